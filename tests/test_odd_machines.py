@@ -20,7 +20,7 @@ PROXIES = {
     "http_proxy": "http://user:secret@proxy:9",
     "HTTPS_PROXY": "proxy:8",
     "ALL_PROXY": "https://[::1]:7",
-    "NO_PROXY": ".lab,10.0.0.1",
+    "NO_PROXY": ".lab,10.0.0.1,fd00::1",
 }
 
 
@@ -40,7 +40,8 @@ def bare(monkeypatch):
         ("ftp://models.org", " through the proxy https://[::1]:7 of ALL_PROXY"),
         ("http://localhost.org", " through the proxy http://proxy:9 of http_proxy"),
         *((f"http://{it}:1/v1", "") for it in ("localhost", "127.0.0.1", "127.1.2.3", "[::1]")),
-        *((f"http://{it}", "") for it in ("a.lab:80", "10.0.0.1")),
+        *((f"http://{it}", "") for it in ("localhost.", "0.0.0.0:1", "[::ffff:127.0.0.1]", "[::]")),
+        *((f"http://{it}", "") for it in ("a.lab:80", "10.0.0.1", "[fd00::1]:80")),
     ],
 )
 def test_a_proxy_is_named_and_this_machine_needs_none(bare, url, named):
@@ -49,9 +50,15 @@ def test_a_proxy_is_named_and_this_machine_needs_none(bare, url, named):
     assert proxy_of(url).words == named
 
 
-@pytest.mark.parametrize("proxy", ["socks5://h:1", "socks://h:1", "http://h:1x"])
-def test_a_proxy_that_cannot_be_used_is_one_sentence(bare, proxy):
-    bare.setenv("ALL_PROXY", proxy.replace("h:", "u:secret@h:"))
+@pytest.mark.parametrize(
+    ("proxy", "secret"),
+    [
+        *((proxy, "secret") for proxy in ("socks5://h:1", "socks://h:1", "http://h:1x")),
+        *(("http://h:1", f"sec{one}ret") for one in "/?#\n "),
+    ],
+)
+def test_a_proxy_that_cannot_be_used_is_one_sentence(bare, proxy, secret):
+    bare.setenv("ALL_PROXY", proxy.replace("h:", f"u:{secret}@h:"))
     bare.setitem(sys.modules, "socksio", None)
     with pytest.raises(MissingDependencyError, match=f"proxy {proxy} of ALL_PROXY cannot be used"):
         make_model(ModelOptions(model="m", base_url="http://models.org/v1"))

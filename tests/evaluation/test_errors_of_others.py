@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import sys
+from collections.abc import Callable
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +15,7 @@ import pytest
 from hosting_fakes import paper_plan, paper_runner
 
 from roboirg import main as cli
+from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.records.store import read_records
@@ -62,6 +65,19 @@ def test_what_a_user_wrote_has_its_place(told: Any, hook: str, spec: str, proces
     found, kind = told(hook, spec, process), "SystemExit" if hook == "class body" else "ValueError"
     assert found.cause.endswith(f": {kind}: from {hook} {RAISED}")
     assert "Traceback" in found.details
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        lambda: ast.literal_eval("1+"),
+        lambda: exec(compile("1/0", "<made by a library>", "exec"), {}),  # noqa: S102
+    ],
+)
+def test_code_without_a_file_has_the_place_that_runs_it(run: Callable[[], Any]) -> None:
+    with pytest.raises((SyntaxError, ZeroDivisionError)) as raised:
+        run()
+    assert one_line(raised.value).rpartition(", line ")[0].endswith(Path(__file__).name)
 
 
 @pytest.mark.parametrize("hook", ["usage", "close"])

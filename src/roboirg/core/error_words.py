@@ -20,7 +20,10 @@ OUR_PACKAGES = "roboirg", "roboirg_learn"
 """Their code is not the user's; their kinds of policies may read the simulator's state."""
 
 MAX_CAUSE_LENGTH = 400
-_LIBRARY = re.compile(r"[\\/](site|dist)-packages[\\/]")
+_LIBRARY = re.compile(
+    r"[\\/](site|dist)-packages[\\/]|<(?!frozen|string|stdin|python-input|ipython-input)"
+)
+"""Files that no user edits: of installed packages, or code that one has generated."""
 
 
 def one_line(error: BaseException) -> str:
@@ -55,8 +58,6 @@ def is_of_others(error: BaseException) -> bool:
 
 def _last_step(error: BaseException) -> tuple[FrameType, int] | None:
     """Return frame and line of the last step in code of users; else in what we called first."""
-    if isinstance(error, SyntaxError):  # its text has the place
-        return None
     theirs = [
         (frame, line)
         for frame, line in traceback.walk_tb(error.__traceback__)
@@ -78,7 +79,7 @@ def _is_python(file: str) -> bool:
 
 
 def _is_users(frame: FrameType) -> bool:
-    """Return whether a file was not installed by pip, or its package adds something to ours."""
+    """Return whether a file is not of a library, or its package adds something to ours."""
     return not _LIBRARY.search(frame.f_code.co_filename) or _package(frame) in _extensions()
 
 

@@ -55,14 +55,14 @@ def _fields() -> dict[str, str]:
 def core_count() -> int:
     """Return how many cores this process may use, within the limit of its container."""
     if hasattr(os, "sched_getaffinity"):
-        return math.ceil(min([len(os.sched_getaffinity(0)), *_quotas()]))
+        return max(1, math.ceil(min([len(os.sched_getaffinity(0)), *_quotas()])))
     return os.cpu_count() or 1
 
 
 def _quotas() -> Iterator[float]:
     """Yield the limit of a container's processor time, in cores, in both versions of cgroups."""
     for names in _CPU_QUOTAS:
-        with contextlib.suppress(OSError, ValueError):  # no such file, or no number
+        with contextlib.suppress(OSError, ValueError, ZeroDivisionError):  # no file, or no numbers
             quota, period = " ".join(Path(name).read_text() for name in names).split()
             # Without a limit, the quota is "max", or -1.
             yield float(quota) / float(period) if float(quota) > 0 else math.inf

@@ -11,8 +11,8 @@ from urllib.request import getproxies_environment, proxy_bypass
 
 from roboirg.core.errors import MissingDependencyError
 
-_LOOPBACK = re.compile(r"localhost|.*\.localhost|127(\.\d+){3}|::1")
-_USABLE = re.compile(r"(https?|socks5h?)://(\S*@)?(\[[\da-f:.]+\]|[^\s/:@]+)(:\d{1,5})?/?")
+_LOOPBACK = re.compile(r"(.*\.)?localhost\.?|(::ffff:)?127(\.\d+){1,3}|::1|::|0\.0\.0\.0")
+_USABLE = re.compile(r"(https?|socks5h?)://([^\s/?#]*@)?(\[[\da-f:.]+\]|[^\s/:@]+)(:\d{1,5})?/?")
 
 
 class Proxy(NamedTuple):
@@ -34,13 +34,17 @@ def proxy_of(url: str) -> Proxy:
         MissingDependencyError: what a variable holds cannot be used; a run stops.
     """
     parts, named = urlsplit(url), getproxies_environment()
-    if _LOOPBACK.fullmatch(parts.hostname or "") or proxy_bypass(parts.netloc):
+    if _LOOPBACK.fullmatch(parts.hostname or "") or any(
+        map(proxy_bypass, (parts.netloc, parts.hostname or ""))
+    ):
         return Proxy()
     for variable in (f"{parts.scheme}_proxy", "all_proxy"):
         if found := named.get(variable.removesuffix("_proxy")):
             name = variable if os.environ.get(variable) else variable.upper()
             address = found if "://" in found else f"http://{found}"
-            words = f"the proxy {re.sub('//.*@', '//', address)} of {name}"  # without a password
+            words = (
+                f"the proxy {re.sub('(?s)//.*@', '//', address)} of {name}"  # without a password
+            )
             if _USABLE.fullmatch(address) and (address[0] != "s" or find_spec("socksio")):
                 return Proxy(address, f" through {words}")
             raise MissingDependencyError(
