@@ -642,7 +642,7 @@ class It:
     cameras = ()
     def reset(self, instruction, demonstration):
         print("last words")
-        threading.Timer(0.05, lambda: os._exit(5)).start()  # between two calls
+        threading.Timer(0.6, lambda: os._exit(5)).start()  # between two calls
         self.metadata = {}
     def act(self, observation):
         return np.ones((1, 8))
@@ -650,7 +650,7 @@ class It:
     )
     monkeypatch.setattr("roboirg.evaluation.play.rollout.MAX_LOSSES", 2)
     plan = paper_plan(spec, 1)
-    runner: PaperRunner = paper_runner(plan, tmp_path, seconds=0.2)
+    runner: PaperRunner = paper_runner(plan, tmp_path, seconds=2.0)
     (record,) = InProcess().run(deque(plan.jobs()), runner)
     assert (record.outcome, record.error, record.attempt) == ("error", "policy", 2)
     assert "the process ended with exit code 5" in str(record.cause)
