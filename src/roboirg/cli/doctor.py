@@ -131,8 +131,9 @@ def _check_packages() -> Iterator[Check]:
         needed = one.marker is None or any(one.marker.evaluate({"extra": it}) for it in _EXTRAS)
         if needed and one.name != DISTRIBUTION:
             wanted[one.name] = one.specifier
+    brings = metadata.packages_distributions()
     for name, specifier in wanted.items():
-        brought = metadata.packages_distributions().get(_MODULES.get(name, ""), [name])
+        brought = brings.get(_MODULES.get(name, ""), [name])
         yield _check_package(name if name in brought else brought[0], specifier)
 
 

@@ -177,7 +177,6 @@ def tables(
     from roboirg.evaluation.analysis.stats.run_data import RunData
     from roboirg.evaluation.analysis.tables.rendering import get_format
     from roboirg.evaluation.analysis.tables.rendering.terminal import print_tables
-    from roboirg.evaluation.analysis.tables.table_notes import with_mixtures
     from roboirg.evaluation.plan.sources import opened_sources
     from roboirg.util.atomic_write import write_atomically
     from roboirg.util.freed_memory import paused_collection
@@ -186,9 +185,7 @@ def tables(
     _check_choice(which, by, runs or [], published=published, floors=floors)
     with paused_collection(), opened_sources(runs or []) as sources:
         data = RunData(read_frame(sources, words=by is not None))
-        found = with_mixtures(
-            _tables(which, by, sources, data, published=published, floors=floors), data.frame
-        )
+        found = _tables(which, by, sources, data, published=published, floors=floors)
     if format in ("csv", "json"):  # without notes
         warn_of_mixtures(data.frame)
     if out is not None:
@@ -276,13 +273,16 @@ def _tables(
     floors: str | None,
 ) -> list[Table]:
     from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
+    from roboirg.evaluation.analysis.tables.table_notes import with_mixtures
 
     if by is not None:
-        return _breakdown_tables(data, by)
-    if which in DIAGNOSTIC_TABLES:
+        found = _breakdown_tables(data, by)
+    elif which in DIAGNOSTIC_TABLES:
         records = (one for source in sources for one in source.records())
-        return [DIAGNOSTIC_TABLES[which](data, records)]
-    return _paper_tables(which, data, published=published, floors=floors)
+        found = [DIAGNOSTIC_TABLES[which](data, records)]
+    else:
+        found = _paper_tables(which, data, published=published, floors=floors)
+    return with_mixtures(found, data.frame)
 
 
 def _paper_tables(which: str, data: RunData, *, published: bool, floors: str | None) -> list[Table]:

@@ -51,7 +51,11 @@ def all_suites() -> tuple[str, ...]:
 
 def every_task() -> Mapping[str, Task]:
     """Return every task by name: the benchmark's, the real robot's, then those of packages."""
-    return {name: task for suites in _suite_groups() for name, task in all_tasks(suites).items()}
+    # The suites of packages are ordered by code together.
+    return {
+        **all_tasks(SUITES),
+        **all_tasks(tuple(suite for suite in all_suites() if suite not in SUITES)),
+    }
 
 
 def get_task(name: str) -> Task:
@@ -96,11 +100,6 @@ def _registry() -> tuple[Task, ...]:
                 f"{task.suite + '-more'!r}."
             )
     return tuple(tasks)
-
-
-def _suite_groups() -> tuple[tuple[str, ...], ...]:
-    """Return the suites that are ordered by code together, in order."""
-    return (SUITES, tuple(suite for suite in all_suites() if suite not in SUITES))
 
 
 def _expand(word: str) -> tuple[str, ...]:

@@ -47,7 +47,7 @@ def temporary_folder() -> Path:
     """Return the folder of this user among the temporary files, made for this user alone.
 
     Raises:
-        InvalidValueError: it belongs to somebody else, who could fill it with anything.
+        InvalidValueError: it belongs to another user, who could fill it with anything.
     """
     folder = Path(tempfile.gettempdir()) / f"{_NAME}-{os.getuid()}"
     folder.mkdir(mode=0o700, exist_ok=True)

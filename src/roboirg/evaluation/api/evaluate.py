@@ -66,7 +66,7 @@ def evaluate(
     from roboirg.evaluation.plan.plan import PLAN_KEYS
 
     own = inspect.signature(evaluate).parameters
-    check_names("option of evaluate()", options, (*own, *PLAN_KEYS))
+    check_names("option of evaluate()", options, {**own, **dict.fromkeys(PLAN_KEYS)})
     plan = python_plan(
         policy,
         tasks=tasks,
