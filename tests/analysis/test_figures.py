@@ -12,6 +12,7 @@ import pytest
 from msgspec.structs import replace
 from page_text import played
 
+from roboirg.core.failures import FAILURES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.figures import draw_figure, failures, write_figures
 from roboirg.evaluation.analysis.figures.rates import Rate, RateRow, draw_rates
@@ -22,7 +23,6 @@ from roboirg.evaluation.analysis.stats.measure import ALL_TASKS
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record import Summary
-from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 
 pytest.importorskip("matplotlib")
 
@@ -136,7 +136,7 @@ def test_bars_are_shares_of_what_was_played(monkeypatch: pytest.MonkeyPatch) -> 
     failed = [one.attribution.failure for one in results() if one.attribution is not None]
     for name, color in failures.COLORS.items():
         assert forgetful.get(color, 0) == pytest.approx(100 * failed.count(name) / 6)
-    assert len({*failures.COLORS.values()}) == len(GROUNDING) + len(EXECUTION) + 1
+    assert len({*failures.COLORS.values()}) == len(FAILURES) + 1
 
 
 def test_gaps_are_those_of_the_summary() -> None:

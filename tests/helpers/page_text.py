@@ -10,6 +10,7 @@ from made_records import make_record
 from msgspec.structs import replace
 from typer.testing import CliRunner
 
+from roboirg.core.failures import FAILURES
 from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.sources import Source
@@ -17,7 +18,6 @@ from roboirg.evaluation.plan.stored_plans import write_plan
 from roboirg.evaluation.records.record import Attribution, EventRecord, Record
 from roboirg.evaluation.records.record_codec import encode
 from roboirg.evaluation.records.store import RECORDS_FILE
-from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 from roboirg.main import app
 
 PLAN = Plan(
@@ -26,10 +26,7 @@ PLAN = Plan(
     episodes=(0, 1, 2),
     forms=("implicit", "resolved"),
 )
-MISSES = [
-    *(("grounding", failure) for failure in GROUNDING),
-    *(("execution", failure) for failure in EXECUTION),
-]
+MISSES = [(meaning.kind, failure) for failure, meaning in FAILURES.items()]
 
 
 def played(plan: Plan) -> list[Record]:

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from staged import Staged
 from syrupy.assertion import SnapshotAssertion
 
-from roboirg.core.conditions import ExecutionFailure, Fact, GroundingFailure, Rule, facts_of
+from roboirg.core.conditions import Fact, Rule, facts_of
 from roboirg.core.episode import Episode
+from roboirg.core.failures import FAILURES, FailureName
 from roboirg.judging import FailureAttribution, Status, attribute_failure
-from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.fingerprint import NOT_COUNTED, fingerprint, plain
 from roboirg.tasks.splits.splits import get_episode
@@ -67,8 +67,7 @@ def test_each_way_to_fail_is_told(task: str, one: Case, snapshot: SnapshotAssert
 
 def check(staged: Staged, found: FailureAttribution) -> None:
     """What holds of every finding."""
-    assert found.kind == ("grounding" if found.failure in GROUNDING else "execution")
-    assert found.failure in (*GROUNDING, *EXECUTION)
+    assert found.kind == FAILURES[found.failure].kind
     assert 0 <= found.step <= staged.step - staged.turn
     assert re.fullmatch(r"[A-Z].*[^.]\.", found.sentence)
     if found.subject is not None:
@@ -89,9 +88,7 @@ def test_every_task_has_the_failures_that_the_document_says_and_no_others() -> N
 
 def test_every_failure_is_defined_once_in_the_document() -> None:
     defined = re.findall(r"^\| (?:grounding|execution)? ?\| `(\w+)` \|", DOCUMENT, re.MULTILINE)
-    assert tuple(defined) == (*GROUNDING, *EXECUTION)
-    assert get_args(GroundingFailure) == GROUNDING
-    assert get_args(ExecutionFailure) == EXECUTION
+    assert tuple(defined) == tuple(FAILURES) == get_args(FailureName)
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -253,7 +250,7 @@ def test_rules_name_their_failure_where_their_facts_cannot_tell() -> None:
                         "binned",
                     }, rule
                 else:
-                    assert rule.failure in (*GROUNDING, *EXECUTION)
+                    assert rule.failure in FAILURES
 
 
 def test_how_a_failure_is_described_is_no_part_of_an_episode_s_identity() -> None:

@@ -6,25 +6,10 @@ and from what has happened before.
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from roboirg.core.fact_traits import FactKind, FactTraits, fact_traits
-
-GroundingFailure = Literal[
-    "wrong_object",
-    "mirrored_pick",
-    "wrong_count",
-    "wrong_order",
-    "wrong_time",
-    "wrong_place",
-    "other_goal",
-]
-"""The policy did something else than the instruction means."""
-
-ExecutionFailure = Literal[
-    "nothing_reached", "missed_grasp", "dropped", "misplaced", "out_of_time", "unreachable"
-]
-"""The policy did not complete what the instruction means."""
+from roboirg.core.failures import FailureName
 
 
 class Fact(NamedTuple):
@@ -105,7 +90,7 @@ class Rule(NamedTuple):
 
     condition: Condition
     cause: str
-    failure: GroundingFailure | ExecutionFailure | None = None
+    failure: FailureName | None = None
 
 
 def absent(fact: Fact) -> FactCount:

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 from roboirg.core.conditions import Elapsed, Fact, Rule, facts_of
 from roboirg.core.fact_traits import FactRole, raised_kind
+from roboirg.core.failures import FailureName
 from roboirg.judging.episode_replay import EpisodeReplay, FactInterval
 from roboirg.judging.fact_history import FactHistory
-from roboirg.judging.failure_attribution import FailureAttribution, FailureName
+from roboirg.judging.failure_attribution import FailureAttribution
 from roboirg.judging.grounding_errors import classify_grounding_error
 from roboirg.judging.judge import describe_act, describe_object
 from roboirg.judging.release_errors import describe_missed_grasp, describe_release, expected_action
@@ -208,6 +209,6 @@ def _nothing_done(replay: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAtt
     )
     if replay.expected_stage == 0 and wanted and not tried:
         words = f"reached none of the objects it needs; {expected_action(replay)}"
-        return FailureAttribution.of("nothing_reached", None, replay.last_step, words)
+        return FailureAttribution.of("no_attempt", None, replay.last_step, words)
     words = f"ran out of time; {expected_action(replay)}"
     return FailureAttribution.of("out_of_time", None, replay.last_step, words)

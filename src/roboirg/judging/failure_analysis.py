@@ -22,10 +22,11 @@ from roboirg.core.conditions import (
     facts_of,
 )
 from roboirg.core.episode import Episode
+from roboirg.core.failures import FailureName
 from roboirg.judging.end_state import describe_end_state
 from roboirg.judging.episode_replay import EpisodeReplay, Event, FactInterval, rejudge
 from roboirg.judging.fact_history import FactHistory
-from roboirg.judging.failure_attribution import FailureAttribution, FailureName
+from roboirg.judging.failure_attribution import FailureAttribution
 from roboirg.judging.grounding_errors import classify_grounding_error
 from roboirg.judging.judge import Status, describe_violation
 from roboirg.judging.release_errors import find_excusing_release

@@ -1,30 +1,24 @@
-"""The result of a failure analysis, and the names of failures."""
+"""The result of a failure analysis."""
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple, get_args
+from typing import NamedTuple
 
-from roboirg.core.conditions import ExecutionFailure, GroundingFailure
-
-FailureName = GroundingFailure | ExecutionFailure
-
-GROUNDING: tuple[GroundingFailure, ...] = get_args(GroundingFailure)
-EXECUTION: tuple[ExecutionFailure, ...] = get_args(ExecutionFailure)
+from roboirg.core.failures import FAILURES, FailureKind, FailureName
 
 
 class FailureAttribution(NamedTuple):
     """Why an episode failed.
 
     Attributes:
-        kind: ``grounding`` (the policy did something else than the instruction means) or
-            ``execution`` (it did not complete what the instruction means).
-        failure: which of the kind, one of `GROUNDING` or `EXECUTION`.
+        kind: as in `roboirg.core.failures.FAILURE_KINDS`.
+        failure: its name, a key of `roboirg.core.failures.FAILURES`.
         subject: name of the object that it is about, if there is one.
         step: control step of the policy's turn at which it showed.
         sentence: the same in words.
     """
 
-    kind: Literal["grounding", "execution"]
+    kind: FailureKind
     failure: FailureName
     subject: str | None
     step: int
@@ -35,7 +29,5 @@ class FailureAttribution(NamedTuple):
         cls, failure: FailureName, subject: str | None, step: int, words: str
     ) -> FailureAttribution:
         """Return an attribution of the kind of the failure; the words become a sentence."""
-        kind: Literal["grounding", "execution"] = (
-            "grounding" if failure in GROUNDING else "execution"
-        )
+        kind = FAILURES[failure].kind
         return cls(kind, failure, subject, step, f"{words[0].upper()}{words[1:]}.")

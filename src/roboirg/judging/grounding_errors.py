@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from roboirg.core.conditions import Fact, GroundingFailure, facts_of
+from roboirg.core.conditions import Fact, facts_of
 from roboirg.core.episode import Stage
 from roboirg.core.fact_traits import FactRole
+from roboirg.core.failures import FailureName
 
 
 def classify_grounding_error(
     fact: Fact, stages: Sequence[Stage], expected_stage: int
-) -> GroundingFailure:
+) -> FailureName:
     """Return the grounding failure of an act that another stage expects, or none.
 
     | the act | is |
@@ -43,7 +44,7 @@ def _repeats(fact: Fact, now: tuple[Fact, ...], past: Sequence[tuple[Fact, ...]]
     return again and any(_is_alike(fact, one) for one in now)
 
 
-def _classify_early(fact: Fact, skipped: Sequence[tuple[Fact, ...]]) -> GroundingFailure:
+def _classify_early(fact: Fact, skipped: Sequence[tuple[Fact, ...]]) -> FailureName:
     """Classify an act before its time by the expected acts that it skips."""
     only_releases = all(one.traits.role is FactRole.RELEASE for facts in skipped for one in facts)
     ends_task = fact.traits.role is FactRole.PRESS

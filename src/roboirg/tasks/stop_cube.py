@@ -8,7 +8,6 @@ target's place; here it is drawn independently.
 from __future__ import annotations
 
 import math
-from typing import Literal
 
 import numpy as np
 
@@ -98,7 +97,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     )
     press = Stage(
         expects=stopped,
-        forbids=(*_wrong(interval, visit, off_target="misplaced"), too_early),
+        forbids=(*wrong, too_early),
         primitive=Primitive("press_below", "button", steps=interval * visit - interval // 2),
         subgoal="press the button to stop the cube on the target {at}",
         points_at="target",
@@ -117,17 +116,15 @@ def checkpoints(interval: int, visit: int) -> tuple[int, ...]:
     return (*range(CHECKPOINT, press, CHECKPOINT), press)
 
 
-def _wrong(
-    interval: int, visit: int, off_target: Literal["wrong_time", "misplaced"] = "wrong_time"
-) -> tuple[Rule, ...]:
-    """Return the rules of every stage; in the last, a press off the target is bad aim."""
+def _wrong(interval: int, visit: int) -> tuple[Rule, ...]:
+    """Return the rules of every stage."""
     off = All((Fact("pressed", "button"), absent(Fact("near", "shuttle", "target"))))
     return (
-        Rule(off, "pressed the button while the cube was off the target", off_target),
+        Rule(off, "pressed the button while the cube was off the target", "mistimed"),
         Rule(
             Elapsed(least=interval * visit + 1),
             f"let the cube's {ORDINALS[visit - 1]} visit pass",
-            "wrong_time",
+            "stopped",
         ),
     )
 

@@ -224,7 +224,7 @@ def test_operators_choose_among_the_failures_of_the_task(task, wrong):
         choices = failure_choices(trial.episode)
         assert {one.failure for one in choices if one.is_grounding} == wrong
         assert [one.failure for one in choices if not one.is_grounding] == [
-            "nothing_reached", "missed_grasp", "dropped", "misplaced", "out_of_time",
+            "missed_grasp", "dropped", "misplaced", "out_of_time", "stopped", "no_attempt",
         ]  # fmt: skip
         assert len({one.key for one in choices}) == len(choices)
         meant = str(trial.episode.goal["color"])

@@ -19,6 +19,7 @@ import msgspec
 from roboirg.core.arms import TOLD
 from roboirg.core.delivery import PromptVerdict
 from roboirg.core.environment_options import EnvironmentOptions
+from roboirg.core.failures import FailureKind
 from roboirg.core.field_types import MOST_CAUSE_LETTERS, Cause, Name, Subgoal, Whole
 from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.instruction_options import InstructionOptions
@@ -43,7 +44,6 @@ instruction is longer than what the policy's model reads, and such episodes were
 
 ERROR_KINDS: tuple[ErrorKind, ...] = get_args(ErrorKind)
 
-FailureKind = Literal["grounding", "execution"]
 OriginalStatus = Literal["success", "failure", "undecided"]
 
 NON_DETERMINISTIC_FIELDS = frozenset(
@@ -217,12 +217,11 @@ class SubgoalRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
 
 class Attribution(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Why an episode failed, concluded from its events.
+    """Why an episode failed, concluded from what was declared, its events and its attempts.
 
     Attributes:
-        kind: ``grounding`` (the policy did the wrong thing) or ``execution`` (it tried the right
-            thing and did not succeed).
-        failure: subtype, as in `roboirg.judging.failure_attribution`.
+        kind: as in `roboirg.core.failures.FAILURE_KINDS`.
+        failure: its name, as in `roboirg.core.failures.FAILURES`.
         subject: name of the object concerned, if there is one.
         step: control step of the policy's turn at which the failure showed, if there is one.
         sentence: explanation in words.
@@ -391,6 +390,8 @@ class Record(Summary, kw_only=True, forbid_unknown_fields=True):  # type: ignore
         end_state: hash of the state in which the episode left the world and the judge; None if it
             did not come to an end.
         events: facts that became true or false, in order.
+        attempts: the same for facts of attempts, which no stage expects; None if nobody watched for
+            them, as with a real robot and in older records.
         subgoals: what a planner named, in order.
         usage: what models queried by the policy cost: ``calls``, ``input_tokens``,
             ``output_tokens``, ``cost_usd``.
@@ -412,6 +413,7 @@ class Record(Summary, kw_only=True, forbid_unknown_fields=True):  # type: ignore
     inference: InferenceFacts | None = None
     end_state: str | None = None
     events: tuple[EventRecord, ...] = ()
+    attempts: tuple[EventRecord, ...] | None = None
     subgoals: tuple[SubgoalRecord, ...] = ()
     usage: dict[str, float] = {}
     timings: dict[str, float] = {}

@@ -6,15 +6,17 @@ from typing import NamedTuple
 
 from roboirg.core.conditions import Rule, facts_of
 from roboirg.core.episode import Episode
+from roboirg.core.failures import FailureName
 from roboirg.evaluation.records.record import Attribution
-from roboirg.judging.failure_attribution import FailureAttribution, FailureName
+from roboirg.judging.failure_attribution import FailureAttribution
 
-EXECUTION_WORDS: tuple[tuple[FailureName, str], ...] = (
-    ("nothing_reached", "never reached the right object"),
+OTHER_WORDS: tuple[tuple[FailureName, str], ...] = (
     ("missed_grasp", "reached the right object but did not lift it"),
     ("dropped", "dropped the right object"),
     ("misplaced", "put the right object down next to its place"),
-    ("out_of_time", "ran out of time, or stopped half-way"),
+    ("out_of_time", "ran out of time on the way"),
+    ("stopped", "stopped half-way"),
+    ("no_attempt", "never went to the right object"),
 )
 
 
@@ -50,7 +52,7 @@ class FailureChoice(NamedTuple):
 
 
 def failure_choices(episode: Episode) -> tuple[FailureChoice, ...]:
-    """Return the failures of a trial: grounding failures by the task's rules, then execution."""
+    """Return the failures of a trial: grounding failures by the task's rules, then the others."""
     rules = dict.fromkeys(
         rule for stage in episode.stages for rule in stage.forbids if isinstance(rule, Rule)
     )
@@ -61,5 +63,5 @@ def failure_choices(episode: Episode) -> tuple[FailureChoice, ...]:
             fact = facts_of(rule)[0]
             key = f"{rule.failure}:{fact.place or fact.subject}"
             grounding.append(FailureChoice(key, rule.failure, fact.subject, rule.cause))
-    execution = [FailureChoice(name, name, None, words) for name, words in EXECUTION_WORDS]
+    execution = [FailureChoice(name, name, None, words) for name, words in OTHER_WORDS]
     return (*grounding, *execution)

@@ -21,14 +21,19 @@ HEIGHT = 1.55
 """Of a bar, of the two lines of a row."""
 MIN_LABELED_PERCENT = 6.0
 """Smallest part with room for its number, percent."""
-_ORANGE = ("#7f2704", "#a63603", "#c0510a", "#ee8130", "#fbb477", "#fddfbf", "#fff1e3")
-_BLUE = ("#08306b", "#20578f", "#3f85bd", "#74b0d8", "#a9d0e8", "#d9ebf6")
-_DARK = frozenset((*_ORANGE[:3], *_BLUE[:3]))
+_ORANGE = (
+    "#7f2704", "#a63603", "#c0510a", "#dd6a1c", "#ee8130", "#fbb477", "#fddfbf", "#fff1e3",
+)  # fmt: skip
+_BLUE = (
+    "#08306b", "#20578f", "#3271a8", "#4b90c4", "#74b0d8", "#a9d0e8", "#d9ebf6", "#edf5fb",
+)  # fmt: skip
+_GRAY = ("#5f5f5f", "#858585", "#ababab", "#cfcfcf")
+_DARK = frozenset((*_ORANGE[:4], *_BLUE[:4], *_GRAY[:2]))
 NOTE = "n: trials with a verdict; the rest of a bar succeeded."
 
 
-COLORS = dict(zip(FAILURES, (*_ORANGE, *_BLUE, "#bbbbbb"), strict=True))
-"""By name of the failure: shades of orange for grounding, of blue for execution."""
+COLORS = dict(zip(FAILURES, (*_ORANGE, *_BLUE, *_GRAY, "#eeeeee"), strict=True))
+"""By name of the failure: orange for grounding, blue for execution, gray for undecided."""
 
 
 def draw_failures(content: RunData) -> Figure | None:

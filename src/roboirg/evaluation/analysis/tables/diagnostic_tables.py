@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from roboirg.core import failures
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.results.frame import Frame, suite
 from roboirg.evaluation.analysis.results.option_labels import (
@@ -40,15 +41,13 @@ from roboirg.evaluation.analysis.tables.table import (
     named_columns,
 )
 from roboirg.evaluation.records.record import Record
-from roboirg.judging.failure_attribution import EXECUTION, GROUNDING
 
 UNATTRIBUTED = "not attributed"
 FAILURES: Mapping[str, str] = {
-    **dict.fromkeys(GROUNDING, "grounding"),
-    **dict.fromkeys(EXECUTION, "execution"),
+    **{name: one.kind for name, one in failures.FAILURES.items()},
     UNATTRIBUTED: "",
 }
-"""The names of failures with their kinds, those of grounding first."""
+"""The names of failures with their kinds, in the order of the core's table."""
 OF_CELLS = ("policy and setting", "task")
 CELL = ("run", "options", "scope")
 
@@ -59,8 +58,8 @@ _FORMS_NOTE = (
 )
 _FAILURES_NOTE = (
     "Failed episodes, and how many of them failed in each way, with their share of the failures. "
-    "Grounding: the policy did something else than the instruction means; execution: it did not "
-    "complete what the instruction means."
+    + ". ".join(f"{kind.capitalize()}: {means}" for kind, means in failures.FAILURE_KINDS.items())
+    + "."
 )
 _BREAKDOWN_NOTE = (
     "Success in percent, the gap to explicit on the same episodes in points, its interval, and "
