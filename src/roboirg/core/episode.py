@@ -17,6 +17,7 @@ from typing import Literal, NamedTuple, TypeVar, get_args
 
 from roboirg.core.conditions import Condition, Fact, Rule
 from roboirg.core.motions import Motion, Point
+from roboirg.core.object_sizes import HALF_WIDTHS
 
 Color = Literal["red", "green", "blue", "yellow", "gray", "purple"]
 Difficulty = Literal["easy", "medium", "hard"]
@@ -80,6 +81,11 @@ class SceneObject:
     radius: float | None = None
     thickness: float | None = None
     rgb: tuple[float, float, float] | None = None
+
+    @property
+    def half_width(self) -> float:
+        """Half its width in the plane, m; 0 for kinds that are not known here."""
+        return self.radius or HALF_WIDTHS.get(self.kind, 0.0)
 
 
 @dataclass(frozen=True, slots=True)

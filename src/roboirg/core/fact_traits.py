@@ -5,7 +5,8 @@ Another package adds a kind with `register_fact_kind`, in the module of the task
     register_fact_kind("upright", FactTraits(..., detect=detect_upright))
 
 Thresholds are in meters, radians and seconds (RoboMME, evaluation mode). ``reached`` and ``held``
-are our own: no stage expects them, they show how something failed.
+are our own: no stage expects them, they show how something failed. So are the kinds with the role
+`FactRole.ATTEMPT`, which form a list of their own.
 """
 
 from __future__ import annotations
@@ -47,6 +48,8 @@ class FactRole(StrEnum):
     """A button is down. It often ends a task."""
     STATE = "state"
     """No act: how the robot or the world is."""
+    ATTEMPT = "attempt"
+    """What the hand tried or where it was: for attribution alone, never among a world's facts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,6 +221,58 @@ _TRAITS: dict[FactKind, FactTraits] = {
         holds_while="all nine joints are within 0.01 of the home position",
         past="went home",
         state="home",
+        timeline="nothing",
+    ),
+    "above": FactTraits(
+        role=FactRole.ATTEMPT,
+        subjects=("robot",),
+        places=_GRASPABLE,
+        holds_while="the hand is below z 0.25 and within 0.05 (xy) of its outline",
+        past="moved above {place}",
+        state="above",
+        timeline="nothing",
+    ),
+    "clutched": FactTraits(
+        role=FactRole.ATTEMPT,
+        subjects=_GRASPABLE,
+        holds_while="at the step at which the fingers have closed on nothing and it is nearest, "
+        "within 0.05 (xy) of its outline and 0.05 above its origin; another one too that is less "
+        "than 0.015 farther",
+        past="closed its fingers next to {subject}",
+        state="missed",
+    ),
+    "emptied": FactTraits(
+        role=FactRole.ATTEMPT,
+        subjects=("robot",),
+        places=("target", "bin", "box", "cube"),
+        holds_while="at the step at which closed fingers that held nothing and were above z 0.1 "
+        "open within 0.05 (xy) of its outline: below z 0.1, or at any height over a bin or box",
+        past="opened an empty hand at {place}",
+        state="emptied at",
+    ),
+    "beside": FactTraits(
+        role=FactRole.ATTEMPT,
+        subjects=_MOVABLE,
+        places=("target", "bin", "box"),
+        holds_while="it is held within 0.05 (xy) of the outline of the place",
+        past="carried {subject} to {place}",
+        state="carried to",
+        timeline="nothing",
+    ),
+    "pressed_beside": FactTraits(
+        role=FactRole.ATTEMPT,
+        subjects=("button",),
+        holds_while="it is not pressed, and closed fingers that were above z 0.1 are below z 0.06 "
+        "and within 0.05 (xy) of its outline",
+        past="came down next to {subject}",
+        state="missed",
+    ),
+    "lingering": FactTraits(
+        role=FactRole.ATTEMPT,
+        subjects=("robot",),
+        holds_while="the hand has stayed within 0.05 of a point for 60 steps",
+        past="stayed where it was",
+        state="lingering",
         timeline="nothing",
     ),
 }

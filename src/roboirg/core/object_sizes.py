@@ -63,3 +63,25 @@ TAPE_HALF = 0.0175
 leans on the walls of a box has its middle below 0.035."""
 TAPE_SIDES = 12
 """Sides of the ring that is a roll: an even number, since the fingers are parallel."""
+
+HALF_WIDTHS = {
+    "cube": CUBE_HALF,
+    "tape": TAPE_RADIUS,
+    "container": CONTAINER_FOOTPRINT_HALF,
+    "button": BUTTON_BASE_HALF[0],
+    "bin": BIN_HALF,
+    "box": BOX_HALF,
+}
+"""Half the width of an object by its kind; targets and sites have a radius instead."""
+
+BESIDE = 0.05
+"""How far from the outline of an object, in the plane, a hand is next to it."""
+UNCLEAR = 0.015
+"""Closing fingers mean two objects if the distances to their outlines differ by less."""
+HAND_HIGH, HAND_RAISED, HAND_LOW = 0.25, 0.1, 0.06
+"""Heights of the tool center: above the first it is at no object; closed fingers that were above
+the second and come below it let go, and press if they come below the third."""
+FINGERS_SHUT = 0.004
+"""Largest position of a finger that has closed on nothing."""
+LINGER_STEPS = 60
+"""Control steps for which a hand that stays where it is lingers."""

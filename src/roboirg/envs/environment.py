@@ -182,6 +182,11 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         return tuple(self.session.events)
 
     @property
+    def attempts(self) -> Sequence[Event]:
+        """What the hand tried since reset, as events of facts with the role ``attempt``."""
+        return tuple(self.session.attempts)
+
+    @property
     def render_device(self) -> str:
         """Name of the render device, or "none" if nothing is rendered."""
         return describe_device(find_render_device()).name if self._renders else "none"

@@ -35,6 +35,7 @@ class EpisodeSession:
         original: follows the stages to the scene's own goal in the same way, if the episode has
             another one; else None.
         events: all events since the start.
+        attempts: the same of facts of attempts, which nothing is judged by.
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class EpisodeSession:
         self.judge = _judge_of(episode)
         self.original = None if original is None else _judge_of(original)
         self.events: list[Event] = list(changes(0, frozenset(), self.world.facts))
+        self.attempts: list[Event] = []
         self._judge()
 
     @property
@@ -69,9 +71,10 @@ class EpisodeSession:
 
     def step(self, action: NDArray[np.floating[Any]]) -> None:
         """Execute one action (8) and judge the result."""
-        before = self.world.facts
+        before, tried = self.world.facts, self.world.attempts
         now = self.world.step(action)
         self.events += changes(self.world.elapsed, before, now)
+        self.attempts += changes(self.world.elapsed, tried, self.world.attempts)
         self._judge()
 
     def play_demonstration(

@@ -13,6 +13,7 @@ import sapien.physx
 from roboirg.core.conditions import Fact
 from roboirg.core.fact_traits import FACT_TRAITS
 from roboirg.core.motions import Point
+from roboirg.simulation.attempt_detection import AttemptDetector, distance_in_plane
 from roboirg.simulation.bodies import Body
 from roboirg.simulation.panda import Panda
 from roboirg.simulation.physics_settings import FINGER_OPEN, HOME
@@ -60,6 +61,9 @@ class FactDetector:
     """Detects the facts of one world.
 
     It keeps the last ones: some facts start and cease at different thresholds, or last.
+
+    Attributes:
+        attempts: detects what the hand tries.
     """
 
     def __init__(self, bodies: Mapping[str, Body], robot: Panda) -> None:
@@ -72,6 +76,7 @@ class FactDetector:
         self._contacts: Contacts = []
         self._stopped: AbstractSet[str] = frozenset()
         self._tool = self._tool_now()
+        self.attempts = AttemptDetector(bodies, robot)
 
     def detect(
         self,
@@ -95,6 +100,7 @@ class FactDetector:
         facts.update(self._robot_facts())
         facts.update(self._registered_facts(present))
         self._before = frozenset(facts)
+        self.attempts.detect(self._tool, self._before)
         return self._before
 
     def _facts_about(self, body: Body) -> Iterator[Fact]:
@@ -128,7 +134,7 @@ class FactDetector:
             distance, height = BEYOND_DISTANCE, BEYOND_HEIGHT
             if fact not in self._before:
                 distance, height = OVER_DISTANCE, OVER_HEIGHT
-            if position.z < height and _apart(position, target.position) <= distance:
+            if position.z < height and distance_in_plane(position, target.position) <= distance:
                 yield fact
         if position.z > PICKED_HEIGHT:
             if held:
@@ -139,11 +145,11 @@ class FactDetector:
     def _released_facts(self, name: str, position: Point) -> Iterator[Fact]:
         yield Fact("lying", name)
         for place in self._places:
-            if _apart(position, place.position) <= ON_TARGET_DISTANCE:
+            if distance_in_plane(position, place.position) <= ON_TARGET_DISTANCE:
                 yield Fact("placed", name, place.item.name)
         for bin_ in self._bins:
             if (
-                _apart(position, bin_.position) <= ON_TARGET_DISTANCE
+                distance_in_plane(position, bin_.position) <= ON_TARGET_DISTANCE
                 and float(self._robot.finger_positions.min()) > BINNED_FINGERS
                 and math.dist(position, self._tool) > BINNED_TOOL_DISTANCE
             ):
@@ -160,12 +166,13 @@ class FactDetector:
     def _button_facts(self, button: Body) -> Iterator[Fact]:
         if button.pressed_depth > PRESSED_DEPTH:
             yield Fact("pressed", button.item.name)
-        if self._tool.z < HOVER_HEIGHT and _apart(self._tool, button.position) <= HOVER_DISTANCE:
+        apart = distance_in_plane(self._tool, button.position)
+        if self._tool.z < HOVER_HEIGHT and apart <= HOVER_DISTANCE:
             yield Fact("hovering", "robot", button.item.name)
 
     def _shuttle_facts(self, shuttle: Body) -> Iterator[Fact]:
         for target in self._targets:
-            if _apart(shuttle.position, target.position) <= NEAR_DISTANCE:
+            if distance_in_plane(shuttle.position, target.position) <= NEAR_DISTANCE:
                 yield Fact("near", shuttle.item.name, target.item.name)
                 if shuttle.item.name in self._stopped:
                     yield Fact("stopped", shuttle.item.name, target.item.name)
@@ -180,14 +187,16 @@ class FactDetector:
 
     def _hand_facts(self, body: Body, position: Point) -> Generator[Fact, None, bool]:
         """Yield the facts about the hand at a movable object; return whether the hand holds it."""
-        distance = math.dist(position, self._tool)
-        if distance > REACH:
+        apart = distance_in_plane(position, self._tool)
+        if apart > REACH:
             return False
+        distance = math.dist(position, self._tool)
         if distance <= REACHED_DISTANCE:
             yield Fact("reached", body.item.name)
-        held = self._robot.grasps(body.physics, self._contacts)
+        held = distance <= REACH and self._robot.grasps(body.physics, self._contacts)
         if held:
             yield Fact("held", body.item.name)
+        self.attempts.near.append((body, apart - body.item.half_width, held))
         return held
 
     def _of_kind(self, kind: str) -> tuple[Body, ...]:
@@ -195,8 +204,3 @@ class FactDetector:
 
     def _tool_now(self) -> Point:
         return Point(*(float(value) for value in self._robot.tool_pose.p))
-
-
-def _apart(first: Point, second: Point) -> float:
-    """Return the distance in the plane, m."""
-    return math.hypot(first.x - second.x, first.y - second.y)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Set as AbstractSet
 from typing import Any
 
 import numpy as np
@@ -90,6 +91,11 @@ class World:
             self.robot.set_targets(action)
             for _ in range(physics_settings.PHYSICS_STEPS):
                 self._physics.step()
+
+    @property
+    def attempts(self) -> AbstractSet[Fact]:
+        """What the hand tried in the last step: facts that no stage expects."""
+        return self._detector.attempts.found
 
     @property
     def absent(self) -> frozenset[str]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import cast
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, cast
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Episode
@@ -19,6 +19,20 @@ def judged_events(events: Iterable[EventRecord], start: int) -> list[Event]:
     return [
         Event(one.step + start, Fact(one.kind, one.subject, one.place), one.holds) for one in events
     ]
+
+
+def recorded_events(events: Iterable[Mapping[str, Any]], start: int) -> tuple[EventRecord, ...]:
+    """Return the events of an environment for records, the reverse of `judged_events`."""
+    return tuple(
+        EventRecord(
+            step=int(event["step"]) - start,
+            kind=str(event["kind"]),
+            subject=str(event["subject"]),
+            place=None if event.get("place") is None else str(event["place"]),
+            holds=bool(event.get("holds", True)),
+        )
+        for event in events
+    )
 
 
 def find_goal_outcomes(

@@ -19,10 +19,11 @@ from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.core.subgoal_text import split_point
 from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.episode_record import conclude, utterances_at
+from roboirg.evaluation.play.goal_outcomes import recorded_events
 from roboirg.evaluation.play.job_instruction import PreparedJob
 from roboirg.evaluation.play.video_writer import VideoWriter
 from roboirg.evaluation.records.action_log import ActionLog
-from roboirg.evaluation.records.record import EventRecord, Record, SubgoalRecord
+from roboirg.evaluation.records.record import Record, SubgoalRecord
 from roboirg.judging import judge_subgoal, plain_subgoal
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.play import EpisodeLoop
@@ -137,16 +138,7 @@ class GuardedLoop(EpisodeLoop):
         self._record.policy_metadata, self._record.server_version = found, server_version(found)
 
     def _add_events(self, info: Mapping[str, Any]) -> None:
-        self._record.events += tuple(
-            EventRecord(
-                step=int(event["step"]) - self._start,
-                kind=str(event["kind"]),
-                subject=str(event["subject"]),
-                place=None if event.get("place") is None else str(event["place"]),
-                holds=bool(event.get("holds", True)),
-            )
-            for event in info.get("events", ())
-        )
+        self._record.events += recorded_events(info.get("events", ()), self._start)
 
     def _add_heard(self, utterances: Sequence[Mapping[str, Any]]) -> None:
         self._heard += utterances
@@ -234,8 +226,10 @@ class GuardedLoop(EpisodeLoop):
             self._read_metadata()
 
     def keep_actions(self) -> None:
-        """Keep the executed actions, and where they left the world; record its hash."""
+        """Keep the executed actions and where they left the world; record its hash and attempts."""
         numbers, self._record.end_state = self.env.end_state()
+        tried = [one.as_dict() for one in self.env.attempts]
+        self._record.attempts = recorded_events(tried, self._start)
         starts = np.cumsum([0, *map(len, self.answers)], dtype=np.int32)[:-1]
         rows = np.concatenate([np.empty((0, self._space.size)), *self.answers])
         self.log = ActionLog(self._space.name, rows, starts, numbers)

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from roboirg.core import object_sizes
 from roboirg.core.footprints import Circle, Footprint, Rectangle, overlap
+from roboirg.core.object_sizes import HALF_WIDTHS
 from roboirg.simulation.bodies import Body
 
 FINGER_OFFSET = 0.048
@@ -61,21 +61,11 @@ def _fingers(x: float, y: float, side: NDArray[np.float64]) -> list[Rectangle]:
 def _footprints(body: Body) -> Iterator[Footprint]:
     """Yield the areas near the table that an object blocks."""
     x, y, _ = body.position
-    yaw = body.yaw
-    match body.item.kind:
-        case "cube":
-            yield Rectangle(x, y, object_sizes.CUBE_HALF, object_sizes.CUBE_HALF, yaw)
-        case "tape":
-            yield Circle(x, y, object_sizes.TAPE_RADIUS)
-        case "box":
-            yield Rectangle(x, y, object_sizes.BOX_HALF, object_sizes.BOX_HALF, yaw)
-        case "container":
-            half = object_sizes.CONTAINER_FOOTPRINT_HALF
-            yield Rectangle(x, y, half, half, yaw)
-        case "button":
-            yield Rectangle(x, y, *object_sizes.BUTTON_BASE_HALF[:2])
-        case "bin":
-            yield Rectangle(x, y, object_sizes.BIN_HALF, object_sizes.BIN_HALF, yaw)
+    half = body.item.half_width
+    if body.item.kind == "tape":
+        yield Circle(x, y, half)
+    elif body.item.kind in HALF_WIDTHS:
+        yield Rectangle(x, y, half, half, body.yaw)
 
 
 def _rotation(closing: NDArray[np.float64]) -> Rotation:

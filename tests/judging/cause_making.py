@@ -1,0 +1,388 @@
+"""Make failures whose cause is known: the oracle's motions in the simulator, disturbed on purpose.
+
+A cause is a function that plays with `Hands`, marked with its truth: the kind and the name of the
+failure that was made (not what the acts look like), or ``success`` for a control.
+
+    @cause("execution", "missed_grasp", "PickXtimes", "VideoRepick")
+    def misses_the_first_and_goes_on(hands: Hands) -> None:
+        first, *rest = hands.stages
+        hands.do(first, beside=0.04)  # the whole motion 4 cm beside its object
+        hands.play(rest)
+
+`hands.stages` are those of the episode; `hands.stages_of(goal)` those of another goal of the scene
+(`hands.other_goals`). What the scene does not offer is refused with `need(...)`, and the cause is
+then not played there. A cause ends where the episode does; if it returns before, the arm rests
+until time is up. Then ``play_cause(one, episode)`` returns the course of facts to store, and
+`write_courses` and `read_courses` keep many of them in a file. Give causes names of their own: they
+are the rows of a table.
+"""
+
+from __future__ import annotations
+
+import json
+import lzma
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Episode, Goal, Primitive, Stage
+from roboirg.core.errors import MotionPlanningError
+from roboirg.core.motions import Point
+from roboirg.judging import Event
+from roboirg.tasks import get_task
+from roboirg.tasks.splits.splits import get_episode
+
+TIME = 1300
+"""Steps that a cause has, unless it says otherwise."""
+OPEN, CLOSED = 1.0, -1.0
+
+
+class NotOfferedError(Exception):
+    """The scene does not offer what a cause needs."""
+
+
+class OverError(Exception):
+    """The episode has ended."""
+
+
+class Course(NamedTuple):
+    """What happened in an episode, and what was made to happen.
+
+    Attributes:
+        cause: name of the cause.
+        kind: of the failure that was made: grounding, execution, undecided; ``success`` of a
+            control.
+        failure: its name, or None if only the kind counts.
+        where: task, split and index of the episode.
+        status: how it ended: success, failure, timeout.
+        start: steps of the world before the policy's turn.
+        elapsed: steps of the world in all.
+        words: the judge's cause, if it gave one.
+        declared: what a listener understood, as `Hands.declare` got it; None if nothing was said.
+        events: facts that changed.
+        attempts: the same of facts of attempts.
+    """
+
+    cause: str
+    kind: str
+    failure: str | None
+    where: tuple[str, str, int]
+    status: str
+    start: int
+    elapsed: int
+    words: str | None
+    declared: Mapping[str, Any] | None
+    events: tuple[Event, ...]
+    attempts: tuple[Event, ...]
+
+    @property
+    def episode(self) -> Episode:
+        return get_episode(*self.where)
+
+
+class Cause(NamedTuple):
+    """One way to fail, as `cause` marks it."""
+
+    name: str
+    kind: str
+    failure: str | None
+    tasks: tuple[str, ...]
+    play: Callable[[Hands], None]
+    time: int
+
+
+CAUSES: list[Cause] = []
+
+
+def cause(
+    kind: str, failure: str | None, *tasks: str, time: int = TIME
+) -> Callable[[Callable[[Hands], None]], Callable[[Hands], None]]:
+    """Mark a function as a cause of a failure in some tasks, with the steps that it has."""
+
+    def keep(play: Callable[[Hands], None]) -> Callable[[Hands], None]:
+        CAUSES.append(Cause(play.__name__, kind, failure, tasks, play, time))
+        return play
+
+    return keep
+
+
+def need(offered: object) -> None:
+    """Refuse a scene that does not offer something."""
+    if not offered:
+        raise NotOfferedError
+
+
+class Hands:
+    """The oracle's hands in one episode, which can be disturbed.
+
+    Attributes:
+        episode: what is played.
+        stages: what is meant.
+        rng: for whatever a cause draws; the same in each run.
+        slower: how many times slower than the oracle everything is done.
+    """
+
+    def __init__(self, episode: Episode, time: int) -> None:
+        import roboirg
+
+        self.env = roboirg.make(episode, cameras=(), max_steps=time)
+        _, info = self.env.reset()
+        self.start = int(info["elapsed_steps"])
+        self.episode, self.stages, self.slower = episode, episode.stages, 1
+        self.rng = np.random.default_rng(episode.seed)
+        self.declared: Mapping[str, Any] | None = None
+        self._expert = _disturbed_expert(self.env.session.world)
+
+    # What there is
+
+    @property
+    def other_goals(self) -> list[Goal]:
+        """All other goals of the scene."""
+        goals = get_task(self.episode.task).goals(self.episode.scene)
+        return [goal for goal in goals if goal != self.episode.goal]
+
+    def stages_of(self, goal: Goal) -> tuple[Stage, ...]:
+        return get_task(self.episode.task).stages(self.episode.scene, goal)
+
+    def others(self, name: str) -> list[str]:
+        """Names of the other objects of the same kind that are there, the nearest first."""
+        same = self.episode.scene.of_kind(self.episode.scene[name].kind)
+        absent = self.env.session.world.absent
+        names = [one.name for one in same if one.name != name and one.name not in absent]
+        return sorted(names, key=lambda one: math.dist(self.at(one), self.at(name)))
+
+    def at(self, name: str) -> Point:
+        """Where an object is now, m."""
+        return self.env.session.world.bodies[name].position
+
+    def picks(self) -> list[int]:
+        """Indices of the stages that pick something up."""
+        return [i for i, one in enumerate(self.stages) if one.primitive.kind.startswith("pick")]
+
+    def holds(self, kind: str, subject: str, place: str | None = None) -> bool:
+        """Whether a fact holds now."""
+        return Fact(kind, subject, place) in self.env.session.world.facts
+
+    @property
+    def step(self) -> int:
+        """Steps of the world so far; those of `Primitive.steps` are counted in the same way."""
+        return self.env.session.world.elapsed
+
+    # What they do
+
+    def play(self, stages: Iterable[Stage]) -> None:
+        """Do stages as the oracle does, each once."""
+        for stage in stages:
+            self.do(stage)
+
+    def do(
+        self,
+        what: Stage | Primitive,
+        *,
+        beside: float | tuple[float, float] = 0.0,
+        lowest: float = 0.0,
+        fingers: float | None = None,
+        open_after: float | None = None,
+        at: float = OPEN,
+        until: float = 1.0,
+    ) -> None:
+        """Do a stage or a primitive, disturbed.
+
+        Args:
+            what: a stage of any goal, or a `Primitive("pick_cube", name)` and the like.
+            beside: by how much the whole motion is beside its object or place, m: a distance, in
+                the direction in which the least is in the way, or a vector (x, y).
+            lowest: the tool stays above this height, m.
+            fingers: the gripper all the time, +1 open to -1 closed; None as the oracle.
+            open_after: share of the motion's pieces after which the fingers are opened to `at`.
+            until: share of the motion's pieces after which it is broken off.
+        """
+        primitive = what.primitive if isinstance(what, Stage) else what
+        about = str(primitive.place or primitive.subject)
+        vector = self._free_way(about, beside) if isinstance(beside, float) else beside
+        self._expert.shift, self._expert.lowest = vector, lowest
+        pieces = _PIECES.get(primitive.kind, 4)
+        for number, rows in enumerate(self._expert.execute(primitive)):
+            if number >= until * pieces:
+                break
+            if fingers is not None:
+                rows[:, -1] = fingers
+            if open_after is not None and number >= open_after * pieces:
+                rows[:, -1] = at
+            self.execute(rows)
+        self._expert.shift, self._expert.lowest = (0.0, 0.0), 0.0
+
+    def execute(self, rows: NDArray[np.float64]) -> None:
+        """Execute joint targets and gripper, (n, 8), perhaps more slowly."""
+        if self.slower != 1:
+            rows = np.repeat(rows, self.slower, axis=0)
+        self.env.step_chunk(rows)
+        if self.env.status != "ongoing":
+            raise OverError
+
+    def go(self, point: Point | tuple[float, float, float]) -> None:
+        """Move the tool in a straight line, fingers down, m; the gripper stays as it is."""
+        self.execute(self._expert.way(Point(*point)))
+
+    def grip(self, gripper: float) -> None:
+        """Open (+1) or close (-1) the fingers, or in between."""
+        self.execute(self._expert.gripping(gripper))
+
+    def wait(self, steps: int) -> None:
+        """Rest."""
+        self.execute(np.repeat(self._expert.here()[None], steps, axis=0))
+
+    def tremble(self, steps: int, size: float = 0.02) -> None:
+        """Shake all joints about where they are, by up to `size`, rad."""
+        rows = np.repeat(self._expert.here()[None], steps, axis=0)
+        rows[:, :-1] += self.rng.uniform(-size, size, rows[:, :-1].shape)
+        self.execute(rows)
+
+    def snatch(self, name: str, times: int = 1, beside: float = 0.03) -> None:
+        """Go for a thing with closing fingers that miss it, the hand up again after each time."""
+        kind = "pick_container" if self.episode.scene[name].kind == "container" else "pick_cube"
+        for _ in range(times):
+            self.do(Primitive(kind, name), beside=beside)
+
+    def declare(self, goal: Goal | Mapping[str, Any] | None, *, impossible: bool = False) -> None:
+        """Say what a listener understood: a goal, or None for no answer."""
+        slots = dict(goal.as_mapping()) if isinstance(goal, Goal) else goal
+        self.declared = {"understood": slots, "impossible": impossible}
+
+    def _free_way(self, name: str, distance: float) -> tuple[float, float]:
+        """Return the vector of a length that leads farthest from all other objects."""
+        if not distance:
+            return 0.0, 0.0
+        world, (x, y, _) = self.env.session.world, self.at(name)
+        others = [
+            body.position
+            for other, body in world.bodies.items()
+            if other != name and other not in world.absent and body.item.kind not in _FLAT
+        ]
+        ways = [
+            (distance * math.cos(turn), distance * math.sin(turn))
+            for turn in np.arange(0.0, 2 * math.pi, math.pi / 8)
+        ]
+
+        def space(way: tuple[float, float]) -> float:
+            gaps = [math.dist((x + way[0], y + way[1]), one[:2]) for one in others]
+            # Not out of the arm's reach, or under it.
+            return min((*gaps, 0.3)) - max(0.0, x + way[0] - 0.15) - max(0.0, -0.2 - x - way[0])
+
+        return max(ways, key=space)
+
+
+_FLAT = ("target", "site", "marker", "shuttle", "hidden_cube")
+_PIECES = {"pick_cube": 6, "pick_container": 6, "place_on": 4, "put_into": 4, "drop_into": 3}
+"""Trajectories that a primitive yields; four where it is not said."""
+
+
+def _disturbed_expert(world: Any) -> Any:
+    from roboirg.simulation.expert.primitives import STRAIGHT_DOWN, MotionPrimitives
+    from roboirg.simulation.physics_settings import GRIPPER_STEPS
+
+    class Disturbed(MotionPrimitives):
+        """Primitives that go beside what they mean, and stay above a height."""
+
+        shift, lowest = (0.0, 0.0), 0.0
+
+        def execute(self, primitive: Primitive) -> Iterator[NDArray[np.float64]]:
+            if primitive.kind == "pick_cube" and self.shift != (0.0, 0.0):
+                return self._grasp_and_lift(primitive.subject, OPEN)  # once
+            return super().execute(primitive)
+
+        def _position(self, name: str) -> Point:
+            place = super()._position(name)
+            return Point(place.x + self.shift[0], place.y + self.shift[1], place.z)
+
+        def _plan(self, position: Point, rotation: Any) -> NDArray[np.float64]:
+            higher = position._replace(z=max(position.z, self.lowest))
+            return super()._plan(higher, rotation)
+
+        def way(self, point: Point) -> NDArray[np.float64]:
+            return self._move(point, STRAIGHT_DOWN)
+
+        def gripping(self, gripper: float) -> NDArray[np.float64]:
+            return np.tile(self._grip(gripper)[:1], (GRIPPER_STEPS, 1))
+
+        def here(self) -> NDArray[np.float64]:
+            return np.append(world.robot.arm_positions, self._gripper)
+
+    return Disturbed(world)
+
+
+def play_cause(one: Cause, episode: Episode) -> Course | None:
+    """Play a cause in an episode; None if the scene does not offer it, or the arm cannot do it."""
+    hands = Hands(episode, one.time)
+    try:
+        one.play(hands)
+        while True:
+            hands.wait(50)
+    except (NotOfferedError, MotionPlanningError):
+        return None
+    except OverError:
+        pass
+    env = hands.env
+    return Course(
+        one.name,
+        one.kind,
+        one.failure,
+        (episode.task, episode.split, episode.index),
+        env.status,
+        hands.start,
+        env.session.world.elapsed,
+        env.cause,
+        hands.declared,
+        tuple(env.events),
+        tuple(env.attempts),
+    )
+
+
+def play_causes(
+    causes: Sequence[Cause], indices: Sequence[int], scenes: int, split: str = "test"
+) -> Iterator[Course]:
+    """Play each cause in the first scenes of each of its tasks that offer it."""
+    for one in causes:
+        for task in one.tasks:
+            found = 0
+            for index in indices:
+                if found == scenes:
+                    break
+                course = play_cause(one, get_episode(task, split, index))
+                if course is not None:
+                    found += 1
+                    yield course
+
+
+def write_courses(path: Path, courses: Iterable[Course]) -> None:
+    """Write courses, compressed."""
+    lines = [
+        json.dumps([*one[:-2], *([_short(event) for event in part] for part in one[-2:])])
+        for one in courses
+    ]
+    path.write_bytes(lzma.compress("\n".join(lines).encode(), preset=9))
+
+
+def read_courses(path: Path) -> list[Course]:
+    """Read what `write_courses` wrote."""
+    found = []
+    for line in lzma.decompress(path.read_bytes()).decode().splitlines():
+        *rest, events, attempts = json.loads(line)
+        rest[3] = tuple(rest[3])
+        parts = (tuple(map(_event, part)) for part in (events, attempts))
+        found.append(Course(*rest, *parts))
+    return found
+
+
+def _short(event: Event) -> list[object]:
+    return [event.step, *event.fact, int(event.holds)]
+
+
+def _event(short: Sequence[object]) -> Event:
+    step, kind, subject, place, holds = cast("tuple[int, str, str, str | None, int]", short)
+    return Event(step, Fact(kind, subject, place), bool(holds))

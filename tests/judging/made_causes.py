@@ -1,0 +1,411 @@
+"""Causes of failures, the half by which the rules of attribution were made.
+
+``python tests/judging/made_causes.py`` plays them and stores what happened, some twenty minutes.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+
+from cause_making import (
+    CAUSES,
+    OPEN,
+    Hands,
+    cause,
+    need,
+    play_causes,
+    write_courses,
+)
+
+from roboirg.core.episode import Goal, Primitive
+from roboirg.core.motions import Shuttle
+
+MADE = Path(__file__).with_name("made_failures.jsonl.xz")
+MISS = 0.035
+PICKING = ("PickXtimes", "SwingXtimes", "VideoRepick", "VideoPlaceButton", "VideoPlaceOrder")
+UNMASK = ("VideoUnmask", "ButtonUnmask", "VideoUnmaskSwap", "ButtonUnmaskSwap")
+WITH_WRONG = (*PICKING, *UNMASK, "BinFill", "PickByCount")
+ALL = (*WITH_WRONG, "PutInBox", "StopCube")
+
+
+def goals_with(hands: Hands, **same: object) -> list[Goal]:
+    """Other goals of the scene that agree in some slots."""
+    return [
+        goal
+        for goal in hands.other_goals
+        if all(dict(goal.slots)[slot] == value for slot, value in same.items())
+    ]
+
+
+def slots(hands: Hands, *names: str) -> dict[str, object]:
+    return {name: hands.episode.goal[name] for name in names}
+
+
+def play_any(hands: Hands, goals: list[Goal]) -> None:
+    need(goals)
+    hands.play(hands.stages_of(goals[int(hands.rng.integers(len(goals)))]))
+
+
+def first_pick(hands: Hands) -> int:
+    """Play up to the first pick; its index."""
+    index = hands.picks()[0]
+    hands.play(hands.stages[:index])
+    return index
+
+
+def wrong_thing(hands: Hands, name: str) -> str:
+    """An object of the same kind that is not meant, not the nearest one."""
+    meant = {stage.primitive.subject for stage in hands.stages}
+    colors = set() if hands.episode.task != "BinFill" else set(hands.episode.goal.texts("colors"))
+    scene = hands.episode.scene
+    wrong = [
+        one for one in hands.others(name) if one not in meant and scene[one].color not in colors
+    ]
+    # An object in whose surroundings the right one lies cannot show what was meant.
+    wrong = [one for one in wrong if math.dist(hands.at(one), hands.at(name)) > 0.11]
+    need(wrong)
+    return wrong[0]
+
+
+# Another goal, hands perfect
+
+
+@cause("grounding", "wrong_object", "PickXtimes", "SwingXtimes")
+def another_color(hands: Hands) -> None:
+    play_any(hands, goals_with(hands, **slots(hands, "repeats")))
+
+
+@cause("grounding", "wrong_object", "VideoPlaceButton")
+def another_color_to_place(hands: Hands) -> None:
+    play_any(hands, goals_with(hands, **slots(hands, "relation")))
+
+
+@cause("grounding", "wrong_object", "VideoPlaceOrder")
+def another_color_to_order(hands: Hands) -> None:
+    play_any(hands, goals_with(hands, **slots(hands, "placement")))
+
+
+@cause("grounding", "wrong_object", "BinFill")
+def another_color_to_bin(hands: Hands) -> None:
+    meant = hands.episode.goal
+    play_any(
+        hands,
+        [
+            goal
+            for goal in hands.other_goals
+            if set(goal.texts("colors")) - set(meant.texts("colors"))
+            and sum(goal.numbers("counts")) == sum(meant.numbers("counts"))
+        ],
+    )
+
+
+@cause("grounding", "wrong_count", "PickXtimes", "SwingXtimes", "VideoRepick", "PickByCount")
+def once_more(hands: Hands) -> None:
+    repeats = hands.episode.goal.number("repeats")
+    same = {name: one for name, one in hands.episode.goal.slots if name != "repeats"}
+    play_any(hands, [g for g in goals_with(hands, **same) if g.number("repeats") == repeats + 1])
+
+
+@cause("grounding", "wrong_count", "PickXtimes", "SwingXtimes", "VideoRepick", "PickByCount")
+def once_less(hands: Hands) -> None:
+    repeats = hands.episode.goal.number("repeats")
+    same = {name: one for name, one in hands.episode.goal.slots if name != "repeats"}
+    play_any(hands, [g for g in goals_with(hands, **same) if g.number("repeats") == repeats - 1])
+
+
+@cause("grounding", "wrong_count", "BinFill")
+def another_number_to_bin(hands: Hands) -> None:
+    play_any(hands, goals_with(hands, **slots(hands, "colors")))
+
+
+@cause("grounding", "wrong_place", "VideoPlaceButton")
+def another_disc(hands: Hands) -> None:
+    play_any(hands, goals_with(hands, **slots(hands, "color")))
+
+
+@cause("grounding", "wrong_place", "VideoPlaceOrder")
+def another_disc_in_order(hands: Hands) -> None:
+    play_any(hands, goals_with(hands, **slots(hands, "color")))
+
+
+@cause("grounding", "wrong_place", "PutInBox")
+def another_box(hands: Hands) -> None:
+    play_any(hands, hands.other_goals)
+
+
+@cause("grounding", "wrong_object", *UNMASK)
+def another_container(hands: Hands) -> None:
+    number = len(hands.episode.goal.texts("colors"))
+    goals = [g for g in hands.other_goals if len(g.texts("colors")) == number]
+    meant = set(hands.episode.goal.texts("colors"))
+    play_any(hands, [g for g in goals if g.texts("colors")[0] not in meant])
+
+
+@cause("grounding", "wrong_order", *UNMASK)
+def the_two_the_other_way_round(hands: Hands) -> None:
+    turned = hands.episode.goal.texts("colors")[::-1]
+    need(len(turned) == 2)
+    play_any(hands, [g for g in hands.other_goals if g.texts("colors") == turned])
+
+
+@cause("grounding", "wrong_count", *UNMASK)
+def only_the_first_of_two(hands: Hands) -> None:
+    first, *rest = hands.episode.goal.texts("colors")
+    need(rest)
+    play_any(hands, [g for g in hands.other_goals if g.texts("colors") == (first,)])
+
+
+@cause("grounding", "wrong_order", "SwingXtimes")
+def left_first(hands: Hands) -> None:
+    pick, right, left, *rest = hands.stages
+    hands.play([pick, left, right, *rest])
+
+
+@cause("grounding", "wrong_order", "ButtonUnmask", "ButtonUnmaskSwap")
+def container_before_the_button(hands: Hands) -> None:
+    index = hands.picks()[0]
+    container = hands.stages[index].primitive.subject
+    hands.wait(60)
+    hands.do(hands.stages[index])
+    hands.do(Primitive("put_down", container))
+    hands.play(hands.stages[:index])
+
+
+@cause("grounding", "wrong_place", "VideoPlaceOrder")
+def back_where_it_lay(hands: Hands) -> None:
+    pick = hands.stages[0]
+    hands.do(pick)
+    hands.do(Primitive("place_on", pick.primitive.subject, "site"))
+
+
+# Wrong and clumsy
+
+
+@cause("grounding", "wrong_object", *WITH_WRONG)
+def snatches_at_a_wrong_thing(hands: Hands) -> None:
+    index = first_pick(hands)
+    hands.snatch(wrong_thing(hands, hands.stages[index].primitive.subject), 6)
+
+
+@cause("grounding", "wrong_object", "PickXtimes", "SwingXtimes", "VideoRepick", "BinFill")
+def snatches_at_a_wrong_thing_and_presses(hands: Hands) -> None:
+    index = first_pick(hands)
+    hands.snatch(wrong_thing(hands, hands.stages[index].primitive.subject), 6)
+    hands.do(hands.stages[-1])
+
+
+# Right and clumsy
+
+
+@cause("execution", "missed_grasp", *WITH_WRONG, "PutInBox")
+def snatches_at_the_right_thing(hands: Hands) -> None:
+    index = first_pick(hands)
+    hands.snatch(hands.stages[index].primitive.subject, 6)
+
+
+@cause("execution", "missed_grasp", "PickXtimes", "SwingXtimes", "VideoRepick")
+def misses_the_only_one_and_goes_on(hands: Hands) -> None:
+    need(len(hands.picks()) == 1)
+    hands.do(hands.stages[0], beside=MISS)
+    hands.play(hands.stages[1:])
+
+
+def go_on_after_misses(hands: Hands, missed: set[int]) -> None:
+    for number, stage in enumerate(hands.stages):
+        hands.do(stage, beside=MISS if number in missed else 0.0)
+
+
+@cause("execution", "missed_grasp", "PickXtimes", "BinFill", "VideoRepick")
+def misses_the_first_of_several(hands: Hands) -> None:
+    need(len(hands.picks()) >= 2)
+    go_on_after_misses(hands, {hands.picks()[0]})
+
+
+@cause("execution", "missed_grasp", "PickXtimes", "BinFill", "VideoRepick")
+def misses_the_last_of_several(hands: Hands) -> None:
+    need(len(hands.picks()) >= 2)
+    go_on_after_misses(hands, {hands.picks()[-1]})
+
+
+@cause("execution", "missed_grasp", "PickXtimes", "BinFill")
+def misses_all_of_several(hands: Hands) -> None:
+    need(len(hands.picks()) >= 2)
+    go_on_after_misses(hands, set(hands.picks()))
+
+
+@cause("execution", "missed_grasp", "PickXtimes")
+def the_first_slips_at_once(hands: Hands) -> None:
+    need(len(hands.picks()) >= 2)
+    pick, *rest = hands.stages
+    hands.do(pick, until=5 / 6)
+    x, y, _ = hands.at(pick.primitive.subject)
+    hands.go((x, y, 0.03))
+    hands.grip(OPEN)
+    hands.go((x, y, 0.15))
+    hands.play(rest)
+
+
+@cause("execution", "misplaced", "PickXtimes", "BinFill")
+def puts_one_beside(hands: Hands) -> None:
+    need(len(hands.picks()) >= 2)
+    place = hands.picks()[0] + 1
+    for number, stage in enumerate(hands.stages):
+        hands.do(stage, beside=0.075 if number == place else 0.0)
+
+
+@cause("execution", "dropped", "PickXtimes", "VideoPlaceOrder", "SwingXtimes")
+def opens_half_way(hands: Hands) -> None:
+    pick, place, *rest = hands.stages
+    hands.do(pick)
+    about = hands.at(str(place.primitive.place))
+    x, y, _ = hands.at(pick.primitive.subject)
+    hands.go(((x + about.x) / 2, (y + about.y) / 2, 0.15))
+    hands.grip(OPEN)
+    hands.play([place, *rest])
+
+
+@cause("execution", "misplaced", "SwingXtimes")
+def the_last_visit_passes_beside(hands: Hands) -> None:
+    last = len(hands.stages) - 3
+    for number, stage in enumerate(hands.stages):
+        hands.do(stage, beside=0.05 if number == last else 0.0)
+
+
+@cause("execution", "missed_grasp", *UNMASK, "PickByCount")
+def misses_the_first_of_two(hands: Hands) -> None:
+    need(len(hands.picks()) == 2)
+    go_on_after_misses(hands, {hands.picks()[0]})
+
+
+@cause("execution", "missed_press", "ButtonUnmask", "ButtonUnmaskSwap")
+def presses_beside_the_button(hands: Hands) -> None:
+    for stage in hands.stages:
+        is_press = stage.primitive.kind == "press"
+        hands.do(stage, beside=0.05 if is_press else 0.0)
+
+
+@cause("execution", "missed_press", "StopCube")
+def presses_beside_in_time(hands: Hands) -> None:
+    *waits, press = hands.stages
+    hands.play(waits)
+    hands.do(press, beside=0.045)
+
+
+def press_at(hands: Hands, late: int) -> None:
+    run = next(one for one in hands.episode.scene.motions if isinstance(one, Shuttle))
+    need(abs(late) < run.interval / 2 - 6)
+    press = hands.stages[-1].primitive
+    hands.do(hands.stages[0])
+    moment = press.steps + late
+    hands.wait(max(1, moment - 40 - hands.step))
+    hands.do(Primitive("press_below", press.subject, steps=moment))
+
+
+@cause("execution", "mistimed", "StopCube")
+def presses_early(hands: Hands) -> None:
+    press_at(hands, -40)
+
+
+@cause("execution", "mistimed", "StopCube")
+def presses_late(hands: Hands) -> None:
+    press_at(hands, 45)
+
+
+@cause("execution", "out_of_time", "PickXtimes", "BinFill", "VideoPlaceOrder", time=700)
+def five_times_slower(hands: Hands) -> None:
+    hands.slower = 5
+    hands.play(hands.stages)
+
+
+@cause("execution", "out_of_time", "VideoUnmask", "PutInBox", time=350)
+def five_times_slower_and_less_time(hands: Hands) -> None:
+    hands.slower = 5
+    hands.play(hands.stages)
+
+
+# Neither, and what acts do not show
+
+
+@cause("success", None, "PickXtimes")
+def hovers_over_a_wrong_one(hands: Hands) -> None:
+    x, y, _ = hands.at(wrong_thing(hands, hands.stages[0].primitive.subject))
+    hands.go((x, y, 0.1))
+    hands.play(hands.stages)
+
+
+@cause("undecided", "no_attempt", *ALL)
+def does_nothing(hands: Hands) -> None:
+    hands.wait(100)
+
+
+@cause("undecided", "no_attempt", "StopCube", "PickXtimes", "VideoUnmask")
+def trembles(hands: Hands) -> None:
+    while True:
+        hands.tremble(50)
+
+
+@cause("undecided", "stopped", "StopCube", "PickXtimes")
+def stays_above_the_button(hands: Hands) -> None:
+    button = hands.stages[-1].primitive.subject if hands.episode.task != "StopCube" else "button"
+    hands.do(Primitive("hover", button))
+
+
+@cause("undecided", "stopped", "PickXtimes", "VideoRepick", "BinFill")
+def never_presses(hands: Hands) -> None:
+    hands.play(hands.stages[:-1])
+
+
+@cause("undecided", "stopped", "PickXtimes", "VideoPlaceButton")
+def stops_half_way(hands: Hands) -> None:
+    hands.do(hands.stages[0])
+
+
+# A listener
+
+
+@cause("grounding", "misunderstood", "PickXtimes")
+def understands_what_the_scene_cannot_have(hands: Hands) -> None:
+    hands.declare({"color": "purple", "repeats": 2}, impossible=True)
+
+
+@cause("undecided", "no_answer", "PickXtimes", "VideoUnmask")
+def answers_nothing(hands: Hands) -> None:
+    hands.declare(None)
+
+
+@cause("grounding", "misunderstood", "PickXtimes", "VideoUnmask")
+def understands_another_goal(hands: Hands) -> None:
+    goal = hands.other_goals[-1]
+    hands.declare(goal)
+    hands.play(hands.stages_of(goal))
+
+
+@cause("grounding", "misunderstood", "VideoUnmask")
+def understands_a_part(hands: Hands) -> None:
+    first, *rest = hands.episode.goal.texts("colors")
+    need(rest)
+    goal = Goal.of(colors=(first,))
+    hands.declare(goal)
+    hands.play(hands.stages_of(goal))
+
+
+@cause("execution", "missed_grasp", "PickXtimes")
+def understands_and_misses(hands: Hands) -> None:
+    hands.declare(hands.episode.goal)
+    hands.snatch(hands.stages[0].primitive.subject, 3)
+
+
+def main() -> None:
+    chosen = [one for one in CAUSES if len(sys.argv) < 2 or one.name in sys.argv[2:]]
+    courses = []
+    for course in play_causes(chosen, range(4, 50), 3):
+        courses.append(course)
+        shown = (course.cause, *course.where, course.status, course.elapsed, course.words)
+        sys.stderr.write(f"{shown}\n")
+    write_courses(Path(sys.argv[1]) if len(sys.argv) > 1 else MADE, courses)
+
+
+if __name__ == "__main__":
+    main()
