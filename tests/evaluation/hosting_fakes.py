@@ -61,6 +61,8 @@ class PaperWorld:
         info = {"status": status, "steps": self.steps, "events": [event], "heard": []}
         return self.observation(), 0.0, over, False, info
 
+    attempts = ()
+
     def end_state(self) -> tuple[np.ndarray, str]:
         return np.zeros(3), "paper"
 

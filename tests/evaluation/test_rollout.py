@@ -6,6 +6,7 @@ import itertools
 import re
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -44,7 +45,8 @@ JOB = Job(
 class PaperWorld:
     """Ends after `length` steps with `status`."""
 
-    render_device, due_stage = "none", None
+    render_device, due_stage, episode = "none", None, None
+    session = SimpleNamespace(world=SimpleNamespace(facts=frozenset()))
 
     def __init__(self, length: int = 5, status: str = "success", cause: str | None = None) -> None:
         self.length, self.status, self.cause = length, status, cause
@@ -94,6 +96,8 @@ class PaperWorld:
             "heard": [],
         }
         return {}, 0.0, over and self.status != "timeout", over and self.status == "timeout", info
+
+    attempts = ()
 
     def end_state(self) -> tuple[np.ndarray, str]:
         return np.zeros(3), "paper"

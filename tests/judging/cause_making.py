@@ -1,7 +1,8 @@
 """Make failures whose cause is known: the oracle's motions in the simulator, disturbed on purpose.
 
 A cause is a function that plays with `Hands`, marked with its truth: the kind and the name of the
-failure that was made (not what the acts look like), or ``success`` for a control.
+failure that was made (not what the acts look like), ``success`` for a control, or ``unscored`` for
+what acts cannot show. A course that succeeds though it was to fail is not kept.
 
     @cause("execution", "missed_grasp", "PickXtimes", "VideoRepick")
     def misses_the_first_and_goes_on(hands: Hands) -> None:
@@ -56,7 +57,7 @@ class Course(NamedTuple):
     Attributes:
         cause: name of the cause.
         kind: of the failure that was made: grounding, execution, undecided; ``success`` of a
-            control.
+            control; ``unscored``.
         failure: its name, or None if only the kind counts.
         where: task, split and index of the episode.
         status: how it ended: success, failure, timeout.
@@ -354,7 +355,9 @@ def play_causes(
                 if found == scenes:
                     break
                 course = play_cause(one, get_episode(task, split, index))
-                if course is not None:
+                if course is not None and (course.status == "success") <= (
+                    course.kind in ("success", "unscored")
+                ):
                     found += 1
                     yield course
 

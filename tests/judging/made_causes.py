@@ -163,7 +163,7 @@ def left_first(hands: Hands) -> None:
     hands.play([pick, left, right, *rest])
 
 
-@cause("grounding", "wrong_order", "ButtonUnmask", "ButtonUnmaskSwap")
+@cause("grounding", "wrong_order", "ButtonUnmask")
 def container_before_the_button(hands: Hands) -> None:
     index = hands.picks()[0]
     container = hands.stages[index].primitive.subject
@@ -335,6 +335,15 @@ def hovers_over_a_wrong_one(hands: Hands) -> None:
     hands.play(hands.stages)
 
 
+@cause("unscored", "missed_grasp", "PickXtimes")
+def takes_the_nearest_of_another_kind(hands: Hands) -> None:
+    pick, *rest = hands.stages
+    near = hands.others(pick.primitive.subject)
+    need(near)
+    hands.do(Primitive("pick_cube", near[0]))
+    hands.play(rest)
+
+
 @cause("undecided", "no_attempt", *ALL)
 def does_nothing(hands: Hands) -> None:
     hands.wait(100)
@@ -398,13 +407,14 @@ def understands_and_misses(hands: Hands) -> None:
 
 
 def main() -> None:
-    chosen = [one for one in CAUSES if len(sys.argv) < 2 or one.name in sys.argv[2:]]
+    chosen = [one for one in CAUSES if not sys.argv[2:] or one.name in sys.argv[2:]]
     courses = []
+    path = Path(sys.argv[1]) if len(sys.argv) > 1 else MADE
     for course in play_causes(chosen, range(4, 50), 3):
         courses.append(course)
+        write_courses(path, courses)
         shown = (course.cause, *course.where, course.status, course.elapsed, course.words)
         sys.stderr.write(f"{shown}\n")
-    write_courses(Path(sys.argv[1]) if len(sys.argv) > 1 else MADE, courses)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,15 @@ from collections.abc import Mapping
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.motions import Shuttle
-from roboirg.judging import Event, FailureAttribution, Judge, Status, attribute_failure, changes
+from roboirg.judging import (
+    DeclaredIntent,
+    Event,
+    FailureAttribution,
+    Judge,
+    Status,
+    attribute_failure,
+    changes,
+)
 
 NEAR_SHARE = 0.07
 """Of a pass, before and after its middle, in which the shuttle is near its target."""
@@ -24,11 +32,15 @@ class Staged:
         self.episode = episode
         self.judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
         self.events: list[Event] = []
+        self.attempts: list[Event] = []
+        self.tried: set[Fact] = set()
+        self.tried_before: frozenset[Fact] = frozenset()
         self.step = -1
         self.now: set[Fact] = set()
         self.before: frozenset[Fact] = frozenset()
         self.binned: set[str] = set()
         self.mirrored: Mapping[str, frozenset[str]] | None = None
+        self.intent: DeclaredIntent | None = None
         kinds = {"cube": "lying", "tape": "lying", "container": "put_down"}
         for item in episode.scene.objects:
             if item.kind in kinds:
@@ -58,6 +70,9 @@ class Staged:
             facts = frozenset(self.now)
             self.events += changes(self.step, self.before, facts)
             self.before = facts
+            tried = frozenset(self.tried)
+            self.attempts += changes(self.step, self.tried_before, tried)
+            self.tried_before = tried
             self.judge.update(self.step, facts)
         return self
 
@@ -88,12 +103,30 @@ class Staged:
         self.now = (self.now - set(off)) | set(facts)
         return self.tick()
 
+    def attempt(self, *facts: Fact) -> Staged:
+        """Facts of attempts hold for a step."""
+        self.tried |= set(facts)
+        self.tick()
+        self.tried -= set(facts)
+        return self.tick()
+
+    def rest(self, steps: int = 250) -> Staged:
+        """The hand stays where it is."""
+        self.tick(60).tried.add(Fact("lingering", "robot"))
+        return self.tick(steps)
+
     def reach(self, name: str) -> Staged:
         return self.set(Fact("reached", name))
 
     def miss(self, name: str) -> Staged:
-        """The fingers close on nothing and the hand goes away."""
-        return self.reach(name).tick(5).set(off=(Fact("reached", name),))
+        """The fingers close on nothing next to it and the hand goes away."""
+        return self.attempt(Fact("clutched", name)).tick(5)
+
+    def let_go_of_nothing(self, place: str) -> Staged:
+        return self.attempt(Fact("emptied", "robot", place))
+
+    def press_beside(self, name: str = "button") -> Staged:
+        return self.attempt(Fact("pressed_beside", name))
 
     def grasp(self, name: str) -> Staged:
         gone = tuple(f for f in self.now if f.subject == name and f.kind in RESTING)
@@ -183,6 +216,8 @@ class Staged:
             elapsed_steps=self.step,
             cause=self.judge.cause or cause,
             mirrored=self.mirrored,
+            attempts=self.attempts,
+            intent=self.intent,
         )
 
 

@@ -1,68 +1,197 @@
-"""Every task, every way to fail: events played without a simulator, judged by the real judge."""
+"""Why episodes failed: failures of known cause, the smallest inputs, and anything at all."""
 
 from __future__ import annotations
 
-import contextlib
+import functools
 import re
-from pathlib import Path
 from typing import get_args
 
+import confusion
 import pytest
-from attribution_cases import CASES, Case, NotOfferedError
+from cause_making import play_cause, read_courses
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_causes import CAUSES
 from staged import Staged
-from syrupy.assertion import SnapshotAssertion
 
 from roboirg.core.conditions import Fact, Rule, facts_of
 from roboirg.core.episode import Episode
 from roboirg.core.failures import FAILURES, FailureName
-from roboirg.judging import FailureAttribution, Status, attribute_failure
+from roboirg.judging import DeclaredIntent, FailureAttribution, Status, attribute_failure
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.fingerprint import NOT_COUNTED, fingerprint, plain
 from roboirg.tasks.splits.splits import get_episode
 
-DOCUMENT = (Path(__file__).parents[2] / "docs" / "attribution.md").read_text()
-TASKS = tuple(sorted({task for one in CASES for task in one.tasks}))
+TASKS = tuple(sorted(every_task()))
 SAMPLE = [("test", index) for index in range(12)] + [("train", index) for index in range(4)]
 """Six easy, four medium and four hard episodes, at least."""
+MADE = read_courses(confusion.HALVES["development"])
+NAMES = sorted({str(one.failure) for one in MADE if one.kind not in ("success", "unscored")})
+classes = functools.cache(lambda: confusion.classes(MADE))
 
-each_case = pytest.mark.parametrize(
-    ("task", "one"),
+
+# Failures whose cause is known
+
+
+def test_kinds_are_right_where_the_cause_is_known() -> None:
+    """What issue 72 asks of causes that were not known to the rules, and more."""
+    found = confusion.scores(MADE)
+    assert found.of_decided >= 0.95
+    assert found.of_causes >= 0.9
+    assert found.undecided <= 0.05
+    assert found.kept_undecided >= 0.95
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_names_are_right_where_the_cause_is_known(name: str) -> None:
+    many, kinds, names = classes()[name]
+    assert kinds >= 0.8 * many
+    assert names >= 0.6 * many
+
+
+@pytest.mark.parametrize("half", [half for half, path in confusion.HALVES.items() if path.exists()])
+def test_the_document_has_the_tables(half: str) -> None:
+    text = confusion.DOCUMENT.read_text()
+    assert confusion.put_in(text, "failures", confusion.failures_table()) == text
+    courses = read_courses(confusion.HALVES[half])
+    assert confusion.put_in(text, half, confusion.table(courses)) == text
+
+
+@pytest.mark.sim
+@pytest.mark.parametrize(
+    "name", ["snatches_at_a_wrong_thing", "presses_beside_in_time", "opens_half_way", "trembles"]
+)
+def test_what_is_stored_is_what_the_simulator_does(name: str) -> None:
+    """Attempts come from motion, not from the file."""
+    stored = next(one for one in MADE if one.cause == name)
+    cause = next(one for one in CAUSES if one.name == name)
+    played = play_cause(cause, stored.episode)
+    assert played is not None
+    assert confusion.attribute(played) == confusion.attribute(stored)
+    assert {one.fact for one in played.attempts} == {one.fact for one in stored.attempts}
+
+
+def test_every_failure_is_of_a_kind_and_is_shown_to_users() -> None:
+    assert get_args(FailureName) == tuple(FAILURES)
+
+
+# The smallest inputs
+
+
+def staged(task: str, picks: int = 1) -> Staged:
+    """The first episode of a task with so many picks."""
+    for index in range(50):
+        episode = get_episode(task, "test", index)
+        kinds = [stage.primitive.kind for stage in episode.stages]
+        others = len(episode.scene.of_kind("cube")) > 1 or task.endswith("Unmask")
+        if sum(kind.startswith("pick") for kind in kinds) == picks and others:
+            return Staged(episode)
+    raise AssertionError(task)
+
+
+def first(play: Staged) -> str:
+    return play.episode.stages[0].primitive.subject
+
+
+def other(play: Staged) -> str:
+    kind = play.episode.scene[first(play)].kind
+    return next(o.name for o in play.episode.scene.of_kind(kind) if o.name != first(play))
+
+
+def says(play: Staged, failure: str, subject: str | None = None) -> None:
+    found = play.finding()
+    assert found is not None
+    check(play, found)
+    assert (found.failure, found.subject) == (failure, subject or found.subject)
+
+
+def test_one_of_several_grasps_missed_without_notice_is_no_count_error() -> None:
+    play = staged("PickXtimes", 2)
+    play.miss(first(play)).let_go_of_nothing("target").play(play.episode.stages[:2]).press()
+    says(play, "missed_grasp", first(play))
+
+
+def test_a_miss_that_was_noticed_excuses_no_count() -> None:
+    play = staged("PickXtimes", 2)
+    play.miss(first(play)).play(play.episode.stages[:2]).press()
+    says(play, "wrong_count")
+
+
+def test_all_grasps_missed_is_no_count_error_and_none_tried_is() -> None:
+    play = staged("PickXtimes", 2)
+    for _ in range(2):
+        play.miss(first(play)).let_go_of_nothing("target")
+    says(play.press(), "missed_grasp", first(play))
+    says(staged("PickXtimes", 2).press(), "wrong_count")
+
+
+def test_attempts_at_a_wrong_thing_are_the_wrong_thing() -> None:
+    for end in (Staged.rest, Staged.press):
+        play = staged("PickXtimes")
+        says(end(play.miss(other(play)).miss(other(play))), "wrong_object", other(play))
+
+
+def test_fingers_that_close_between_two_things_decide_nothing() -> None:
+    play = staged("PickXtimes")
+    both = (Fact("clutched", first(play)), Fact("clutched", other(play)))
+    says(play.attempt(*both).rest(), "ambiguous_act")
+
+
+def test_a_wrong_thing_only_touched_is_no_attempt() -> None:
+    play = staged("PickXtimes")
+    says(play.reach(other(play)).set(off=(Fact("reached", other(play)),)).rest(), "no_attempt")
+
+
+def test_a_press_beside_the_button_is_a_missed_press() -> None:
+    play = staged("ButtonUnmask")
+    container = play.episode.stages[1].primitive.subject
+    says(play.tick(40).press_beside().lift(container).rest(), "missed_press", "button")
+
+
+def test_a_thing_that_falls_is_dropped_wherever_it_lands() -> None:
+    play = staged("VideoPlaceOrder")
+    place = play.episode.stages[1].primitive.place
+    wrong = next(one.name for one in play.episode.scene.of_kind("target") if one.name != place)
+    says(play.lift(first(play)).drop(first(play), wrong), "dropped", first(play))
+
+
+@pytest.mark.parametrize(
+    ("late", "failure"), [(0.3, "mistimed"), (-0.7, "ambiguous_act"), (-1.0, "wrong_time")]
+)
+def test_when_the_moving_cube_is_stopped(late: float, failure: str) -> None:
+    play = Staged(get_episode("StopCube", "test", 0))
+    interval = play.episode.scene.motions[0].interval  # type: ignore[union-attr]
+    moment = play.episode.stages[-1].primitive.steps + round(late * interval)
+    says(play.hover().until(moment - 2).press(), failure)
+
+
+def test_hands_that_stop_or_do_nothing_decide_nothing() -> None:
+    says(staged("PickXtimes").rest(), "no_attempt")
+    play = staged("PickXtimes")
+    says(play.play(play.episode.stages[:-1]).hover().rest(), "stopped")
+    play = staged("PickXtimes")
+    says(play.lift(first(play)).tick(300), "out_of_time")
+
+
+@pytest.mark.parametrize(
+    ("intent", "failure"),
     [
-        pytest.param(task, one, id=f"{task}-{one.failure}-{one.play.__name__}")
-        for one in CASES
-        for task in one.tasks
+        (DeclaredIntent(True, None), "no_answer"),
+        (DeclaredIntent(True, {"color": "purple", "repeats": 1}), "misunderstood"),
+        (DeclaredIntent(verdicts=((0, "right"), (5, "wrong_thing"))), "wrong_object"),
+        (DeclaredIntent(verdicts=((0, "right"),)), "not_followed"),
     ],
 )
+def test_what_was_declared_comes_before_acts(intent: DeclaredIntent, failure: str) -> None:
+    play = staged("PickXtimes").rest()
+    play.intent = intent
+    says(play, failure)
 
 
-def played(task: str, one: Case) -> list[Staged]:
-    """The case in every episode of the sample that offers what it needs."""
-    found = []
-    # Words that name a side in a certain way are rare.
-    for where in (*SAMPLE, *(("train", index) for index in range(4, 100))):
-        if found and where not in SAMPLE:
-            break
-        staged = Staged(get_episode(task, *where))
-        with contextlib.suppress(NotOfferedError):
-            one.play(staged)
-            found.append(staged)
-    return found
-
-
-@each_case
-def test_each_way_to_fail_is_told(task: str, one: Case, snapshot: SnapshotAssertion) -> None:
-    """With the object, the step and the words: as stored, of the last episode."""
-    courses = played(task, one)
-    assert courses, "no episode of the sample offers it"
-    for staged in courses:
-        found = staged.finding()
-        assert found is not None
-        assert found.failure == one.failure, (staged.episode.key, found, staged.judge.cause)
-        assert (staged.judge.status is Status.FAILURE) == one.early
-        check(staged, found)
-    assert f"{found.step} {found.subject}: {found.sentence}" == snapshot
+def test_who_understood_and_missed_failed_by_execution() -> None:
+    play = staged("PickXtimes")
+    play.intent = DeclaredIntent(True, dict(play.episode.goal.as_mapping()))
+    says(play.miss(first(play)).rest(), "missed_grasp")
 
 
 def check(staged: Staged, found: FailureAttribution) -> None:
@@ -72,23 +201,6 @@ def check(staged: Staged, found: FailureAttribution) -> None:
     assert re.fullmatch(r"[A-Z].*[^.]\.", found.sentence)
     if found.subject is not None:
         assert found.subject in {item.name for item in staged.episode.scene.objects}
-
-
-def test_every_task_has_the_failures_that_the_document_says_and_no_others() -> None:
-    rows = re.findall(r"^\| ((?:\w+(?:, )?)+) \| ((?:`\w+`(?:, )?)+) \|$", DOCUMENT, re.MULTILINE)
-    documented = {
-        task: set(re.findall(r"\w+", failures))
-        for names, failures in rows
-        for task in names.split(", ")
-    }
-    tried = {task: {one.failure for one in CASES if task in one.tasks} for task in TASKS}
-    assert tried == documented
-    assert set(documented) == set(every_task())
-
-
-def test_every_failure_is_defined_once_in_the_document() -> None:
-    defined = re.findall(r"^\| (?:grounding|execution)? ?\| `(\w+)` \|", DOCUMENT, re.MULTILINE)
-    assert tuple(defined) == tuple(FAILURES) == get_args(FailureName)
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -119,7 +231,9 @@ episodes = st.builds(get_episode, st.sampled_from(TASKS), st.just("test"), st.in
 
 @given(episodes, st.floats(0, 1, exclude_max=True))
 @settings(max_examples=80)
-def test_right_acts_that_stop_early_fail_by_execution(episode: Episode, share: float) -> None:
+def test_right_acts_that_stop_early_are_no_grounding_failure(
+    episode: Episode, share: float
+) -> None:
     staged = Staged(episode).play(episode.stages)
     end = staged.turn + int(share * (staged.step - staged.turn))
     events = [event for event in staged.events if event.step <= end]
@@ -127,7 +241,7 @@ def test_right_acts_that_stop_early_fail_by_execution(episode: Episode, share: f
         episode, events, timed_out=True, policy_start_step=staged.turn, elapsed_steps=end
     )
     assert found is not None
-    assert found.kind == "execution"
+    assert found.kind != "grounding"
     assert found.step <= end - staged.turn
 
 
@@ -151,7 +265,7 @@ def test_taking_one_thing_for_another_is_a_grounding_failure_or_none(
     staged = Staged(episode).play(episode.stages[:begin])
     for stage in episode.stages[begin:]:
         staged.do(stage, {right: wrong, wrong: right})
-    found = staged.set(Fact("still", "robot")).tick(150).finding()
+    found = staged.rest().finding()
     assert (found is None) == (staged.judge.status is Status.SUCCESS)
     assert found is None or found.kind == "grounding"
     assert right != wrong or found is None
@@ -220,7 +334,7 @@ def test_a_misplaced_release_is_dated_and_the_right_ones_before_it_are_not_the_c
     assert staged.judge.status is Status.FAILURE
     assert found is not None
     assert (found.failure, found.subject) == ("dropped", second)
-    assert staged.turn + found.step == done
+    assert staged.turn + found.step == done - 3  # when it was let go
     episode = next(
         found
         for found in (get_episode("PickXtimes", "test", index) for index in range(50))

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import pytest
 
-from roboirg.core.episode import Stage
+from roboirg.core.conditions import Fact
+from roboirg.core.episode import Episode, Stage
 from roboirg.core.subgoal_text import split_point
 from roboirg.judging import judge_subgoal, plain_subgoal
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 
 
-def due(task: str, number: int) -> Stage:
-    return get_episode(task, "test", 0).stages[number]
+def verdict(
+    said: str, due: Stage | None, episode: Episode, pointed_at: set[str | None] | None = None
+) -> str:
+    points = None if pointed_at is None else {str(one) for one in pointed_at}
+    return judge_subgoal(said, due, points, episode)
 
 
 def test_points_are_split_off() -> None:
@@ -22,41 +26,75 @@ def test_points_are_split_off() -> None:
 
 @pytest.mark.parametrize("task", every_task())
 def test_what_is_due_is_right_and_another_act_is_lost(task: str) -> None:
-    stages = get_episode(task, "test", 3).stages
-    for stage in stages:
+    episode = get_episode(task, "test", 3)
+    for stage in episode.stages:
         words = plain_subgoal(stage)
-        assert judge_subgoal(words, stage, None) == "right"
-        assert judge_subgoal(f"{words.upper()}.", stage, None) == "right"
-        assert judge_subgoal("dance", stage, None) == judge_subgoal(words, None, None) == "lost"
-        for other in stages:
-            if plain_subgoal(other) != words:
-                assert judge_subgoal(plain_subgoal(other), stage, None) != "right"
+        assert verdict(words, stage, episode) == "right"
+        assert verdict(f"{words.upper()}.", stage, episode) == "right"
+        assert verdict("dance", stage, episode) == verdict(words, None, episode) == "lost"
+        for other in episode.stages:
+            if other.primitive.kind != stage.primitive.kind:
+                assert verdict(plain_subgoal(other), stage, episode) != "right"
 
 
 @pytest.mark.parametrize(
-    ("task", "number", "said", "verdict"),
+    ("task", "number", "said", "expected"),
     [
         ("PickXtimes", 0, "pick up the green cube for the first time", "right"),
+        ("PickXtimes", 0, "pick up the green cube", "right"),
+        ("PickXtimes", 0, "pick the green cube up", "right"),
+        ("PickXtimes", 0, "pick up the green cube again", "right"),
         ("PickXtimes", 0, "pick up the green cube for the second time", "wrong_count"),
         ("PickXtimes", 0, "pick up the green cube for the 12th time", "wrong_count"),
         ("PickXtimes", 0, "pick up the blue cube for the first time", "wrong_thing"),
+        ("PickXtimes", 0, "pick up the blue cube", "wrong_thing"),
         ("PickXtimes", 0, "press the button to stop", "lost"),
         ("PickXtimes", 1, "place the green cube onto the target", "right"),
+        ("PickXtimes", 1, "put the green cube on the target", "right"),
         ("PickXtimes", 1, "place the blue cube onto the target", "wrong_thing"),
+        ("PickXtimes", 1, "put the blue cube on the target", "wrong_thing"),
         ("PickXtimes", 1, "place the green cube onto the table", "wrong_place"),
         ("PickXtimes", 1, "", "lost"),
         ("BinFill", 0, "pick up the third red cube", "wrong_count"),
+        ("BinFill", 0, "pick up the red cube", "right"),
+        ("ButtonUnmaskSwap", 0, "press the second button", "right"),
+        ("ButtonUnmaskSwap", 0, "press the button", "right"),
+        ("SwingXtimes", 1, "move to the top of the left-side target", "wrong_place"),
+        ("PutInBox", 1, "put it into the green box", "wrong_place"),
         ("StopCube", 1, "remain static for 30 steps", "right"),
     ],
 )
-def test_what_is_wrong(task: str, number: int, said: str, verdict: str) -> None:
-    assert judge_subgoal(said, due(task, number), None) == verdict
+def test_what_is_wrong(task: str, number: int, said: str, expected: str) -> None:
+    index = 30 if task == "PutInBox" else 0
+    episode = get_episode(task, "test", index)
+    assert verdict(said, episode.stages[number], episode) == expected
 
 
 def test_a_point_off_the_thing_is_wrong_whatever_the_words() -> None:
-    pick, place = get_episode("VideoPlaceOrder", "test", 0).stages[:2]
-    assert judge_subgoal(plain_subgoal(pick), pick, {pick.points_at}) == "right"
-    assert judge_subgoal(plain_subgoal(pick), pick, {"target_0"}) == "wrong_thing"
-    assert judge_subgoal(plain_subgoal(place), place, {place.points_at, "cube"}) == "right"
-    assert judge_subgoal(plain_subgoal(place), place, set()) == "wrong_place"
-    assert judge_subgoal("remain static", due("StopCube", 1), {"button"}) == "right"
+    episode = get_episode("VideoPlaceOrder", "test", 0)
+    pick, place = episode.stages[:2]
+    assert verdict(plain_subgoal(pick), pick, episode, {pick.points_at}) == "right"
+    assert verdict(plain_subgoal(pick), pick, episode, {"target_0"}) == "wrong_thing"
+    assert verdict("pick the cube up", pick, episode, {"target_0"}) == "wrong_thing"
+    assert verdict(plain_subgoal(place), place, episode, {place.points_at, "cube"}) == "right"
+    assert verdict(plain_subgoal(place), place, episode, set()) == "wrong_place"
+    waits = get_episode("StopCube", "test", 0)
+    assert verdict("remain static", waits.stages[1], waits, {"button"}) == "right"
+
+
+def test_equal_cubes_stand_for_each_other_in_any_order_as_often_as_they_are_meant() -> None:
+    episode = next(
+        one
+        for one in (get_episode("BinFill", "test", index) for index in range(50))
+        if len(one.goal.texts("colors")) == 2 and one.goal.numbers("counts")[0] == 1
+    )
+    once, other = episode.goal.texts("colors")
+    first = episode.stages[0]
+    for color in (once, other):
+        cubes = [one.name for one in episode.scene.of_kind("cube") if one.color == color]
+        assert verdict(f"pick up the {color} cube", first, episode) == "right"
+        assert verdict("pick up the cube", first, episode, {cubes[-1]}) == "right"
+        if color == once:
+            done = frozenset({Fact("binned", cubes[-1], "bin")})
+    said = f"pick up the {once} cube"
+    assert judge_subgoal(said, episode.stages[2], None, episode, done) == "wrong_thing"

@@ -13,12 +13,12 @@ import roboirg
 from roboirg.core.actions import choice_action
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.core.subgoal_words import read_subgoal
 from roboirg.evaluation.analysis.stats.planner_failures import planner_failure
 from roboirg.judging import plain_subgoal
 from roboirg.policies import make_policy, play
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.hands.scripted_hands import ScriptedHands
-from roboirg.policies.hands.subgoal_words import read_subgoal
 from roboirg.policies.planners import make_planner, model_planners
 from roboirg.policies.planners.hierarchical_policy import MOST_REFUSALS, HierarchicalPolicy
 from roboirg.policies.planners.oracle_planner import OraclePlanner

@@ -235,9 +235,9 @@ _TRAITS: dict[FactKind, FactTraits] = {
     "clutched": FactTraits(
         role=FactRole.ATTEMPT,
         subjects=_GRASPABLE,
-        holds_while="at the step at which the fingers have closed on nothing and it is nearest, "
-        "within 0.05 (xy) of its outline and 0.05 above its origin; another one too that is less "
-        "than 0.015 farther",
+        holds_while="at the step at which the fingers have closed on nothing, if it was nearest "
+        "when they were open, within 0.05 (xy) of its outline and 0.08 above its origin; another "
+        "one too that was less than 0.015 farther",
         past="closed its fingers next to {subject}",
         state="missed",
     ),
@@ -245,8 +245,9 @@ _TRAITS: dict[FactKind, FactTraits] = {
         role=FactRole.ATTEMPT,
         subjects=("robot",),
         places=("target", "bin", "box", "cube"),
-        holds_while="at the step at which closed fingers that held nothing and were above z 0.1 "
-        "open within 0.05 (xy) of its outline: below z 0.1, or at any height over a bin or box",
+        holds_while="of a target: the hand is below z 0.1 and within 0.05 (xy) of its outline, and "
+        "next to no movable object; else at the step at which closed fingers that held nothing and "
+        "were above z 0.1 open next to it, below z 0.1 or at any height at a bin or box",
         past="opened an empty hand at {place}",
         state="emptied at",
     ),
@@ -257,6 +258,14 @@ _TRAITS: dict[FactKind, FactTraits] = {
         holds_while="it is held within 0.05 (xy) of the outline of the place",
         past="carried {subject} to {place}",
         state="carried to",
+        timeline="nothing",
+    ),
+    "lowered": FactTraits(
+        role=FactRole.ATTEMPT,
+        subjects=_GRASPABLE,
+        holds_while="it is held, and the tool center is below z 0.08",
+        past="lowered {subject}",
+        state="lowered",
         timeline="nothing",
     ),
     "pressed_beside": FactTraits(

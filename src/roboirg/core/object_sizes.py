@@ -78,10 +78,11 @@ BESIDE = 0.05
 """How far from the outline of an object, in the plane, a hand is next to it."""
 UNCLEAR = 0.015
 """Closing fingers mean two objects if the distances to their outlines differ by less."""
-HAND_HIGH, HAND_RAISED, HAND_LOW = 0.25, 0.1, 0.06
+HAND_HIGH, HAND_RAISED, HAND_LOWERED, HAND_LOW = 0.25, 0.1, 0.08, 0.06
 """Heights of the tool center: above the first it is at no object; closed fingers that were above
-the second and come below it let go, and press if they come below the third."""
-FINGERS_SHUT = 0.004
-"""Largest position of a finger that has closed on nothing."""
+the second and come below it let go; what is held below the third is being put down; closed fingers
+press below the fourth."""
+FINGERS_SHUT, FINGERS_OPEN = 0.004, 0.03
+"""Largest position of a finger that has closed on nothing, and smallest of one that is open."""
 LINGER_STEPS = 60
 """Control steps for which a hand that stays where it is lingers."""

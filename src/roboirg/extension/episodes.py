@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Goal, Split
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.subgoal_words import read_subgoal
 from roboirg.language import FORMS, LANGUAGE_VERSION
 from roboirg.language.settings import all_settings, plain_settings
 from roboirg.language.variants import instructions
-from roboirg.policies.hands.subgoal_words import read_subgoal
 from roboirg.policies.planners.model_planners import merge_keyframes
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.tasks import goals_of, with_goal

@@ -1,62 +1,208 @@
-"""Conclude a failure from the end of an episode that violated no rule."""
+"""Conclude a failure from what was tried, and from the end of an episode that violated no rule."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
-from roboirg.core.conditions import Elapsed, Fact, Rule, facts_of
+from roboirg.core.conditions import Elapsed, Fact, facts_of
 from roboirg.core.fact_traits import FactRole, raised_kind
 from roboirg.core.failures import FailureName
+from roboirg.core.motions import Shuttle
 from roboirg.judging.episode_replay import EpisodeReplay, FactInterval
-from roboirg.judging.fact_history import FactHistory
 from roboirg.judging.failure_attribution import FailureAttribution
 from roboirg.judging.grounding_errors import classify_grounding_error
-from roboirg.judging.judge import describe_act, describe_object
-from roboirg.judging.release_errors import describe_missed_grasp, describe_release, expected_action
+from roboirg.judging.judge import describe_act, describe_expected, describe_object
+from roboirg.judging.meant_objects import meant_objects
+from roboirg.judging.slips import (
+    SETTLED_STEPS,
+    Slip,
+    drop_before,
+    find_slips,
+    is_noticed,
+)
 
-AT_REST = Fact("still", "robot")
-REST_STEPS = 100
-"""Control steps (five seconds) that the robot must rest at the end to count as stopped."""
+STOPPED_STEPS = 150
+"""Control steps for which the hand must linger at the end, seven and a half seconds and the three
+after which it lingers, to count as stopped. A hand five times slower than the oracle's does not."""
+
+_WORDS = {
+    "missed_grasp": "did not get hold of {}",
+    "missed_press": "came down next to {} without pressing it",
+    "dropped": "dropped {}",
+    "misplaced": "brought {} next to its place",
+    "wrong_place": "put {} next to another place",
+    "wrong_object": "tried to handle {}",
+    "wrong_order": "tried to handle {}",
+    "ambiguous_act": "closed its fingers between {} and something else",
+    "wrong_time": "came down next to {} at another moment",
+    "out_of_time": "ran out of time",
+    "stopped": "stopped",
+    "no_attempt": "tried nothing of what it needs",
+}
+"""What was tried, or how it ended, in the past tense, by the failure that it is."""
 
 
 def describe_end_state(replay: EpisodeReplay) -> FailureAttribution:
-    """Return the failure that the end of an episode shows.
+    """Return the failure that the end of an episode shows; the first that fits.
 
     | the end | is |
     | --- | --- |
-    | an act stands that is not expected | as `classify_grounding_error` says |
-    | the expected object is in the hand, and nothing above or below fits | ``out_of_time`` |
-    | an object that was to be carried is not in the hand | ``dropped`` or ``misplaced`` |
-    | an object that was to be picked was reached, or held, and is not in the hand | \
-``missed_grasp`` |
-    | the robot stopped where a shorter task would have ended | ``wrong_count`` |
-    | no stage was completed, and nothing expected was reached | ``nothing_reached`` |
-    | otherwise | ``out_of_time`` |
+    | an act stands that is not expected | as `classify_grounding_error` says, or the slips that \
+explain it |
+    | the current stage was tried, and its object is not in the hand | as `judge_tries` says |
+    | the hand stopped where a shorter task would have ended | ``wrong_count``, or the slips that \
+explain it |
+    | the hand had stopped, or did nothing from the beginning | ``stopped``, ``no_attempt`` |
+    | the hand still moved, and had been at something that is expected | ``out_of_time`` |
+    | it moved elsewhere | ``no_attempt`` |
     """
-    wanted = replay.unmet()
-    unexpected, in_hand = _unexpected_act(replay, wanted), _in_hand(replay, wanted)
-    if in_hand is not None:
-        return unexpected or _stopped_short(replay) or in_hand
-    return (
-        unexpected
-        or _released(replay, wanted)
-        or describe_missed_grasp(replay, wanted)
-        or _stopped_short(replay)
-        or _nothing_done(replay, wanted)
-    )
+    wanted, slips = replay.unmet(), find_slips(replay)
+    unexpected = _unexpected_act(replay, wanted)
+    if unexpected is not None and drop_before(slips, unexpected[0]) is None:
+        act, failure = unexpected
+        found = explain_early_act(replay, slips, act.fact)
+        return found or _describe_act(replay, failure, act)
+    gripped = {fact.subject for fact in replay.facts[-1] if fact.traits.grips}
+    in_hand = any(fact.subject in gripped for fact in wanted)
+    short = _stopped_short(replay) or _done_too_early(replay)
+    if short is not None:
+        left = range(replay.expected_stage, len(replay.stages))
+        short = explain_missing(replay, slips, left) or short
+    tried = None if in_hand else judge_tries(replay, slips)
+    return tried or short or _at_rest(replay)
 
 
-def _unexpected_act(replay: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribution | None:
-    """Return the last act that stands and is not expected."""
+def explain_early_act(
+    replay: EpisodeReplay, slips: Sequence[Slip], act: Fact
+) -> FailureAttribution | None:
+    """Return the slips or tries before an act that a later stage expects, if they explain it."""
+    current, stages = replay.expected_stage, replay.stages
+    later = range(current + 1, len(stages))
+    index = next((one for one in later if act in facts_of(stages[one].expects)), None)
+    if index is None:
+        return None
+    if explained := explain_missing(replay, slips, range(current, index)):
+        return explained
+    tried = judge_tries(replay, slips)
+    return tried if tried is not None and tried.kind == "grounding" else None
+
+
+def explain_missing(
+    replay: EpisodeReplay, slips: Sequence[Slip], skipped: range
+) -> FailureAttribution | None:
+    """Return the first of the unnoticed slips if they account for all acts that are missing.
+
+    A slip accounts for one object that was to be handled, from its pick on; places that were passed
+    are counted one by one. `skipped` has the indices of the stages that are missing.
+    """
+    missing = replay.stages[skipped.start : skipped.stop]
+    roles = [{fact.traits.role for fact in facts_of(stage.expects)} for stage in missing]
+    raises = [index for index, own in enumerate(roles) if FactRole.RAISE in own]
+    head = [own for own in roles[: raises[0] if raises else None] if own - {FactRole.RELEASE}]
+    names = _meant(replay, skipped)
+    own = [one for one in slips if one.subjects <= names and not is_noticed(replay, one, slips)]
+    visits = sum(FactRole.CARRY in roles for roles in head)
+    passed = sum(one.failure == "misplaced" for one in own) if visits else 0
+    made = len(own) - passed + bool(visits and passed >= visits)
+    return describe_slip(replay, own[0]) if own and made >= len(raises) + bool(head) else None
+
+
+def judge_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> FailureAttribution | None:
+    """Return what the failed tries in the current stage show; None without any.
+
+    | mostly tried was | is |
+    | --- | --- |
+    | what the stage expects | the last loss of it, or the last failed try |
+    | what a later stage expects | ``wrong_order`` |
+    | something else | ``wrong_object`` |
+    | what the stage expects or another thing, which is not clear | ``ambiguous_act`` |
+    """
+    right, ahead = _right_now(replay), range(replay.expected_stage, len(replay.stages))
+    tries = [one for one in slips if one.step >= replay.expected_since]
+    clear = [one for one in tries if one.subjects <= right]
+    off = [one for one in tries if not one.subjects & right]
+    if clear and len(clear) >= len(off):
+        lost = [one for one in clear if one.failure not in ("missed_grasp", "missed_press")]
+        return describe_slip(replay, (lost or clear)[-1])
+    if off:
+        is_later = off[-1].subjects & _meant(replay, ahead)
+        failure: FailureName = "wrong_order" if is_later else "wrong_object"
+        return describe_slip(replay, off[-1], failure)
+    return describe_slip(replay, tries[-1], "ambiguous_act") if tries else None
+
+
+def _right_now(replay: EpisodeReplay) -> frozenset[str]:
+    """Return the objects that the stage means that is current at the end."""
+    current = max(replay.expected_stage, 0)
+    return meant_objects(replay.stages, current, replay.episode.scene, replay.facts[-1])
+
+
+def _meant(replay: EpisodeReplay, indices: range) -> set[str]:
+    """Return the objects that some stages mean."""
+    return {
+        name for one in indices for name in meant_objects(replay.stages, one, replay.episode.scene)
+    }
+
+
+def describe_slip(
+    replay: EpisodeReplay, slip: Slip, failure: FailureName | None = None
+) -> FailureAttribution:
+    """Return a slip as a failure, by default its own; a press has the failure of its moment."""
+    name, moment = failure or slip.failure, judge_moment(replay, slip.step)
+    if name == "missed_press" and moment is not None and moment != "mistimed":
+        name = moment
+    subject, expected = min(slip.subjects), describe_expected(replay.stage_at(slip.step))
+    words = _WORDS[name].format(describe_object(subject, replay.episode.scene))
+    return FailureAttribution.of(name, subject, slip.step, f"{words}; {expected}")
+
+
+def judge_moment(replay: EpisodeReplay, step: int) -> FailureName | None:
+    """Return what pressing at a step is if it must be at a moment and is not; else None.
+
+    The moment is that of the oracle's press, the middle of a pass of the object that moves.
+    """
+    press, motions = replay.stages[-1].primitive, replay.episode.scene.motions
+    run = next((one for one in motions if isinstance(one, Shuttle)), None)
+    if run is None or press.kind != "press_below":
+        return None
+    if abs(step - press.steps) <= run.interval / 2:
+        return "mistimed"
+    coming = replay.facts[step : step + SETTLED_STEPS // 4]
+    is_near = any(fact.subject == run.subject and fact.place for now in coming for fact in now)
+    return "wrong_time" if is_near else "ambiguous_act"
+
+
+def _describe_act(
+    replay: EpisodeReplay, failure: FailureName, act: FactInterval
+) -> FailureAttribution:
+    """Return an act as a failure, in words."""
+    words = describe_act(act.fact, replay.episode.scene)
+    return _describe(replay, failure, act.fact.subject, act.start, words)
+
+
+def _describe(
+    replay: EpisodeReplay, failure: FailureName, subject: str | None, step: int, words: str
+) -> FailureAttribution:
+    """Return a failure in words, and what is expected at the end."""
+    expected = describe_expected(replay.stages[max(replay.expected_stage, 0)])
+    return FailureAttribution.of(failure, subject, step, f"{words}; {expected}")
+
+
+def _unexpected_act(
+    replay: EpisodeReplay, wanted: tuple[Fact, ...]
+) -> tuple[FactInterval, FailureName] | None:
+    """Return the last act that stands and is not expected, and what it is."""
     for interval in reversed(list(_standing_acts(replay))):
         fact = interval.fact
-        if fact.subject in {other.subject for other in wanted}:
-            failure = _future_violation(replay, fact.subject) if fact.traits.grips else None
+        if fact.subject not in {other.subject for other in wanted}:
+            failure: FailureName | None = _classify(replay, fact)
+        elif fact.traits.grips and fact.subject not in _right_now(replay):
+            failure = "wrong_object"
         else:
-            failure = _future_violation(replay, fact.subject) or _classify(replay, fact, wanted)
+            misplaced = fact.traits.role is FactRole.PLACING and fact not in wanted
+            failure = "wrong_place" if misplaced else None
         if failure is not None:
-            words = f"{describe_act(fact, replay.episode.scene)}; {expected_action(replay)}"
-            return FailureAttribution.of(failure, fact.subject, interval.start, words)
+            return interval, failure
     return None
 
 
@@ -67,19 +213,18 @@ def _standing_acts(replay: EpisodeReplay) -> Iterator[FactInterval]:
     that a later stage expects, a press where the stage expects another button, and placing an
     object that was picked up.
     """
-    since, roles = replay.expected_since, FactRole
+    since, start, roles = replay.expected_since, replay.policy_start_step, FactRole
     ahead = replay.stages[replay.expected_stage + 1 :]
     later = {fact for stage in ahead for fact in facts_of(stage.expects)}
-    current = facts_of(replay.stages[replay.expected_stage].expects)
-    expects_press = any(fact.traits.role is roles.PRESS for fact in current)
+    expected = facts_of(replay.stages[replay.expected_stage].expects)
     # An object that was not picked up was there before and has only been touched.
-    raised = {one.fact.subject for one in replay.started(roles.RAISE, after=since)}
+    raised = {one.fact.subject for one in replay.started(roles.RAISE, after=start)}
     acts = (roles.GRIP, roles.RAISE, roles.PLACING, roles.PRESS)
     for interval in replay.started(*acts, after=replay.policy_start_step):
         fact, traits = interval.fact, interval.fact.traits
         stands = {
             roles.RAISE: not traits.undone_by_release and fact in later,
-            roles.PRESS: expects_press,
+            roles.PRESS: fact in later or any(one.traits.role is roles.PRESS for one in expected),
             roles.PLACING: interval.end is None and not traits.lasts and fact.subject in raised,
         }
         in_hand = traits.grips and interval.end is None
@@ -87,69 +232,12 @@ def _standing_acts(replay: EpisodeReplay) -> Iterator[FactInterval]:
             yield interval
 
 
-def _classify(replay: EpisodeReplay, fact: Fact, wanted: tuple[Fact, ...]) -> FailureName | None:
+def _classify(replay: EpisodeReplay, fact: Fact) -> FailureName:
     """Classify an act; taking hold of an object counts as lifting it."""
-    if fact in wanted:
-        return None
     if fact.traits.role is FactRole.GRIP:
         kind = raised_kind(replay.episode.scene[fact.subject].kind)
         fact = fact if kind is None else Fact(kind, fact.subject)
     return classify_grounding_error(fact, replay.stages, replay.expected_stage)
-
-
-def _future_violation(replay: EpisodeReplay, name: str) -> FailureName | None:
-    """Return the failure of the rule that an object would violate for good at its places.
-
-    The object is thought to be where the coming stages want it; None if no stage does, or if it
-    may be there.
-    """
-    ahead = replay.stages[replay.expected_stage :]
-    expected = {fact for stage in ahead for fact in facts_of(stage.expects)}
-    placed = {fact for fact in expected if fact.subject == name and fact.traits.lasts}
-    if not placed:
-        return None
-    history = FactHistory()
-    history.update(0, replay.facts[-1] | placed)
-    rules = (one for stage in ahead for one in stage.forbids if isinstance(one, Rule))
-    return next((rule.failure for rule in rules if _is_violated(rule, placed, history)), None)
-
-
-def _is_violated(rule: Rule, placed: set[Fact], history: FactHistory) -> bool:
-    """Return whether placed objects violate a rule.
-
-    A rule whose condition needs none of its facts is violated by too few of them, which objects at
-    their places cannot do.
-    """
-    least = getattr(rule.condition, "least", 1)  # only counts and times have one
-    return bool(least and placed & set(facts_of(rule)) and history.holds(rule.condition))
-
-
-def _in_hand(replay: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribution | None:
-    """Return ``out_of_time`` if the expected object is in the hand."""
-    names = {fact.subject for fact in wanted}
-    gripped = (fact.subject for fact in replay.facts[-1] if fact.traits.grips)
-    held = sorted(name for name in gripped if name in names)
-    if not held:
-        return None
-    item = describe_object(held[0], replay.episode.scene)
-    words = f"ran out of time with {item} in the hand; {expected_action(replay)}"
-    return FailureAttribution.of("out_of_time", held[0], replay.last_step, words)
-
-
-def _released(replay: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribution | None:
-    """Return the failure if an object that was to be carried is not in the hand."""
-    if any(fact.traits.role is FactRole.RAISE for fact in wanted):
-        return None
-    names = {fact.subject for fact in wanted}
-    lifts = replay.started(FactRole.RAISE, after=replay.policy_start_step)
-    grips = [interval for interval in lifts if interval.fact.subject in names]
-    if not grips:
-        return None
-    last = max(grips, key=lambda interval: interval.start)
-    rests = replay.started(FactRole.RELEASE, after=last.start)
-    own = (rest.start for rest in rests if rest.fact.subject == last.fact.subject)
-    step = next(own, last.end)
-    return describe_release(replay, last, replay.last_step if step is None else step)
 
 
 def _stopped_short(replay: EpisodeReplay) -> FailureAttribution | None:
@@ -159,56 +247,44 @@ def _stopped_short(replay: EpisodeReplay) -> FailureAttribution | None:
     asked for one; letting go does not count as an act. A task that ends by leaving all alone for a
     time could have ended after any stage.
     """
-    acts_before = [
-        {fact.kind for fact in facts_of(stage.expects)}
-        for stage in replay.stages[: replay.expected_stage]
-        if not all(fact.traits.role is FactRole.RELEASE for fact in facts_of(stage.expects))
-    ]
-    last = replay.stages[-1].expects
-    if not acts_before:
+    roles = [{fact.traits.role for fact in facts_of(stage.expects)} for stage in replay.stages]
+    before = [own for own in roles[: replay.expected_stage] if own != {FactRole.RELEASE}]
+    since, last = _lingers_since(replay), replay.stages[-1].expects
+    if since is None or not before or not (isinstance(last, Elapsed) or before[-1] == roles[-1]):
         return None
-    if isinstance(last, Elapsed):
-        since = _untouched_since(replay, last.least)
-    elif acts_before[-1] == {fact.kind for fact in facts_of(last)}:
-        since = _at_rest_since(replay)
-    else:
+    return _describe(replay, "wrong_count", None, since, "came to rest")
+
+
+def _done_too_early(replay: EpisodeReplay) -> FailureAttribution | None:
+    """Return ``wrong_order`` if what the stage expects was done before it was expected."""
+    stages, current, since = replay.stages, replay.expected_stage, replay.expected_since
+    before = {fact for stage in stages[:current] for fact in facts_of(stage.expects)}
+    wanted = set(facts_of(stages[current].expects)) - before
+    acts = replay.started(FactRole.RAISE, FactRole.PRESS, after=replay.policy_start_step)
+    act = next((one for one in acts if one.fact in wanted and one.start < since), None)
+    return None if act is None else _describe_act(replay, "wrong_order", act)
+
+
+def _lingers_since(replay: EpisodeReplay) -> int | None:
+    """Return since when the hand lingers at the end, if that is long enough to have stopped."""
+    rests = list(replay.tried("lingering"))
+    if not rests or rests[-1].end is not None:
         return None
-    if since is None:
-        return None
-    return FailureAttribution.of(
-        "wrong_count", None, since, f"came to rest; {expected_action(replay)}"
-    )
+    # Who goes slowly, or pauses, has lingered as long before. A deadline leaves no time for that.
+    pauses = [1.5 * (one.end - one.start) for one in rests if one.end is not None]
+    least = 0 if replay.judge.violation else max([STOPPED_STEPS, *pauses])
+    return rests[-1].start if replay.last_step - rests[-1].start >= least else None
 
 
-def _untouched_since(replay: EpisodeReplay, steps: int) -> int | None:
-    """Return when the hand last touched an object, if it left all alone for some steps."""
-    touches = (one for one in replay.intervals if one.fact.traits.touches)
-    ends = (replay.last_step if one.end is None else one.end for one in touches)
-    touched = max(ends, default=0)
-    return touched if replay.last_step - touched >= steps else None
-
-
-def _at_rest_since(replay: EpisodeReplay) -> int | None:
-    """Return since when the robot rests, if that is long enough to count as stopped."""
-    rests = (one for one in replay.intervals if one.fact == AT_REST and one.end is None)
-    long_rests = (one.start for one in rests if replay.last_step - one.start >= REST_STEPS)
-    return next(long_rests, None)
-
-
-def _nothing_done(replay: EpisodeReplay, wanted: tuple[Fact, ...]) -> FailureAttribution:
-    """Return ``nothing_reached`` or ``out_of_time``.
-
-    An object or place is reached when the hand is above it, an APPROACH fact with it as the place.
-    """
-    names = {fact.subject for fact in wanted} | {fact.place for fact in wanted}
-    start = replay.policy_start_step
-    tried = any(
-        one.fact.place in names and (one.end is None or one.end > start)
-        for one in replay.intervals
-        if one.fact.traits.role is FactRole.APPROACH
-    )
-    if replay.expected_stage == 0 and wanted and not tried:
-        words = f"reached none of the objects it needs; {expected_action(replay)}"
-        return FailureAttribution.of("no_attempt", None, replay.last_step, words)
-    words = f"ran out of time; {expected_action(replay)}"
-    return FailureAttribution.of("out_of_time", None, replay.last_step, words)
+def _at_rest(replay: EpisodeReplay) -> FailureAttribution:
+    """Return ``stopped``, ``no_attempt`` or ``out_of_time``, as the table says."""
+    start, names = replay.policy_start_step, _meant(replay, range(len(replay.stages)))
+    went = [*replay.tried("above"), *replay.started(FactRole.APPROACH, after=start)]
+    acts = replay.started(FactRole.GRIP, FactRole.RAISE, FactRole.PRESS, after=start)
+    has_begun = replay.expected_stage > 0 or any(one.fact.place in names for one in went)
+    since = _lingers_since(replay)
+    failure: FailureName = "out_of_time" if since is None else "stopped"
+    if not has_begun and not any(acts):
+        failure = "no_attempt"
+    step = replay.last_step if since is None else since
+    return _describe(replay, failure, None, step, _WORDS[failure])

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 from roboirg.core.conditions import All, Condition, Fact, facts_of
 from roboirg.core.episode import Episode, Stage
-from roboirg.core.fact_traits import FactRole
+from roboirg.core.fact_traits import FactKind, FactRole
 from roboirg.judging.fact_history import FactHistory
 from roboirg.judging.judge import Judge, Status
 
@@ -52,6 +53,7 @@ class EpisodeReplay:
         facts: for each step, all facts that hold.
         intervals: of all facts, in the order of their starts.
         judge: after the last evaluation.
+        attempts: intervals of facts of attempts, in the same order.
     """
 
     episode: Episode
@@ -60,6 +62,7 @@ class EpisodeReplay:
     facts: tuple[frozenset[Fact], ...]
     intervals: tuple[FactInterval, ...]
     judge: Judge
+    attempts: tuple[FactInterval, ...] = ()
 
     @property
     def last_step(self) -> int:
@@ -84,18 +87,24 @@ class EpisodeReplay:
 
     def completions(self) -> Iterator[tuple[int, int]]:
         """Yield the index of each completed stage of the policy, and the step that completed it."""
-        now = self.expected_stages[0]
-        for step, then in enumerate((*self.expected_stages[1:], self.expected_stage)):
-            if then != now:
-                if now >= 0:
-                    yield now, step
-                now = then
+        pairs = pairwise((*self.expected_stages, self.expected_stage))
+        return ((now, step) for step, (now, then) in enumerate(pairs) if then != now >= 0)
 
     def started(self, *roles: FactRole, after: int) -> Iterator[FactInterval]:
         """Yield the intervals of facts with some roles that start later than a step."""
         return (
             one for one in self.intervals if one.start > after and one.fact.traits.role in roles
         )
+
+    def tried(self, kind: FactKind, *subjects: str) -> Iterator[FactInterval]:
+        """Yield the attempts of a kind in the policy's turn, with some subjects or with any."""
+        start = self.policy_start_step
+        own = (one for one in self.attempts if one.fact.kind == kind and one.start > start)
+        return (one for one in own if not subjects or one.fact.subject in subjects)
+
+    def stage_at(self, step: int) -> Stage:
+        """Return the policy's stage that was tested at a step, or its first before its turn."""
+        return self.stages[min(max(self.expected_stages[step], 0), len(self.stages) - 1)]
 
     def unmet(self) -> tuple[Fact, ...]:
         """Return the facts in all parts of the expected condition that are not met at the end."""
@@ -108,7 +117,11 @@ class EpisodeReplay:
 
 
 def rejudge(
-    episode: Episode, events: Sequence[Event], policy_start_step: int, elapsed_steps: int
+    episode: Episode,
+    events: Sequence[Event],
+    policy_start_step: int,
+    elapsed_steps: int,
+    attempts: Sequence[Event] = (),
 ) -> EpisodeReplay:
     """Judge an episode again by all its events, in order; steps count since the world began."""
     facts = facts_by_step(events, elapsed_steps)
@@ -119,9 +132,8 @@ def rejudge(
         expected_stages += [expected] * (step + 1 - len(expected_stages))
         expected = judge.index - len(episode.demonstration)
     expected_stages += [expected] * (len(facts) - len(expected_stages))
-    return EpisodeReplay(
-        episode, policy_start_step, tuple(expected_stages), facts, _intervals(events), judge
-    )
+    parts = _intervals(events), judge, _intervals(attempts)
+    return EpisodeReplay(episode, policy_start_step, tuple(expected_stages), facts, *parts)
 
 
 def decide(episode: Episode, events: Sequence[Event], elapsed_steps: int) -> Decision:

@@ -22,14 +22,21 @@ from roboirg.core.conditions import (
     facts_of,
 )
 from roboirg.core.episode import Episode
+from roboirg.core.fact_traits import FactRole
 from roboirg.core.failures import FailureName
-from roboirg.judging.end_state import describe_end_state
+from roboirg.judging.declared_intent import DeclaredIntent
+from roboirg.judging.end_state import (
+    describe_end_state,
+    describe_slip,
+    explain_early_act,
+    judge_moment,
+)
 from roboirg.judging.episode_replay import EpisodeReplay, Event, FactInterval, rejudge
 from roboirg.judging.fact_history import FactHistory
 from roboirg.judging.failure_attribution import FailureAttribution
 from roboirg.judging.grounding_errors import classify_grounding_error
 from roboirg.judging.judge import Status, describe_violation
-from roboirg.judging.release_errors import find_excusing_release
+from roboirg.judging.slips import drop_before, find_slips
 
 MirroredObjects = Mapping[str, Collection[str]]
 """For each object that an instruction means, those that it would mean with left and right
@@ -59,6 +66,8 @@ def attribute_failure(
     elapsed_steps: int,
     cause: str | None = None,
     mirrored: MirroredObjects | None = None,
+    attempts: Sequence[Event] = (),
+    intent: DeclaredIntent | None = None,
 ) -> FailureAttribution | None:
     """Return why an episode failed; None if it did not fail.
 
@@ -73,46 +82,55 @@ def attribute_failure(
             the environment ended the episode: the arm could not reach a pose.
         mirrored: for each object that the instruction means, those that it would mean with left
             and right exchanged (`roboirg.language.mirrored_objects`); None finds no mirrored picks.
+        attempts: all changes of facts of attempts, in order, like `events`.
+        intent: what the policy declared, which comes before what it did; None if it did not.
     """
-    replay = rejudge(episode, events, policy_start_step, elapsed_steps)
-    ended = timed_out or cause is not None
-    if replay.judge.status is Status.SUCCESS or not (replay.judge.violation or ended):
+    replay = rejudge(episode, events, policy_start_step, elapsed_steps, attempts)
+    has_ended = replay.judge.violation or timed_out or cause is not None
+    if replay.judge.status is Status.SUCCESS or not has_ended:
         return None
     first = min(_deviations(replay), key=lambda one: one.step, default=None)
     if first is not None and first.act is not None:
         found = _attribute_act(replay, first, first.act)
     elif first is None and not timed_out:
-        words = f"could not reach a pose: {cause}"
-        found = FailureAttribution.of("unreachable", None, replay.last_step, words)
+        found = FailureAttribution.of(
+            "unreachable", None, replay.last_step, f"could not reach a pose: {cause}"
+        )
     else:
         found = describe_end_state(replay)
         if first is not None and found.failure == "out_of_time":
-            found = _attribute_time(replay, first)
+            failure: FailureName | None = getattr(first.violation, "failure", None)
+            words = _describe_deviation(replay, first)
+            found = FailureAttribution.of(failure or "out_of_time", None, first.step, words)
     act = None if first is None else first.act
     found = refine_wrong_object(found, replay, mirrored or {}, None if act is None else act.place)
-    return found._replace(step=found.step - policy_start_step)
+    found = found._replace(step=found.step - policy_start_step)
+    return found if intent is None else intent.revise(found, episode)
 
 
 def _attribute_act(replay: EpisodeReplay, deviation: _Deviation, act: Fact) -> FailureAttribution:
-    """Return the failure of a forbidden act."""
-    failure = _failure_of(deviation.violation)
+    """Return the failure of a forbidden act, or the slips that explain it."""
+    slips, step = find_slips(replay), deviation.step
+    failure = getattr(deviation.violation, "failure", None)
+    if failure == "mistimed":
+        failure = judge_moment(replay, step)
+    dropped = drop_before(slips, FactInterval(act, step, None))
+    if act.traits.role is FactRole.PLACING and dropped is not None:
+        return describe_slip(replay, dropped)
+    if act.traits.role is FactRole.PRESS and _is_touched(replay, step):
+        failure = "ambiguous_act"
     if failure is None:
-        if deviation.step == replay.last_step:
-            release = find_excusing_release(replay, act)
-            if release is not None:
-                return release
-        stage = max(replay.expected_stages[deviation.step], 0)
-        failure = classify_grounding_error(act, replay.stages, stage)
-    return FailureAttribution.of(
-        failure, act.subject, deviation.step, _describe_deviation(replay, deviation)
-    )
+        explained = explain_early_act(replay, slips, act) if step == replay.last_step else None
+        if explained is not None:
+            return explained
+        failure = classify_grounding_error(act, replay.stages, max(replay.expected_stages[step], 0))
+    return FailureAttribution.of(failure, act.subject, step, _describe_deviation(replay, deviation))
 
 
-def _attribute_time(replay: EpisodeReplay, deviation: _Deviation) -> FailureAttribution:
-    """Return the failure of a missed deadline, if nothing else was wrong."""
-    failure = _failure_of(deviation.violation) or "out_of_time"
-    words = _describe_deviation(replay, deviation)
-    return FailureAttribution.of(failure, None, deviation.step, words)
+def _is_touched(replay: EpisodeReplay, step: int) -> bool:
+    """Return whether something in the hand, and beside the button, pressed it."""
+    roles = {fact.traits.role for fact in replay.facts[step]}
+    return FactRole.GRIP in roles and FactRole.APPROACH not in roles
 
 
 def _deviations(replay: EpisodeReplay) -> Iterator[_Deviation]:
@@ -195,13 +213,9 @@ def _latest_act(replay: EpisodeReplay, violation: Fact | Rule, step: int) -> Fac
     return max(holding or acts, key=lambda interval: interval.start).fact if acts else None
 
 
-def _failure_of(violation: Fact | Rule) -> FailureName | None:
-    return violation.failure if isinstance(violation, Rule) else None
-
-
 def _describe_deviation(replay: EpisodeReplay, deviation: _Deviation) -> str:
-    stage = replay.stages[max(replay.expected_stages[deviation.step], 0)]
-    return describe_violation(deviation.violation, stage, replay.episode.scene)
+    stage, scene = replay.stage_at(deviation.step), replay.episode.scene
+    return describe_violation(deviation.violation, stage, scene)
 
 
 def refine_wrong_object(
@@ -209,28 +223,16 @@ def refine_wrong_object(
 ) -> FailureAttribution:
     """Return a ``mirrored_pick`` if the wrong object or place is the mirrored one.
 
-    Whose mirror image counts depends on the stages: that of the object that the words mean and the
-    current stage expects; without one, of the nearest stage before it, or else after it.
+    The image is that of the object that the words mean and the current stage expects, or of any
+    that they mean if it expects none of them.
     The step of `found` counts since the world began; `place` is None if the act has none.
     """
     if found.failure not in ("wrong_object", "wrong_place"):
         return found
-    meant = _meant_objects(replay, mirrored, max(replay.expected_stages[found.step], 0))
-    sides = {other for name in meant for other in mirrored[name]}
+    facts = facts_of(replay.stage_at(found.step).expects)
+    names = {str(name) for fact in facts for name in (fact.subject, fact.place)}
+    sides = {other for name in names & mirrored.keys() or mirrored for other in mirrored[name]}
     if not sides & {found.subject, place}:
         return found
     words = f"{found.sentence[:-1]}; the words mean it only with left and right exchanged"
     return FailureAttribution.of("mirrored_pick", found.subject, found.step, words)
-
-
-def _meant_objects(
-    replay: EpisodeReplay, mirrored: MirroredObjects, current: int
-) -> frozenset[str]:
-    """Return the keys of `mirrored` that the current stage expects, or one before, or one after."""
-    stages = replay.stages
-    for stage in (*reversed(stages[: current + 1]), *stages[current + 1 :]):
-        facts = facts_of(stage.expects)
-        names = {name for fact in facts for name in (fact.subject, fact.place)}
-        if meant := names & mirrored.keys():
-            return frozenset(name for name in meant if name is not None)
-    return frozenset()

@@ -14,9 +14,11 @@ from roboirg.core.conditions import Fact
 from roboirg.core.motions import Point
 from roboirg.core.object_sizes import (
     BESIDE,
+    FINGERS_OPEN,
     FINGERS_SHUT,
     HAND_HIGH,
     HAND_LOW,
+    HAND_LOWERED,
     HAND_RAISED,
     LINGER_STEPS,
     UNCLEAR,
@@ -37,18 +39,26 @@ class AttemptDetector:
     def __init__(self, bodies: Mapping[str, Body], robot: Panda) -> None:
         self._robot, self._bodies = robot, tuple(bodies.values())
         self._peak, self._anchor, self._stays = 0.0, Point(0.0, 0.0, 0.0), 0
+        self._gaps: dict[str, float] = {}
         self.near: list[tuple[Body, float, bool]] = []
         self.found: AbstractSet[Fact] = frozenset()
 
     def detect(self, tool: Point, facts: AbstractSet[Fact]) -> None:
         """Find the attempts of this step, given the tool center and the facts of the world."""
-        shut = float(self._robot.finger_positions.max()) < FINGERS_SHUT
+        opening = float(self._robot.finger_positions.max())
+        shut = opening < FINGERS_SHUT
         # The greatest height since the fingers closed on nothing; 0 while they have not.
         peak, self._peak = self._peak, max(self._peak, tool.z) if shut else 0.0
         stays = math.dist(tool, self._anchor) <= BESIDE
         self._anchor, self._stays = (self._anchor, self._stays + 1) if stays else (tool, 0)
         found = [Fact("lingering", "robot")] if self._stays >= LINGER_STEPS else []
         if tool.z <= HAND_HIGH:
+            if opening > FINGERS_OPEN:  # closing fingers can push away what they mean
+                self._gaps = {
+                    body.item.name: gap
+                    for body, gap, _ in self.near
+                    if tool.z - body.position.z <= HAND_LOWERED
+                }
             found += self._handled(tool, just_shut=shut and not peak)
             if peak > HAND_RAISED:
                 found += self._ended(tool, facts, shut=shut)
@@ -57,21 +67,24 @@ class AttemptDetector:
 
     def _handled(self, tool: Point, *, just_shut: bool) -> Iterator[Fact]:
         """Yield what the hand is above, where it has carried something, and what it missed."""
-        low = [gap for body, gap, _ in self.near if tool.z - body.position.z <= BESIDE]
-        most = min((*low, BESIDE - UNCLEAR)) + UNCLEAR if low and just_shut else -BESIDE
+        if tool.z <= HAND_RAISED and all(gap > BESIDE for _, gap, _ in self.near):
+            yield from (Fact("emptied", "robot", one) for one in self._next_to(tool, "target"))
+        most = min((*self._gaps.values(), BESIDE - UNCLEAR)) + UNCLEAR
+        if just_shut:
+            yield from (Fact("clutched", one) for one, gap in self._gaps.items() if gap <= most)
         for body, gap, held in self.near:
             name = body.item.name
             if gap <= BESIDE:
                 yield Fact("above", "robot", name)
-            if gap <= most:
-                yield Fact("clutched", name)
-            places = self._next_to(body.position, "target", "bin", "box") if held else ()
-            yield from (Fact("beside", name, place) for place in places)
+            if held and tool.z < HAND_LOWERED:
+                yield Fact("lowered", name)
+            places = ("target", "bin", "box") if held else ()
+            yield from (Fact("beside", name, one) for one in self._next_to(body.position, *places))
 
     def _ended(self, tool: Point, facts: AbstractSet[Fact], *, shut: bool) -> Iterator[Fact]:
         """Yield where closed fingers that were up let go of nothing, or press nothing."""
         if not shut:
-            kinds = ("bin", "box", "target", "cube")[: 2 if tool.z > HAND_RAISED else None]
+            kinds = ("bin", "box", "cube")[: 2 if tool.z > HAND_RAISED else None]
             yield from (Fact("emptied", "robot", one) for one in self._next_to(tool, *kinds))
         elif tool.z < HAND_LOW:
             missed = (Fact("pressed_beside", one) for one in self._next_to(tool, "button"))
@@ -79,11 +92,11 @@ class AttemptDetector:
 
     def _next_to(self, point: Point, *kinds: str) -> list[str]:
         """Return the names of objects of some kinds to which a point is next."""
-        items = [(body.item, body.position) for body in self._bodies if body.item.kind in kinds]
         return [
-            item.name
-            for item, position in items
-            if distance_in_plane(point, position) - item.half_width <= BESIDE
+            body.item.name
+            for body in self._bodies
+            if body.item.kind in kinds
+            and distance_in_plane(point, body.position) - body.item.half_width <= BESIDE
         ]
 
 

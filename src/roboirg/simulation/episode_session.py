@@ -140,10 +140,12 @@ class EpisodeSession:
         from roboirg.simulation.expert.primitives import MotionPrimitives
 
         expert = MotionPrimitives(self.world)
-        for index, stage in enumerate(self.episode.demonstration):
-            for trajectory in expert.execute(stage.primitive):
-                for action in trajectory:
-                    yield RecordedStep(index, action)
+        yield from (
+            RecordedStep(index, action)
+            for index, stage in enumerate(self.episode.demonstration)
+            for trajectory in expert.execute(stage.primitive)
+            for action in trajectory
+        )
 
     @property
     def _judges(self) -> tuple[Judge, ...]:

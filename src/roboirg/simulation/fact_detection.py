@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from typing import NamedTuple
 
@@ -96,24 +96,13 @@ class FactDetector:
         present = [body for body in self._bodies if body.item.name not in absent]
         facts = {fact for fact in self._before if fact.traits.lasts}
         for body in present:
-            facts.update(self._facts_about(body))
+            if body.item.kind in _FINDERS:
+                facts.update(_FINDERS[body.item.kind](self, body))
         facts.update(self._robot_facts())
         facts.update(self._registered_facts(present))
         self._before = frozenset(facts)
         self.attempts.detect(self._tool, self._before)
         return self._before
-
-    def _facts_about(self, body: Body) -> Iterator[Fact]:
-        match body.item.kind:
-            case "cube" | "tape":
-                return self._cube_facts(body)
-            case "container":
-                return self._container_facts(body)
-            case "button":
-                return self._button_facts(body)
-            case "shuttle":
-                return self._shuttle_facts(body)
-        return iter(())
 
     def _registered_facts(self, present: Sequence[Body]) -> Iterator[Fact]:
         """Yield the facts of the kinds that other packages have registered."""
@@ -144,16 +133,18 @@ class FactDetector:
 
     def _released_facts(self, name: str, position: Point) -> Iterator[Fact]:
         yield Fact("lying", name)
-        for place in self._places:
-            if distance_in_plane(position, place.position) <= ON_TARGET_DISTANCE:
-                yield Fact("placed", name, place.item.name)
-        for bin_ in self._bins:
-            if (
-                distance_in_plane(position, bin_.position) <= ON_TARGET_DISTANCE
-                and float(self._robot.finger_positions.min()) > BINNED_FINGERS
-                and math.dist(position, self._tool) > BINNED_TOOL_DISTANCE
-            ):
-                yield Fact("binned", name, bin_.item.name)
+        yield from (
+            Fact("placed", name, place.item.name)
+            for place in self._places
+            if distance_in_plane(position, place.position) <= ON_TARGET_DISTANCE
+        )
+        yield from (
+            Fact("binned", name, bin_.item.name)
+            for bin_ in self._bins
+            if distance_in_plane(position, bin_.position) <= ON_TARGET_DISTANCE
+            and float(self._robot.finger_positions.min()) > BINNED_FINGERS
+            and math.dist(position, self._tool) > BINNED_TOOL_DISTANCE
+        )
 
     def _container_facts(self, container: Body) -> Iterator[Fact]:
         position = container.position
@@ -204,3 +195,15 @@ class FactDetector:
 
     def _tool_now(self) -> Point:
         return Point(*(float(value) for value in self._robot.tool_pose.p))
+
+
+# No bound methods: the cycle would keep the world until the next collection.
+# ruff: noqa: SLF001
+_FINDERS: Mapping[str, Callable[[FactDetector, Body], Iterator[Fact]]] = {
+    "cube": FactDetector._cube_facts,
+    "tape": FactDetector._cube_facts,
+    "container": FactDetector._container_facts,
+    "button": FactDetector._button_facts,
+    "shuttle": FactDetector._shuttle_facts,
+}
+"""What finds the facts about an object of a kind."""

@@ -51,8 +51,8 @@ class Recording:
 
     def steps(self) -> Iterator[RecordedStep]:
         """Yield the recorded steps."""
-        for stage, action in zip(self.stages, self.actions, strict=True):
-            yield RecordedStep(int(stage), action)
+        pairs = zip(self.stages, self.actions, strict=True)
+        return (RecordedStep(int(stage), action) for stage, action in pairs)
 
     def video_actions(self, episode: Episode) -> NDArray[np.float64]:
         """Return the actions (T, 8) of the steps in the episode's video."""

@@ -124,7 +124,6 @@ def _wrong(interval: int, visit: int) -> tuple[Rule, ...]:
         Rule(
             Elapsed(least=interval * visit + 1),
             f"let the cube's {ORDINALS[visit - 1]} visit pass",
-            "stopped",
         ),
     )
 

@@ -72,6 +72,8 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
     needs = PolicyNeeds(cameras=(), actions=log.space)
     try:
         loop = play_with(policy, prepared, needs, again, CallGuard(again.timings, None))
+        # What was declared is taken over: the attribution of a failure begins with it.
+        again.policy_metadata, again.subgoals = record.policy_metadata, record.subgoals
         loop.conclude()
         played = loop.log
     except EpisodeError as error:

@@ -29,7 +29,6 @@ PLAYED_FIELDS = (
     "outcome",
     "error",
     "cause",
-    "attribution",
     "goals",
     "steps",
     "demonstration_steps",
@@ -38,6 +37,8 @@ PLAYED_FIELDS = (
     "instruction",
 )
 """Fields that follow from the job and the actions."""
+ATTRIBUTED_FIELDS = ("attribution", "attempts")
+"""Those that do only if attempts were watched for, and given what the policy declared."""
 
 _MOST_SHOWN = 160
 
@@ -114,7 +115,8 @@ def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
         return RecordCheck(record.slug, (*findings, *_words(record, again)))
     elsewhere = record.processor != again.processor
     may_move_differently = elsewhere and not findings
-    findings += _differences(record, again, PLAYED_FIELDS)
+    watched = ATTRIBUTED_FIELDS if record.attempts is not None else ()
+    findings += _differences(record, again, (*PLAYED_FIELDS, *watched))
     if played is None:
         findings.append("actions: when played again, the episode takes none.")
         return RecordCheck(record.slug, tuple(findings), ReplayVerdict.DIFFERENT, float("inf"))

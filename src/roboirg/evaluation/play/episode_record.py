@@ -30,7 +30,7 @@ from roboirg.evaluation.records.record import (
     Record,
     UtteranceRecord,
 )
-from roboirg.judging import attribute_failure
+from roboirg.judging import DeclaredIntent, attribute_failure
 from roboirg.judging.episode_replay import decide
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit
 from roboirg.util.processor import processor_family
@@ -131,10 +131,24 @@ def conclude(
         cause=record.cause,
         # What mentions nothing, such as a scrambled text, has no sides to exchange.
         mirrored=language.mirrored_objects(episode, instruction) if instruction.mentions else None,
+        attempts=[
+            event
+            for event in judged_events(record.attempts or (), start)
+            if event.step <= decision.step
+        ],
+        intent=declared_intent(record),
     )
     if found is not None and goals.original is not None:
         found = name_other_goal(found, prepared.scene_episode, goals)
     record.attribution = None if found is None else Attribution(**found._asdict())
+
+
+def declared_intent(record: Record) -> DeclaredIntent | None:
+    """Return what a policy declared that it would do; None if it did not."""
+    if "understood" in record.policy_metadata:
+        return DeclaredIntent(True, record.policy_metadata["understood"])
+    said = tuple((one.step, one.verdict) for one in record.subgoals)
+    return DeclaredIntent(verdicts=said) if said else None
 
 
 def utc_now() -> str:

@@ -197,7 +197,9 @@ class GuardedLoop(EpisodeLoop):
         _, point = split_point(subgoal)
         if self._writer is not None:
             self._writer.point = point
-        verdict = judge_subgoal(subgoal, stage, self.env.objects_at(point) if point else None)
+        pointed_at = self.env.objects_at(point) if point else None
+        facts = self.env.session.world.facts
+        verdict = judge_subgoal(subgoal, stage, pointed_at, self.env.episode, facts)
         self._record.subgoals += (
             SubgoalRecord(
                 step=self._record.steps, text=subgoal, point=point, due=due, verdict=verdict

@@ -16,8 +16,8 @@ from roboirg.core.episode import HANDLES_HELD, PICKS, ROBOT, Primitive
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import EMPTY_HAND, SCRIPTED_HANDS, UNKNOWN_WORDS, split_point
+from roboirg.core.subgoal_words import WAIT_STEPS, Request, read_subgoal
 from roboirg.policies.contract.base import AttachedPolicy, EndKind, SubgoalEnd
-from roboirg.policies.hands.subgoal_words import WAIT_STEPS, Request, read_subgoal
 
 if TYPE_CHECKING:
     from roboirg.simulation.world import World

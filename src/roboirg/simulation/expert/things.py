@@ -51,11 +51,8 @@ def nearest_thing(things: Iterable[Thing], point: Point) -> tuple[Thing, float] 
 
 def held_thing(world: World) -> str | None:
     """Return the name of what is in the hand; None if it is empty."""
-    for kind in _HELD:
-        for fact in sorted(world.facts):
-            if fact.kind == kind:
-                return fact.subject
-    return None
+    facts = sorted(world.facts)
+    return next((fact.subject for kind in _HELD for fact in facts if fact.kind == kind), None)
 
 
 def origin_pixel(body: Body) -> Point | None:

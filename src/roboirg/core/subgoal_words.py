@@ -14,15 +14,16 @@ WAIT_STEPS = 16
 _COLOR = rf"(?:(?P<color>{'|'.join(ALL_COLORS)}) )?"
 _ORDINAL = "(?:first|second|third|fourth|fifth|sixth|seventh|eighth|ninth|tenth)"
 _TIME = rf"(?: for the {_ORDINAL} time)?"
+_PICK = "pick (?:up )?(?:the|a)"
 _HELD = r"(?:it|the (?:\w+ )?(?:cube|tape|container))"
 _FORMS: tuple[tuple[str, PrimitiveKind, str | None], ...] = (
     (
-        rf"pick up (?:the|a) (?:{_ORDINAL} )?(?:correct )?{_COLOR}(?P<thing>cube|tape){_TIME}",
+        rf"{_PICK} (?:{_ORDINAL} )?(?:correct )?{_COLOR}(?P<thing>cube|tape)(?: up)?{_TIME}",
         "pick_cube",
         None,
     ),
     (
-        r"pick up (?:the|a) (?:correct )?container(?: that hides the \w+ cube)?",
+        rf"{_PICK} (?:correct )?container(?: up)?(?: that hides the \w+ cube)?",
         "pick_container",
         "container",
     ),
@@ -34,7 +35,7 @@ _FORMS: tuple[tuple[str, PrimitiveKind, str | None], ...] = (
         "move_over",
         "target",
     ),
-    (rf"(?:put|drop) {_HELD} on(?:to)? (?:the )?table", "put_down", None),
+    (rf"(?:place|put|drop) {_HELD} on(?:to)? (?:the )?table", "put_down", None),
     (rf"put (?:{_HELD} down|down {_HELD})", "put_down", None),
     (r"move to the top of the button(?: to prepare)?", "hover", "button"),
     (r"press the button to stop the cube on the target", "press", "target"),
