@@ -16,6 +16,7 @@ from page_text import PLAN, broken, played, render, store
 from syrupy.assertion import SnapshotAssertion
 
 from roboirg.evaluation.analysis.page import report
+from roboirg.evaluation.analysis.page.details import EpisodeDetails
 from roboirg.evaluation.analysis.page.report import write_report
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.play.episode_record import audit_record
@@ -152,6 +153,40 @@ def test_cells_choices_and_details_are_as_stored(snapshot: SnapshotAssertion) ->
     assert "2026-01-02 03:04 to 05:06 UTC" in page.text
     shown = json.dumps([page.data, page.details, page.notes], indent=0, ensure_ascii=False)
     assert re.sub(r"language \S+, environment \d+", "", shown) == snapshot
+
+
+@pytest.mark.parametrize(
+    ("understood", "goal"),
+    [
+        ({"color": "red", "repeats": 1}, "red, once"),
+        ({"color": "green", "repeats": 3}, "green, three times"),
+        ({"colors": ["red", "blue"], "counts": [2, 1]}, "2 red, 1 blue"),
+        ({"color": "red", "relation": "before"}, "red, on the target before the press"),
+        ({"color": "red", "placement": 2}, "red, on target 2 of the video"),
+        ({"visit": 3}, "on visit 3"),
+        (None, None),
+    ],
+)
+def test_a_failed_episode_shows_what_was_named_next_to_what_was_meant(
+    understood: object, goal: str | None
+) -> None:
+    """Of a planner, the last subgoal up to the failure; of an episode that succeeded, nothing."""
+    first = next(one for one in records() if one.attribution)
+    step = first.steps if first.attribution is None else first.attribution.step or 0
+    said = tuple(
+        SubgoalRecord(step=step + late, text=text, due="pick it up", verdict="lost")
+        for late, text in ((-9, "sing"), (0, "dance"), (1, "rest"))
+    )
+    for fields, expected in (
+        ({"policy_metadata": {"understood": understood}}, goal),
+        ({"subgoals": said}, "“dance”; due was “pick it up”"),
+        ({"subgoals": said, "outcome": "success"}, None),
+    ):
+        page = EpisodeDetails(Path(), embeds=False)
+        details = page.details_of(replace(first, **fields))
+        texts = list(page.strings)
+        assert texts[details["goal"]] == "green, three times"
+        assert ("named" in details and texts[details["named"]]) == (expected or False)
 
 
 def test_words_that_differ_stand_apart_and_are_named() -> None:

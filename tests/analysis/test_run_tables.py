@@ -17,6 +17,7 @@ from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.diagnostic_tables import (
     DIAGNOSTIC_TABLES,
     make_breakdown_table,
+    make_failure_table,
 )
 from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.analysis.tables.rendering.terminal import print_tables
@@ -93,9 +94,13 @@ def test_rates_gaps_what_is_incomplete_and_failures_are_printed() -> None:
 
 WRONG = [
     Attribution(kind=kind, failure=failure, step=1, sentence="So.")
-    for kind, failure in (("grounding", "wrong_count"), ("execution", "dropped"))
+    for kind, failure in (
+        ("grounding", "wrong_count"),
+        ("execution", "dropped"),
+        ("undecided", "stopped"),
+    )
 ]
-"""A failure of either kind."""
+"""A failure of each kind."""
 MIXED = frame_of(
     play("110100!111", prompt_verdict="heard", difficulty="hard"),
     play("10001!1001", "direct", prompt_verdict="cut", attribution=WRONG[0], difficulty="hard"),
@@ -113,11 +118,48 @@ MIXED = frame_of(
 
 @pytest.mark.parametrize(
     ("name", "kind"),
-    [("forms", "markdown"), ("failures", "markdown"), ("heard", "markdown"), ("heard", "csv")],
+    [
+        *((one, "markdown") for one in ("forms", "failures", "failure-names", "heard")),
+        ("heard", "csv"),
+    ],
 )
 def test_other_tables_are_as_stored(snapshot: SnapshotAssertion, name: str, kind: str) -> None:
     """Numbers of one row, column, form or outcome in place of another."""
     assert get_format(kind).draw(DIAGNOSTIC_TABLES[name](RunData(MIXED), ())) == snapshot
+
+
+def ended(kinds: str, setting: str) -> list[Summary]:
+    """Return a success, a failure of a kind, or one without attribution for each letter."""
+    wrong: dict[str, Attribution] = dict(zip("gxu", WRONG, strict=True))
+    return [
+        make_result(
+            "success" if letter == "s" else "error" if letter == "!" else "failure", episode,
+            setting=setting, attribution=wrong.get(letter),
+        )
+        for episode, letter in enumerate(kinds)
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("explicit", "direct", "rates", "changes", "shares"),
+    [
+        ("ssssssssgx", "sssssgggxu", "50 30 10 10", "−30 +20 ±0 +10", "60–80 50"),
+        ("ssssssssgx", "sssssggg-u", "50 30 0 20", "−30 +20 −10 +20", "60–100 50"),
+        ("ggggggxxuu", "ssssssssxx", "80 0 20 0", "+80 −60 ±0 −20", "0 60–80"),
+        ("gg!sssxxss", "x!ssssssss", "89 0 11 0", "+25 −12 −12 ±0", "0 50"),
+        ("ssssssssss", "sssssssssg", "90 10 0 0", "−10 +10 ±0 ±0", "100 –"),
+    ],
+)
+def test_all_episodes_end_in_one_of_four_ways_and_gaps_are_sums_of_changes(
+    explicit: str, direct: str, rates: str, changes: str, shares: str
+) -> None:
+    """Of the same episodes: in the fourth case, the errors leave eight that both have."""
+    data = RunData(frame_of(ended(explicit, "explicit"), ended(direct, "direct")))
+    entries = make_failure_table(data).rows[1].entries
+    assert [f"{one.percent:.0f}" for one in entries[2:6]] == rates.split()
+    found = [one.text.split(".")[0] for one in entries[6:10]]
+    assert found == changes.split()
+    assert [one.text for one in entries[10:]] == shares.split()
 
 
 def test_the_breakdown_by_difficulty_is_as_stored(snapshot: SnapshotAssertion) -> None:

@@ -144,8 +144,9 @@ def tables(
         str,
         typer.Option(
             help="main, planner, context, real, harder, other, coverage, or all that apply; or of "
-            "runs alone: forms, failures, subgoals (of planners), heard (how many prompts were "
-            "cut), arms (what control arms show), facts (what a methods section needs)."
+            "runs alone: forms, failures (of all episodes, and in the gap to explicit), "
+            "failure-names, subgoals (of planners), heard (how many prompts were cut), arms (what "
+            "control arms show), facts (what a methods section needs)."
         ),
     ] = _ALL,
     format: Annotated[  # noqa: A002

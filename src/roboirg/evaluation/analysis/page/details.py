@@ -11,9 +11,10 @@ page omits them for others.
 from __future__ import annotations
 
 import functools
+import itertools
 import os
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -34,6 +35,7 @@ from roboirg.judging.episode_replay import Event, completed_stages
 from roboirg.judging.judge import describe_object, plain_subgoal
 from roboirg.language import LANGUAGE_VERSION
 from roboirg.language.arms import arm_episode
+from roboirg.language.number_words import times
 from roboirg.language.settings import EXPLICIT
 from roboirg.tasks.splits.splits import get_episode
 
@@ -42,6 +44,15 @@ EMBEDDED = "#"
 
 _KINDS = {"shuttle": "the moving cube", "site": "the spot on the table"}
 """Words for objects that causes do not name."""
+
+_TIMES = {str(number): times(number) for number in range(1, 11)}
+_SLOT_WORDS: Mapping[str, Callable[[str], str]] = {
+    "repeats": lambda number: _TIMES.get(number, f"{number} times"),
+    "visit": "on visit {}".format,
+    "placement": "on target {} of the video".format,
+    "relation": "on the target {} the press".format,
+}
+"""Words for the values of slots that do not speak for themselves."""
 
 Details = dict[str, Any]
 
@@ -111,7 +122,9 @@ class EpisodeDetails:
             ],
             "command": None if record.setting == EXPLICIT else index(record.command),
             "resolved": self._optional(_resolved_form(job) if is_known else None),
-            "goal": [[index(slot), index(_value(value))] for slot, value in record.goal.items()],
+            "goal": index(goal_words(record.goal)),
+            "slots": list(map(index, record.goal)),
+            "named": self._optional(_named(record) if record.outcome == "failure" else None),
             "cause": self._optional(record.cause),
             "attribution": cause and [*map(index, (cause.kind, cause.failure)), cause.step,
                                       index(cause.sentence)],
@@ -241,6 +254,30 @@ def _subgoal_text(one: SubgoalRecord) -> str:
     return f"{one.text} ({'; '.join(parts)})" if parts else one.text
 
 
+def _named(record: Record) -> str | None:
+    """Return the goal that a failed listener named, or the last subgoal before the failure.
+
+    None if nothing was named, and if no model names anything.
+    """
+    goal, cause = record.policy_metadata.get("understood"), record.attribution
+    if isinstance(goal, dict):
+        return goal_words(goal)
+    end = record.steps if cause is None or cause.step is None else cause.step
+    said = [one for one in record.subgoals if one.step <= end]
+    return f"“{said[-1].text}”; due was “{said[-1].due or 'nothing'}”" if said else None
+
+
+def goal_words(goal: Mapping[str, Any]) -> str:
+    """Return the values of a goal, or of what a model named, in words: ``red, three times``."""
+    values = {slot: one if isinstance(one, tuple | list) else (one,) for slot, one in goal.items()}
+    if {"colors", "counts"} <= values.keys():
+        amounts = itertools.zip_longest(values.pop("counts"), values.pop("colors"), fillvalue="?")
+        values["amounts"] = tuple(f"{count} {color}" for count, color in amounts)
+    return ", ".join(
+        _SLOT_WORDS.get(slot, str)(str(one)) for slot, own in values.items() for one in own
+    )
+
+
 def _prompt(record: Record) -> str | None:
     """Return how many tokens the model reads, unless it read everything."""
     audit = record.prompt
@@ -256,10 +293,6 @@ def _prompt(record: Record) -> str | None:
         f"{verdict}: needs {audit.needed_text} tokens, the model reads {audit.limit} "
         f"({counted_by}){tail}"
     )
-
-
-def _value(value: object) -> str:
-    return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 def _conditions(record: Record) -> str:

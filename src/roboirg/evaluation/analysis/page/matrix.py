@@ -28,11 +28,11 @@ def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
     columns = sorted({key.options for key in episodes.data.cells}, key=options_sort_key)
     rows = _rows(episodes.data.cells)
     found = {one.record.difficulty for one in episodes.all}
-    levels = {"": episodes.data.cells}
+    levels = {"": episodes.data.summaries}
     if len(found) > 1:
         ordered = dict.fromkeys((*DIFFICULTIES, *found))
         levels |= {
-            level: cells_of(episodes.data.frame.where(difficulty=level))
+            level: summarize(cells_of(episodes.data.frame.where(difficulty=level)))
             for level in ordered
             if level in found
         }
@@ -46,9 +46,9 @@ def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
         "levels": [
             {
                 "difficulty": level,
-                "cells": _matrix_cells(cells, episodes.names, rows, columns),
+                "cells": _matrix_cells(summaries, episodes.names, rows, columns),
             }
-            for level, cells in levels.items()
+            for level, summaries in levels.items()
         ],
     }
 
@@ -69,7 +69,7 @@ def _rows(cells: Cells) -> dict[str, dict[str, str | None]]:
 
 
 def _matrix_cells(
-    cells: Cells,
+    summaries: Mapping[ScopeKey, Measured[ScopeKey]],
     names: Mapping[PolicyRun, str],
     rows: Collection[str],
     columns: Sequence[InstructionOptions],
@@ -81,7 +81,7 @@ def _matrix_cells(
             "at": [places[key.policy_run], lines[key.scope], columns.index(key.options)],
             **_cell(one, f"{names[key.policy_run]}, {key.scope}"),
         }
-        for key, one in summarize(cells).items()
+        for key, one in summaries.items()
         if key.scope in lines
     ]
 

@@ -21,7 +21,10 @@ from roboirg.evaluation.analysis.results.reading import with_words
 from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
-from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
+from roboirg.evaluation.analysis.tables.diagnostic_tables import (
+    make_breakdown_table,
+    make_failure_table,
+)
 from roboirg.evaluation.analysis.tables.table import Table
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.records.film import FRAME_RATE, FRAME_STEPS, LAST_FRAME_REPEATS
@@ -125,6 +128,7 @@ def _render(
         facts=facts_of(episodes),
         warnings=run_warnings(episodes),
         breakdowns=_breakdown_tables(frame),
+        failures=_tables_with_rows(lambda: make_failure_table(episodes.data, means=True)),
         links_videos=details.links_videos,
         media=((name, _data_uri(path)) for name, path in _media(episodes).items())
         if details.embeds
@@ -180,10 +184,15 @@ def _data(episodes: PageEpisodes, details: EpisodeDetails) -> dict[str, Any]:
 def _breakdown_tables(frame: Frame) -> list[Table]:
     """Return the tables of control arms, and of gaps by kind of instruction, that have rows."""
     tables = [make_breakdown_table(one, frame) for one in BREAKDOWNS.values()]
-    arms = []
-    with contextlib.suppress(InvalidValueError):  # no scene has two arms
-        arms.append(make_arm_table(RunData(frame)))
+    arms = _tables_with_rows(lambda: make_arm_table(RunData(frame)))  # no scene may have two arms
     return [*arms, *(table for table in tables if table.rows)]
+
+
+def _tables_with_rows(make: Callable[[], Table]) -> list[Table]:
+    """Return the table that is made; none if it would have no rows."""
+    with contextlib.suppress(InvalidValueError):
+        return [make()]
+    return []
 
 
 def _data_uri(path: Path) -> str:

@@ -101,7 +101,11 @@ COLUMNS: Mapping[str, FrameColumn] = {
         ),
         FrameColumn("failure", "text", "how it failed", "no failure", _of_failure("failure")),
         FrameColumn(
-            "failure_kind", "text", "grounding or execution", "no failure", _of_failure("kind")
+            "failure_kind",
+            "text",
+            "grounding, execution or undecided",
+            "no failure",
+            _of_failure("kind"),
         ),
         _field("error", "text", "kind of error", "no error"),
         _field("cause", "text", "why it failed, in words", "success"),

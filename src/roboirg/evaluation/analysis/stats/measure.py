@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -228,8 +228,10 @@ def by_scope(cells: Cells) -> Mapping[ScopeKey, ByTask]:
     return {key: own for level in levels for key, own in level.items()}
 
 
-def summarize(cells: Cells) -> Mapping[ScopeKey, Measured[ScopeKey]]:
-    """Measure each policy run and set of options in each scope.
+def summarize(
+    cells: Cells, wanted: Collection[str] | None = None
+) -> Mapping[ScopeKey, Measured[ScopeKey]]:
+    """Measure each policy run and set of options in each scope, or in those that are wanted.
 
     The gap is to explicit, the second gap is the implicit form less the resolved one. P-values are
     corrected over a policy run's tasks, its suites, or its averages.
@@ -240,7 +242,7 @@ def summarize(cells: Cells) -> Mapping[ScopeKey, Measured[ScopeKey]]:
         return NOTHING if options == key.options else scopes.get(key._replace(options=options), {})
 
     found = measure_groups(
-        scopes,
+        {key: own for key, own in scopes.items() if wanted is None or key.scope in wanted},
         (
             lambda key: other(key, REFERENCE),
             lambda key: other(key, replace(key.options, form="resolved")),

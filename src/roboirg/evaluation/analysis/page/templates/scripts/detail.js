@@ -31,8 +31,8 @@ const factsOf = (row, details) => {
   if (details.command !== undefined) facts.push(entry("explicit", strings[details.command]));
   if (details.resolved !== undefined) facts.push(entry("resolved", strings[details.resolved]));
   if (details.prompt !== undefined) facts.push(entry("prompt", strings[details.prompt]));
-  facts.push(entry("meant", (details.goal ?? [])
-    .map(([slot, value]) => `${strings[slot]}: ${strings[value]}`).join(" · ")));
+  facts.push(entry("meant", strings[details.goal]));
+  if (details.named !== undefined) facts.push(entry("understood", strings[details.named]));
   if (details.attribution) {
     const [kind, failure, , sentence] = details.attribution;
     facts.push(entry("why it failed", h("b", { class: `kind ${strings[kind]}` },

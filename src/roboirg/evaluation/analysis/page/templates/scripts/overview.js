@@ -1,7 +1,7 @@
 // Heat maps of success, and bars of outcomes.
 
 const MEASURES = { rate: "success", gap: "gap to explicit" };
-const BARS = ["success", "grounding", "execution", "not attributed", "error"];
+const BARS = ["success", "grounding", "execution", "undecided", "not attributed", "error"];
 
 const drawMaps = () => {
   const controls = byId("map-controls");

@@ -4,7 +4,7 @@ const HUES = 4;
 
 /** Numbers of referents: the same for an expression and its antecedent. */
 const referents = (details) => {
-  const slots = (details.goal ?? []).map(([slot]) => slot);
+  const slots = details.slots ?? [];
   const found = new Map();
   for (const [, , , , , slot, value] of details.mentions ?? []) {
     const key = `${slot}=${value}`;
