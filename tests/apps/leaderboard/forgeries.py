@@ -89,6 +89,10 @@ def _other_stage(lines: Lines, _folder: Path, rng: random.Random) -> Lines:
 
 LATE = "timeout: the policy took more than 600 s"
 
+OTHER = {"kind": "execution", "failure": "unreachable", "sentence": "Could not."}
+UNWATCHED = _changes("failure", attribution=OTHER, attempts=None)
+"""No forgery: a record from before attempts were watched for, attributed by other rules."""
+
 FORGERIES: dict[str, tuple[Forgery, str]] = {
     "failure to success": (
         _changes("failure", outcome="success", cause=None, attribution=None),
@@ -102,6 +106,8 @@ FORGERIES: dict[str, tuple[Forgery, str]] = {
         _changes("failure", outcome="error", error="timeout", cause=LATE, attribution=None),
         "outcome: the record says 'error'; it should be 'failure'.",
     ),
+    "why it failed": (_changes("failure", attribution=OTHER), "attribution: the record says"),
+    "attempts": (_changes(attempts=[]), "attempts: the record says ()"),
     "steps": (_changes(steps=1), "steps: the record says 1; it should be"),
     "events": (_changes("success", events=[]), "events: the record says ()"),
     "end state": (_changes(end_state="0" * 64), "end_state: when played again"),

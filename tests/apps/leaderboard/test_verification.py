@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from forgeries import FORGERIES, Forgery, Lines, forge
+from forgeries import FORGERIES, UNWATCHED, Forgery, Lines, forge
 from selection import slow_but
 from typer.testing import CliRunner
 
@@ -63,6 +63,7 @@ QUICK = (
     "actions of another episode",
     "actions lost",
     "another file of actions",
+    "why it failed",
     "explicit command",
     "version of the world",
     "version of the words",
@@ -77,6 +78,12 @@ def test_what_was_altered_does_not_hold(name: str, honest: Path, tmp_path: Path)
     forge(forged, forgery, random.Random(name))
     (found, *_) = verify_run(forged).checks
     assert words in "\n".join(found.findings)
+
+
+def test_a_record_from_before_attempts_were_watched_for_holds(honest: Path, tmp_path: Path) -> None:
+    shutil.copytree(honest, tmp_path / "older")
+    forge(tmp_path / "older", UNWATCHED, random.Random(0))
+    assert verify_run(tmp_path / "older").holds
 
 
 def test_an_episode_of_the_plan_that_was_left_out_is_named(honest: Path, tmp_path: Path) -> None:
