@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from cause_making import (
@@ -28,19 +29,6 @@ PICKING = ("PickXtimes", "SwingXtimes", "VideoRepick", "VideoPlaceButton", "Vide
 UNMASK = ("VideoUnmask", "ButtonUnmask", "VideoUnmaskSwap", "ButtonUnmaskSwap")
 WITH_WRONG = (*PICKING, *UNMASK, "BinFill", "PickByCount")
 ALL = (*WITH_WRONG, "PutInBox", "StopCube")
-
-
-def goals_with(hands: Hands, **same: object) -> list[Goal]:
-    """Other goals of the scene that agree in some slots."""
-    return [
-        goal
-        for goal in hands.other_goals
-        if all(dict(goal.slots)[slot] == value for slot, value in same.items())
-    ]
-
-
-def slots(hands: Hands, *names: str) -> dict[str, object]:
-    return {name: hands.episode.goal[name] for name in names}
 
 
 def play_any(hands: Hands, goals: list[Goal]) -> None:
@@ -72,19 +60,32 @@ def wrong_thing(hands: Hands, name: str) -> str:
 # Another goal, hands perfect
 
 
-@cause("grounding", "wrong_object", "PickXtimes", "SwingXtimes")
-def another_color(hands: Hands) -> None:
-    play_any(hands, goals_with(hands, **slots(hands, "repeats")))
+def another_goal(name: str, failure: str, tasks: Sequence[str], *same: str, by: int = 0) -> None:
+    """Mark as a cause a goal that agrees in some slots, and has so many more repeats."""
+
+    def play(hands: Hands) -> None:
+        meant, goals = hands.episode.goal, hands.other_goals
+        found = [goal for goal in goals if all(goal[slot] == meant[slot] for slot in same)]
+        if by:
+            repeats = meant.number("repeats") + by
+            found = [goal for goal in found if goal.number("repeats") == repeats]
+        play_any(hands, found)
+
+    play.__name__ = name
+    cause("grounding", failure, *tasks)(play)
 
 
-@cause("grounding", "wrong_object", "VideoPlaceButton")
-def another_color_to_place(hands: Hands) -> None:
-    play_any(hands, goals_with(hands, **slots(hands, "relation")))
-
-
-@cause("grounding", "wrong_object", "VideoPlaceOrder")
-def another_color_to_order(hands: Hands) -> None:
-    play_any(hands, goals_with(hands, **slots(hands, "placement")))
+COUNTED = ("PickXtimes", "SwingXtimes", "PickByCount")
+another_goal("another_color", "wrong_object", ("PickXtimes", "SwingXtimes"), "repeats")
+another_goal("another_color_to_place", "wrong_object", ("VideoPlaceButton",), "relation")
+another_goal("another_color_to_order", "wrong_object", ("VideoPlaceOrder",), "placement")
+another_goal("once_more", "wrong_count", COUNTED, "color", by=1)
+another_goal("once_less", "wrong_count", COUNTED, "color", by=-1)
+another_goal("repicked_once_more", "wrong_count", ("VideoRepick",), by=1)
+another_goal("repicked_once_less", "wrong_count", ("VideoRepick",), by=-1)
+another_goal("another_number_to_bin", "wrong_count", ("BinFill",), "colors")
+another_goal("another_disc", "wrong_place", ("VideoPlaceButton", "VideoPlaceOrder"), "color")
+another_goal("another_box", "wrong_place", ("PutInBox",))
 
 
 @cause("grounding", "wrong_object", "BinFill")
@@ -101,60 +102,25 @@ def another_color_to_bin(hands: Hands) -> None:
     )
 
 
-@cause("grounding", "wrong_count", "PickXtimes", "SwingXtimes", "VideoRepick", "PickByCount")
-def once_more(hands: Hands) -> None:
-    repeats = hands.episode.goal.number("repeats")
-    same = {name: one for name, one in hands.episode.goal.slots if name != "repeats"}
-    play_any(hands, [g for g in goals_with(hands, **same) if g.number("repeats") == repeats + 1])
-
-
-@cause("grounding", "wrong_count", "PickXtimes", "SwingXtimes", "VideoRepick", "PickByCount")
-def once_less(hands: Hands) -> None:
-    repeats = hands.episode.goal.number("repeats")
-    same = {name: one for name, one in hands.episode.goal.slots if name != "repeats"}
-    play_any(hands, [g for g in goals_with(hands, **same) if g.number("repeats") == repeats - 1])
-
-
-@cause("grounding", "wrong_count", "BinFill")
-def another_number_to_bin(hands: Hands) -> None:
-    play_any(hands, goals_with(hands, **slots(hands, "colors")))
-
-
-@cause("grounding", "wrong_place", "VideoPlaceButton")
-def another_disc(hands: Hands) -> None:
-    play_any(hands, goals_with(hands, **slots(hands, "color")))
-
-
-@cause("grounding", "wrong_place", "VideoPlaceOrder")
-def another_disc_in_order(hands: Hands) -> None:
-    play_any(hands, goals_with(hands, **slots(hands, "color")))
-
-
-@cause("grounding", "wrong_place", "PutInBox")
-def another_box(hands: Hands) -> None:
-    play_any(hands, hands.other_goals)
+def colors_lifted(hands: Hands, keep: Callable[[tuple[str, ...], tuple[str, ...]], bool]) -> None:
+    """Play another goal of an Unmask task that a comparison of colors allows."""
+    meant = hands.episode.goal.texts("colors")
+    play_any(hands, [goal for goal in hands.other_goals if keep(goal.texts("colors"), meant)])
 
 
 @cause("grounding", "wrong_object", *UNMASK)
 def another_container(hands: Hands) -> None:
-    number = len(hands.episode.goal.texts("colors"))
-    goals = [g for g in hands.other_goals if len(g.texts("colors")) == number]
-    meant = set(hands.episode.goal.texts("colors"))
-    play_any(hands, [g for g in goals if g.texts("colors")[0] not in meant])
+    colors_lifted(hands, lambda said, meant: len(said) == len(meant) and said[0] not in meant)
 
 
 @cause("grounding", "wrong_order", *UNMASK)
 def the_two_the_other_way_round(hands: Hands) -> None:
-    turned = hands.episode.goal.texts("colors")[::-1]
-    need(len(turned) == 2)
-    play_any(hands, [g for g in hands.other_goals if g.texts("colors") == turned])
+    colors_lifted(hands, lambda said, meant: len(said) > 1 and said == meant[::-1])
 
 
 @cause("grounding", "wrong_count", *UNMASK)
 def only_the_first_of_two(hands: Hands) -> None:
-    first, *rest = hands.episode.goal.texts("colors")
-    need(rest)
-    play_any(hands, [g for g in hands.other_goals if g.texts("colors") == (first,)])
+    colors_lifted(hands, lambda said, meant: said == meant[:1])
 
 
 @cause("grounding", "wrong_order", "SwingXtimes")

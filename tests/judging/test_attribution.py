@@ -324,49 +324,6 @@ def test_what_shows_late_is_dated_when_it_was_done() -> None:
     assert staged.turn + found.step == done < staged.step
 
 
-def test_a_misplaced_release_is_dated_and_the_right_ones_before_it_are_not_the_cause() -> None:
-    episodes = (get_episode("BinFill", "test", index) for index in range(50))
-    episode = next(found for found in episodes if len(found.stages) == 5)
-    second = episode.stages[2].primitive.subject
-    staged = Staged(episode).play(episode.stages[:2]).lift(second).drop(second)
-    done = staged.step
-    found = staged.press().finding()
-    assert staged.judge.status is Status.FAILURE
-    assert found is not None
-    assert (found.failure, found.subject) == ("dropped", second)
-    assert staged.turn + found.step == done - 3  # when it was let go
-    episode = next(
-        found
-        for found in (get_episode("PickXtimes", "test", index) for index in range(50))
-        if len(found.stages) == 5
-    )
-    cube = episode.stages[0].primitive.subject
-    staged = Staged(episode).play(episode.stages[:2]).lift(cube).put(cube)
-    done = staged.step
-    found = staged.press().finding()
-    assert found is not None
-    assert found.failure == "misplaced"
-    assert staged.turn + found.step == done - 1
-
-
-def test_rules_name_their_failure_where_their_facts_cannot_tell() -> None:
-    """A rule without a name has to be about acts that `mistake` can place."""
-    for task in every_task():
-        for index in range(4):
-            stages = get_episode(task, "test", index).stages
-            rules = {one for s in stages for one in s.forbids if isinstance(one, Rule)}
-            for rule in rules:
-                if rule.failure is None:
-                    assert {fact.kind for fact in facts_of(rule)} <= {
-                        "pressed",
-                        "over",
-                        "picked",
-                        "binned",
-                    }, rule
-                else:
-                    assert rule.failure in FAILURES
-
-
 def test_how_a_failure_is_described_is_no_part_of_an_episode_s_identity() -> None:
     named, other = Rule(Fact("pressed", "b"), "x", "wrong_time"), Rule(Fact("pressed", "b"), "y")
     assert plain(named) == plain(other)

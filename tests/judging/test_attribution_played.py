@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from selection import slow_but
 
 import roboirg
 from roboirg.core.conditions import Fact
-from roboirg.core.episode import SPLITS, Goal, Primitive
+from roboirg.core.episode import SPLITS, Goal
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.judging import FailureAttribution, attribute_failure
 from roboirg.language import instruct, mirrored_objects
 from roboirg.policies import make_policy, play
 from roboirg.policies.builtin.scripted import ScriptedPolicy
-from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.tasks import every_task, get_task
 from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 pytestmark = pytest.mark.sim
-
-OPEN = 1.0
 
 
 def finding(
@@ -109,59 +105,6 @@ def test_a_listener_who_takes_left_for_right_picks_the_mirrored_cube() -> None:
     untold = finding(env, info)
     assert untold is not None
     assert untold.failure == "wrong_object"
-
-
-Pieces = Iterator[NDArray[np.float64]]
-
-
-def picked_up(hands: MotionPrimitives, cube: str) -> Pieces:
-    yield from hands.execute(Primitive("pick_cube", cube))
-
-
-def dropping(hands: MotionPrimitives, cube: str) -> Pieces:
-    for piece in picked_up(hands, cube):
-        last = piece
-        yield piece
-    yield opened(np.repeat(last[-1:], 10, axis=0))
-
-
-def setting_down(hands: MotionPrimitives, cube: str) -> Pieces:
-    yield from picked_up(hands, cube)
-    yield from hands.execute(Primitive("put_down", cube, height=0.02))
-
-
-def missing(hands: MotionPrimitives, cube: str) -> Pieces:
-    for piece in picked_up(hands, cube):
-        yield opened(piece)
-
-
-def opened(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    rows = rows.copy()
-    rows[:, -1] = OPEN
-    return rows
-
-
-@pytest.mark.parametrize(
-    ("work", "failure"),
-    [
-        (picked_up, "stopped"),
-        (dropping, "dropped"),
-        (setting_down, "misplaced"),
-        (missing, "missed_grasp"),
-    ],
-)
-def test_what_the_hand_does(work: Callable[[MotionPrimitives, str], Pieces], failure: str) -> None:
-    env = roboirg.make("PickXtimes", episode=3, cameras=(), max_steps=400)
-    _, info = env.reset()
-    cube = env.episode.stages[0].primitive.subject
-    for piece in work(MotionPrimitives(env.session.world), cube):
-        *_, info = env.step_chunk(piece)
-    resting = np.append(env.session.world.robot.arm_positions, piece[-1, -1])
-    *_, info = env.step_chunk(np.repeat(resting[None], 400, axis=0))
-    assert info["status"] == "timeout"
-    found = finding(env, info)
-    assert found is not None
-    assert (found.failure, found.subject or cube) == (failure, cube)
 
 
 def test_a_pose_out_of_reach() -> None:

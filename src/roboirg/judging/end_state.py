@@ -118,7 +118,7 @@ def judge_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> FailureAttribut
     | what the stage expects or another thing, which is not clear | ``ambiguous_act`` |
     """
     right, ahead = _right_now(replay), range(replay.expected_stage, len(replay.stages))
-    tries = [one for one in slips if one.step >= replay.expected_since]
+    tries = [one for one in slips if one.step >= replay.acted_since]
     clear = [one for one in tries if one.subjects <= right]
     off = [one for one in tries if not one.subjects & right]
     if clear and len(clear) >= len(off):
@@ -213,7 +213,7 @@ def _standing_acts(replay: EpisodeReplay) -> Iterator[FactInterval]:
     that a later stage expects, a press where the stage expects another button, and placing an
     object that was picked up.
     """
-    since, start, roles = replay.expected_since, replay.policy_start_step, FactRole
+    since, start, roles = replay.acted_since, replay.policy_start_step, FactRole
     ahead = replay.stages[replay.expected_stage + 1 :]
     later = {fact for stage in ahead for fact in facts_of(stage.expects)}
     expected = facts_of(replay.stages[replay.expected_stage].expects)
@@ -257,7 +257,7 @@ def _stopped_short(replay: EpisodeReplay) -> FailureAttribution | None:
 
 def _done_too_early(replay: EpisodeReplay) -> FailureAttribution | None:
     """Return ``wrong_order`` if what the stage expects was done before it was expected."""
-    stages, current, since = replay.stages, replay.expected_stage, replay.expected_since
+    stages, current, since = replay.stages, replay.expected_stage, replay.acted_since
     before = {fact for stage in stages[:current] for fact in facts_of(stage.expects)}
     wanted = set(facts_of(stages[current].expects)) - before
     acts = replay.started(FactRole.RAISE, FactRole.PRESS, after=replay.policy_start_step)

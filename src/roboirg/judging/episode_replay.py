@@ -79,11 +79,13 @@ class EpisodeReplay:
         return self.judge.index - len(self.episode.demonstration)
 
     @property
-    def expected_since(self) -> int:
-        """The step of the policy's turn from which on that stage is expected."""
-        if self.expected_stage not in self.expected_stages:
-            return max(self.last_step, self.policy_start_step)
-        return max(self.expected_stages.index(self.expected_stage), self.policy_start_step)
+    def acted_since(self) -> int:
+        """The step at which an act last completed a stage, or else the policy's turn began.
+
+        That time passes is no act.
+        """
+        acts = (step for done, step in self.completions() if facts_of(self.stages[done].expects))
+        return max(acts, default=self.policy_start_step)
 
     def completions(self) -> Iterator[tuple[int, int]]:
         """Yield the index of each completed stage of the policy, and the step that completed it."""

@@ -29,5 +29,5 @@ class FailureAttribution(NamedTuple):
         cls, failure: FailureName, subject: str | None, step: int, words: str
     ) -> FailureAttribution:
         """Return an attribution of the kind of the failure; the words become a sentence."""
-        kind = FAILURES[failure].kind
-        return cls(kind, failure, subject, step, f"{words[0].upper()}{words[1:]}.")
+        sentence = f"{words[0].upper()}{words[1:]}."
+        return cls(FAILURES[failure].kind, failure, subject, step, sentence)
