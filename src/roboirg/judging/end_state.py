@@ -95,16 +95,21 @@ def explain_missing(
     A slip accounts for one object that was to be handled, from its pick on; places that were passed
     are counted one by one. `skipped` has the indices of the stages that are missing.
     """
-    missing = replay.stages[skipped.start : skipped.stop]
-    roles = [{fact.traits.role for fact in facts_of(stage.expects)} for stage in missing]
+    early = {one.fact for one in replay.started(FactRole.RAISE, after=replay.acted_since)}
+    acts = [set(facts_of(replay.stages[one].expects)) for one in skipped]
+    roles = [{fact.traits.role for fact in own} for own in acts if not own & early]
     raises = [index for index, own in enumerate(roles) if FactRole.RAISE in own]
     head = [own for own in roles[: raises[0] if raises else None] if own - {FactRole.RELEASE}]
-    names = _meant(replay, skipped)
-    own = [one for one in slips if one.subjects <= names and not is_noticed(replay, one, slips)]
+    own = [
+        one
+        for one in slips
+        if one.subjects <= _meant(replay, skipped) and not is_noticed(replay, one, slips)
+    ]
     visits = sum(FactRole.CARRY in roles for roles in head)
     passed = sum(one.failure == "misplaced" for one in own) if visits else 0
-    made = len(own) - passed + bool(visits and passed >= visits)
-    return describe_slip(replay, own[0]) if own and made >= len(raises) + bool(head) else None
+    if not own or len(own) - passed + bool(visits and passed >= visits) < len(raises) + bool(head):
+        return None
+    return describe_slip(replay, own[0])
 
 
 def judge_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> FailureAttribution | None:

@@ -130,7 +130,7 @@ def _attribute_act(replay: EpisodeReplay, deviation: _Deviation, act: Fact) -> F
 def _is_touched(replay: EpisodeReplay, step: int) -> bool:
     """Return whether something in the hand, and beside the button, pressed it."""
     roles = {fact.traits.role for fact in replay.facts[step]}
-    return FactRole.GRIP in roles and FactRole.APPROACH not in roles
+    return roles & {FactRole.GRIP, FactRole.APPROACH} == {FactRole.GRIP}
 
 
 def _deviations(replay: EpisodeReplay) -> Iterator[_Deviation]:
