@@ -62,8 +62,9 @@ explain it |
         act, failure = unexpected
         found = explain_early_act(replay, slips, act.fact)
         return found or _describe_act(replay, failure, act)
-    gripped = {fact.subject for fact in replay.facts[-1] if fact.traits.grips}
-    in_hand = any(fact.subject in gripped for fact in wanted)
+    in_hand = {one.subject for one in wanted} & {
+        fact.subject for fact in replay.facts[-1] if fact.traits.grips
+    }
     short = _stopped_short(replay) or _done_too_early(replay)
     if short is not None:
         left = range(replay.expected_stage, len(replay.stages))

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from collections.abc import Set as AbstractSet
 
 from roboirg.core.conditions import Fact
+from roboirg.core.episode import SceneObject
 from roboirg.core.motions import Point
 from roboirg.core.object_sizes import (
     BESIDE,
@@ -31,8 +32,9 @@ class AttemptDetector:
     """Detects the attempts in one world, step by step.
 
     Attributes:
-        near: what the hand is near in this step: the body, how far the tool center is from its
-            outline in the plane, m, and whether the hand holds it. Each step begins without.
+        near: what the hand is near in this step: the object, the position of its origin, how far
+            the tool center is from its outline in the plane, m, and whether the hand holds it. Each
+            step begins without.
         found: the attempts of the last step.
     """
 
@@ -40,11 +42,19 @@ class AttemptDetector:
         self._robot, self._bodies = robot, tuple(bodies.values())
         self._peak, self._anchor, self._stays = 0.0, Point(0.0, 0.0, 0.0), 0
         self._gaps: dict[str, float] = {}
-        self.near: list[tuple[Body, float, bool]] = []
+        self.near: list[tuple[SceneObject, Point, float, bool]] = []
+        self._spots: Mapping[str, Point] = {}
         self.found: AbstractSet[Fact] = frozenset()
 
-    def detect(self, tool: Point, facts: AbstractSet[Fact]) -> None:
-        """Find the attempts of this step, given the tool center and the facts of the world."""
+    def detect(self, tool: Point, facts: AbstractSet[Fact], spots: Mapping[str, Point]) -> None:
+        """Find the attempts of this step.
+
+        Args:
+            tool: the tool center.
+            facts: of the world.
+            spots: positions of places by name, m.
+        """
+        self._spots = spots
         opening = float(self._robot.finger_positions.max())
         shut = opening < FINGERS_SHUT
         # The greatest height since the fingers closed on nothing; 0 while they have not.
@@ -55,9 +65,9 @@ class AttemptDetector:
         if tool.z <= HAND_HIGH:
             if opening > FINGERS_OPEN:  # closing fingers can push away what they mean
                 self._gaps = {
-                    body.item.name: gap
-                    for body, gap, _ in self.near
-                    if tool.z - body.position.z <= HAND_LOWERED
+                    item.name: gap
+                    for item, position, gap, _ in self.near
+                    if tool.z - position.z <= HAND_LOWERED
                 }
             found += self._handled(tool, just_shut=shut and not peak)
             if peak > HAND_RAISED:
@@ -67,19 +77,19 @@ class AttemptDetector:
 
     def _handled(self, tool: Point, *, just_shut: bool) -> Iterator[Fact]:
         """Yield what the hand is above, where it has carried something, and what it missed."""
-        if tool.z <= HAND_RAISED and all(gap > BESIDE for _, gap, _ in self.near):
+        if tool.z <= HAND_RAISED and all(one[2] > BESIDE for one in self.near):
             yield from (Fact("emptied", "robot", one) for one in self._next_to(tool, "target"))
         most = min((*self._gaps.values(), BESIDE - UNCLEAR)) + UNCLEAR
         if just_shut:
             yield from (Fact("clutched", one) for one, gap in self._gaps.items() if gap <= most)
-        for body, gap, held in self.near:
-            name = body.item.name
+        for item, position, gap, held in self.near:
+            name = item.name
             if gap <= BESIDE:
                 yield Fact("above", "robot", name)
             if held and tool.z < HAND_LOWERED:
                 yield Fact("lowered", name)
             places = ("target", "bin", "box") if held else ()
-            yield from (Fact("beside", name, one) for one in self._next_to(body.position, *places))
+            yield from (Fact("beside", name, one) for one in self._next_to(position, *places))
 
     def _ended(self, tool: Point, facts: AbstractSet[Fact], *, shut: bool) -> Iterator[Fact]:
         """Yield where closed fingers that were up let go of nothing, or press nothing."""
@@ -96,7 +106,8 @@ class AttemptDetector:
             body.item.name
             for body in self._bodies
             if body.item.kind in kinds
-            and distance_in_plane(point, body.position) - body.item.half_width <= BESIDE
+            and distance_in_plane(point, self._spots.get(body.item.name) or body.position)
+            <= body.item.half_width + BESIDE
         ]
 
 

@@ -72,6 +72,7 @@ class FactDetector:
         self._targets = self._of_kind("target")
         self._places = (*self._targets, *self._of_kind("site"))
         self._bins = (*self._of_kind("bin"), *self._of_kind("box"))
+        self._spots: dict[str, Point] = {}
         self._before: frozenset[Fact] = frozenset()
         self._contacts: Contacts = []
         self._stopped: AbstractSet[str] = frozenset()
@@ -93,6 +94,9 @@ class FactDetector:
             stopped: names of objects that have been stopped for good.
         """
         self._contacts, self._tool, self._stopped = contacts, self._tool_now(), stopped
+        # Read once for all cubes: this is most of what detection costs.
+        fixed = (*self._places, *self._bins)
+        self._spots = {body.item.name: body.position for body in fixed}
         present = [body for body in self._bodies if body.item.name not in absent]
         facts = {fact for fact in self._before if fact.traits.lasts}
         for body in present:
@@ -101,7 +105,7 @@ class FactDetector:
         facts.update(self._robot_facts())
         facts.update(self._registered_facts(present))
         self._before = frozenset(facts)
-        self.attempts.detect(self._tool, self._before)
+        self.attempts.detect(self._tool, self._before, self._spots)
         return self._before
 
     def _registered_facts(self, present: Sequence[Body]) -> Iterator[Fact]:
@@ -123,7 +127,10 @@ class FactDetector:
             distance, height = BEYOND_DISTANCE, BEYOND_HEIGHT
             if fact not in self._before:
                 distance, height = OVER_DISTANCE, OVER_HEIGHT
-            if position.z < height and distance_in_plane(position, target.position) <= distance:
+            if (
+                position.z < height
+                and distance_in_plane(position, self._spots[target.item.name]) <= distance
+            ):
                 yield fact
         if position.z > PICKED_HEIGHT:
             if held:
@@ -136,12 +143,12 @@ class FactDetector:
         yield from (
             Fact("placed", name, place.item.name)
             for place in self._places
-            if distance_in_plane(position, place.position) <= ON_TARGET_DISTANCE
+            if distance_in_plane(position, self._spots[place.item.name]) <= ON_TARGET_DISTANCE
         )
         yield from (
             Fact("binned", name, bin_.item.name)
             for bin_ in self._bins
-            if distance_in_plane(position, bin_.position) <= ON_TARGET_DISTANCE
+            if distance_in_plane(position, self._spots[bin_.item.name]) <= ON_TARGET_DISTANCE
             and float(self._robot.finger_positions.min()) > BINNED_FINGERS
             and math.dist(position, self._tool) > BINNED_TOOL_DISTANCE
         )
@@ -187,7 +194,7 @@ class FactDetector:
         held = distance <= REACH and self._robot.grasps(body.physics, self._contacts)
         if held:
             yield Fact("held", body.item.name)
-        self.attempts.near.append((body, apart - body.item.half_width, held))
+        self.attempts.near.append((body.item, position, apart - body.item.half_width, held))
         return held
 
     def _of_kind(self, kind: str) -> tuple[Body, ...]:
