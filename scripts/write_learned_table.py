@@ -127,14 +127,12 @@ def memories_table(data: RunData) -> str:
 
 def failures_table(data: RunData) -> str:
     """Return how the policy with memory fails in explicit words, over its training seeds."""
-    found: dict[str, Counter[str]] = {}
-    for one in failures(data):
-        if one.attribution is not None:
-            found.setdefault(one.task, Counter())[one.attribution.failure] += 1
+    found = [(one.task, one.attribution.failure) for one in failures(data) if one.attribution]
     lines = ["| task | failures | of which |", "| --- | ---: | --- |"]
-    for task in (one for one in all_tasks() if one in found):
-        kinds = ", ".join(f"`{name}` {count}" for name, count in found[task].most_common())
-        lines.append(f"| {task} | {found[task].total()} | {kinds} |")
+    for task in all_tasks():
+        names = Counter(name for own, name in found if own == task)
+        kinds = ", ".join(f"`{name}` {count}" for name, count in names.most_common())
+        lines += [f"| {task} | {names.total()} | {kinds} |"] * bool(names)
     return "\n".join(lines)
 
 

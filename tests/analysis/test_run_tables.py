@@ -162,6 +162,13 @@ def test_all_episodes_end_in_one_of_four_ways_and_gaps_are_sums_of_changes(
     assert [one.text for one in entries[10:]] == shares.split()
 
 
+def test_a_failure_with_a_name_of_another_version_is_not_attributed() -> None:
+    other = Attribution(kind="execution", failure="renamed", sentence="So.")
+    data = RunData(frame_of(play("10", attribution=other)))
+    (row,) = DIAGNOSTIC_TABLES["failure-names"](data, ()).rows
+    assert [one.text for one in row.entries] == ["2", "1", "1"]
+
+
 def test_the_breakdown_by_difficulty_is_as_stored(snapshot: SnapshotAssertion) -> None:
     table = make_breakdown_table(BREAKDOWNS["difficulty"], MIXED)
     assert get_format("markdown").draw(table) == snapshot

@@ -115,8 +115,11 @@ def setting_label(options: InstructionOptions) -> str:
 
 
 def _failure(record: Summary) -> str | None:
-    """Return the name of an episode's failure or error; None for a success."""
+    """Return the name of an episode's failure or error; None for a success.
+
+    A name that this version does not have is not attributed.
+    """
     if record.outcome == "success":
         return None
     cause = record.attribution
-    return record.error or (cause.failure if cause else UNATTRIBUTED)
+    return record.error or (cause.failure if cause and cause.failure in FAILURES else UNATTRIBUTED)

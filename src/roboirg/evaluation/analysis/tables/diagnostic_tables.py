@@ -157,7 +157,7 @@ def count_failures(frame: Frame, by: Sequence[str]) -> Mapping[Key, Counter[str]
             counts = found.setdefault(tuple(key), Counter())
             counts["trials"] += 1
             if outcome == "failure":
-                counts[failure or UNATTRIBUTED] += 1
+                counts[failure if failure in FAILURES else UNATTRIBUTED] += 1
     return found
 
 

@@ -1,0 +1,88 @@
+"""Attribute the failures of stored packs again: stores attempts and attributions in them.
+
+python scripts/attribute_packs.py results/*.roboirg.zip
+
+Plays the actions of each distinct play once, to see what was tried, in two processes: about an hour
+for the published packs. What was seen is kept in build/attributed, so the command can be stopped,
+and rules of attribution can change without playing again; delete that folder after a change of what
+attempts are. Stops at a record whose events or goals are not those that it says; a pack is replaced
+when all of its records are done. Prints how the episodes of each pack ended.
+
+What subgoals point at is not looked at again, as that takes pictures: their verdicts stay.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+from pathlib import Path
+
+import msgspec
+
+from roboirg.apps.leaderboard.action_replay import replay
+from roboirg.apps.leaderboard.packing import pack_run
+from roboirg.core.errors import RoboIRGError
+from roboirg.evaluation.analysis.results.reading import read_frame
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.diagnostic_tables import make_failure_table
+from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
+from roboirg.evaluation.plan.sources import Source
+from roboirg.evaluation.play.episode_record import conclude
+from roboirg.evaluation.play.job_instruction import PreparedJob
+from roboirg.evaluation.records.action_log import read_actions
+from roboirg.evaluation.records.packs import opened_run
+from roboirg.evaluation.records.record_codec import encode, read_record, read_summary
+from roboirg.evaluation.records.store import RECORDS_FILE
+from roboirg.util.atomic_write import write_atomically
+from roboirg.util.parallel_map import parallel_map
+
+PLAYED = Path(__file__).parents[1] / "build" / "attributed"
+
+
+def attributed(line: bytes, folder: Path) -> bytes:
+    """Return the line of a record with its attempts and today's attribution.
+
+    Raises:
+        RoboIRGError: played again, its events or goals are others.
+    """
+    record = read_record(line, folder / RECORDS_FILE, 1)
+    path, goals = PLAYED / f"{record.action_log}-{record.arm}.json", record.goals
+    if record.action_log is None or goals is None:
+        return line  # an error
+    if not path.exists():
+        write_atomically(path, encode(replay(record, read_actions(folder, record.action_log))[0]))
+    again = read_record(path.read_bytes(), path, 1)
+    record.attempts = again.attempts
+    conclude(
+        record,
+        PreparedJob(msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)),
+        -min(one.step for one in record.events),
+        timed_out=(record.cause or "").startswith("not done after"),
+        original=goals.original,
+    )
+    if (again.events, record.goals) != (record.events, goals):
+        raise RoboIRGError(f"{record.slug}: played again, its events or goals are others.")
+    return encode(record)
+
+
+def main(*packs: str) -> None:
+    """Attribute the failures of packs."""
+    for pack in map(Path, packs):
+        with opened_run(pack) as folder:
+            path, work = folder / RECORDS_FILE, functools.partial(attributed, folder=folder)
+            lines = path.read_bytes().splitlines()
+            plays = {read_summary(line, path, 1).action_log: line for line in lines}
+            # First a record of each play, so that none is played by both processes.
+            found = {
+                line: attributed_line
+                for batch in ([*plays.values()], lines)
+                for line, attributed_line in parallel_map(work, batch, 2)
+            }
+            path.write_bytes(b"".join(found[line] + b"\n" for line in lines))
+            pack_run(folder, pack, videos=True, logs=True)
+            frame = read_frame([Source(folder)])
+        print(markdown(make_failure_table(RunData(frame), means=True)), flush=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
