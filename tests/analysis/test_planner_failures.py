@@ -13,6 +13,8 @@ from roboirg.evaluation.records.record import Attribution, Job, Record, SubgoalR
 
 WRONG = Attribution(kind="grounding", failure="wrong_object", sentence="It took another one.")
 
+UNCLEAR = Attribution(kind="undecided", failure="ambiguous_act", sentence="It closed its fingers.")
+
 
 @pytest.fixture(scope="module")
 def failed() -> Record:
@@ -26,6 +28,7 @@ def failed() -> Record:
     ("verdicts", "attribution", "named"),
     [
         ("right", WRONG, "wrong thing"),
+        ("wrong_place", UNCLEAR, "wrong place"),
         ("wrong_place wrong_count right", None, "wrong count"),
         ("right", None, "hands"),
     ],

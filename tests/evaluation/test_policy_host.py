@@ -233,7 +233,7 @@ def test_records_do_not_depend_on_workers_or_batches(
     assert {record["outcome"] for record in found.values()} == {"success", "failure", "error"}
     # What fails for one episode of a batch costs only that one.
     causes = [record["cause"] for record in found.values() if record["outcome"] == "error"]
-    assert set(causes) == {"policy: ValueError: one of them is bad (hosting_fakes.py, line 183)"}
+    assert set(causes) == {"policy: ValueError: one of them is bad (hosting_fakes.py, line 185)"}
     sizes = [int(line) for line in (tmp_path / "sizes").read_text().split()]
     assert sum(sizes) == 8 * hosting_fakes.LENGTH / 4
     assert max(sizes) <= min(batch, max(workers, 1))

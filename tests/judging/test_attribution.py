@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 import re
-from typing import get_args
+from types import SimpleNamespace
+from typing import cast, get_args
 
 import confusion
 import pytest
@@ -17,6 +18,8 @@ from staged import Staged
 from roboirg.core.conditions import Fact, Rule, facts_of
 from roboirg.core.episode import Episode
 from roboirg.core.failures import FAILURES, FailureName
+from roboirg.evaluation.play.episode_record import declared_intent
+from roboirg.evaluation.records.record import Record
 from roboirg.judging import DeclaredIntent, FailureAttribution, Status, attribute_failure
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.fingerprint import NOT_COUNTED, fingerprint, plain
@@ -34,7 +37,7 @@ classes = functools.cache(lambda: confusion.classes(MADE))
 
 
 def test_kinds_are_right_where_the_cause_is_known() -> None:
-    """What issue 72 asks of causes that were not known to the rules, and more."""
+    """More than of causes that the rules did not know."""
     found = confusion.scores(MADE)
     assert found.of_decided >= 0.95
     assert found.of_causes >= 0.9
@@ -186,6 +189,14 @@ def test_what_was_declared_comes_before_acts(intent: DeclaredIntent, failure: st
     play = staged("PickXtimes").rest()
     play.intent = intent
     says(play, failure)
+
+
+@pytest.mark.parametrize("understood", ["the red one", {"confidence": 0.9}, ["red"], 3])
+def test_what_another_policy_calls_understood_is_no_goal(understood: object) -> None:
+    record = SimpleNamespace(
+        policy_metadata={"understood": understood}, goal={"color": "red"}, subgoals=()
+    )
+    assert declared_intent(cast("Record", record)) is None
 
 
 def test_who_understood_and_missed_failed_by_execution() -> None:

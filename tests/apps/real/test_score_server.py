@@ -210,7 +210,7 @@ def test_the_page_fits_narrow_screens_and_says_what_it_shows(browser, served, wa
         page.goto(served.url)
         assert page.evaluate("document.documentElement.scrollWidth") <= NARROW["width"]
         assert page.locator("svg[role=img] title").count() == 1
-        assert page.locator("fieldset legend").count() == 4
+        assert page.locator("fieldset legend").count() == 5
         for button in page.locator("main button").all():
             assert button.get_attribute("aria-keyshortcuts")
             assert button.bounding_box()["height"] >= 40

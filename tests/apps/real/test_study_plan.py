@@ -222,8 +222,8 @@ def test_a_turned_box_is_drawn_counter_clockwise():
 def test_operators_choose_among_the_failures_of_the_task(task, wrong):
     for trial in make_study(("a",), tasks=(task,), trials=8, demonstrations=0).trials:
         choices = failure_choices(trial.episode)
-        assert {one.failure for one in choices if one.is_grounding} == wrong
-        assert [one.failure for one in choices if not one.is_grounding] == [
+        assert {one.failure for one in choices if one.attribution().kind == "grounding"} == wrong
+        assert [one.failure for one in choices if one.attribution().kind != "grounding"] == [
             "missed_grasp", "dropped", "misplaced", "out_of_time", "stopped", "no_attempt",
         ]  # fmt: skip
         assert len({one.key for one in choices}) == len(choices)

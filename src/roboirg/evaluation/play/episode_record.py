@@ -6,7 +6,7 @@ import datetime as dt
 import functools
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from itertools import zip_longest
 from pathlib import Path
@@ -144,9 +144,13 @@ def conclude(
 
 
 def declared_intent(record: Record) -> DeclaredIntent | None:
-    """Return what a policy declared that it would do; None if it did not."""
-    if "understood" in record.policy_metadata:
-        return DeclaredIntent(True, record.policy_metadata["understood"])
+    """Return what a policy declared that it would do; None if it did not.
+
+    Policies' metadata may hold anything: a goal names slots of the task, or is None.
+    """
+    understood = record.policy_metadata.get("understood", "")
+    if understood is None or (isinstance(understood, Mapping) and understood.keys() & record.goal):
+        return DeclaredIntent(True, understood)
     said = tuple((one.step, one.verdict) for one in record.subgoals)
     return DeclaredIntent(verdicts=said) if said else None
 

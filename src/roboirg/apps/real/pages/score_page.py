@@ -86,7 +86,7 @@ def verdict_buttons(
             one.key,
             str(number),
             f"the robot {one.words}",
-            "grounding" if one.is_grounding else "execution",
+            one.attribution().kind,
             one.key == chosen,
         )
         for number, one in enumerate(choices, 1)

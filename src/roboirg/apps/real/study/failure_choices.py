@@ -35,11 +35,6 @@ class FailureChoice(NamedTuple):
     subject: str | None
     words: str
 
-    @property
-    def is_grounding(self) -> bool:
-        """Whether the policy did something else than the instruction means."""
-        return self.attribution().kind == "grounding"
-
     def attribution(self, note: str = "") -> Attribution:
         """Return the attribution for the record; an operator counts no steps.
 

@@ -54,8 +54,9 @@ def planner_failure(record: Record) -> str | None:
     found = record.attribution
     timed_out = record.steps >= record.environment.max_steps
     if not timed_out:
-        named = "" if found is None else _OF_ATTRIBUTION.get(found.failure, "hands")
-        return named or _last_verdict(record) or "hands"
+        if found is None or found.kind == "undecided":
+            return _last_verdict(record) or "hands"
+        return _OF_ATTRIBUTION.get(found.failure, "hands")
     return _when_time_is_up(record)
 
 
