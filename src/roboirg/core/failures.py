@@ -105,12 +105,12 @@ FAILURES: Mapping[FailureName, FailureMeaning] = {
         "execution",
         "closed its fingers on nothing next to the right object, or took hold of it, and did "
         "not lift it",
-        "the fingers close beside the cube; it slips out before it is up",
+        "the fingers close next to the cube; it slips out before it is up",
     ),
     "missed_press": FailureMeaning(
         "execution",
         "lowered a closed hand next to the right button and did not press it",
-        "the hand comes down 5 cm beside the button",
+        "the hand comes down 5 cm from the button",
     ),
     "dropped": FailureMeaning(
         "execution",
@@ -120,7 +120,7 @@ FAILURES: Mapping[FailureName, FailureMeaning] = {
     "misplaced": FailureMeaning(
         "execution",
         "put the right object down next to its place, or carried it past that place",
-        "the cube is put down next to the target; a swing passes 5 cm beside the disc",
+        "the cube is put down next to the target; a swing passes 5 cm from the disc",
     ),
     "mistimed": FailureMeaning(
         "execution",

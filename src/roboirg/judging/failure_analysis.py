@@ -128,7 +128,7 @@ def _attribute_act(replay: EpisodeReplay, deviation: _Deviation, act: Fact) -> F
 
 
 def _is_touched(replay: EpisodeReplay, step: int) -> bool:
-    """Return whether something in the hand, and beside the button, pressed it."""
+    """Return whether something in the hand, and next to the button, pressed it."""
     roles = {fact.traits.role for fact in replay.facts[step]}
     return roles & {FactRole.GRIP, FactRole.APPROACH} == {FactRole.GRIP}
 

@@ -1,4 +1,4 @@
-"""What the hands tried and failed to do: misses, drops, releases and passes beside a place."""
+"""What the hands tried and failed to do: misses, drops, releases and passes next to a place."""
 
 from __future__ import annotations
 
