@@ -5,8 +5,8 @@ python scripts/attribute_packs.py results/*.roboirg.zip
 Plays the actions of each distinct play once, to see what was tried, in two processes: about an hour
 for the published packs. What was seen is kept in build/attributed, so the command can be stopped,
 and rules of attribution can change without playing again; delete that folder after a change of what
-attempts are. Stops at a record whose events or goals are not those that it says; a pack is replaced
-when all of its records are done. Prints how the episodes of each pack ended.
+attempts are. Stops at a record whose events do not lead to its goals; a pack is replaced when all
+of its records are done. Prints how the episodes of each pack ended.
 
 What subgoals point at is not looked at again, as that takes pictures: their verdicts stay.
 """
@@ -42,8 +42,10 @@ PLAYED = Path(__file__).parents[1] / "build" / "attributed"
 def attributed(line: bytes, folder: Path) -> bytes:
     """Return the line of a record with its attempts and today's attribution.
 
+    Without attempts where the play's events are others here: another processor may have made them.
+
     Raises:
-        RoboIRGError: played again, its events or goals are others.
+        RoboIRGError: its events do not lead to the goals that it says.
     """
     record = read_record(line, folder / RECORDS_FILE, 1)
     path, goals = PLAYED / f"{record.action_log}-{record.arm}.json", record.goals
@@ -52,7 +54,8 @@ def attributed(line: bytes, folder: Path) -> bytes:
     if not path.exists():
         write_atomically(path, encode(replay(record, read_actions(folder, record.action_log))[0]))
     again = read_record(path.read_bytes(), path, 1)
-    record.attempts = again.attempts
+    if again.events == record.events:
+        record.attempts = again.attempts
     conclude(
         record,
         PreparedJob(msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)),
@@ -60,8 +63,8 @@ def attributed(line: bytes, folder: Path) -> bytes:
         timed_out=(record.cause or "").startswith("not done after"),
         original=goals.original,
     )
-    if (again.events, record.goals) != (record.events, goals):
-        raise RoboIRGError(f"{record.slug}: played again, its events or goals are others.")
+    if record.goals != goals:
+        raise RoboIRGError(f"{record.slug}: its events do not lead to the goals that it says.")
     return encode(record)
 
 
