@@ -8,7 +8,8 @@ and rules of attribution can change without playing again; delete that folder af
 attempts are. Stops at a record whose events do not lead to its goals; a pack is replaced when all
 of its records are done. Prints how the episodes of each pack ended.
 
-What subgoals point at is not looked at again, as that takes pictures: their verdicts stay.
+A planner's subgoals are named again at the same steps, with pictures for what they point at, and
+judged by today's rules. That takes another half an hour.
 """
 
 from __future__ import annotations
@@ -19,24 +20,63 @@ from pathlib import Path
 
 import msgspec
 
-from roboirg.apps.leaderboard.action_replay import replay
+from roboirg.apps.leaderboard.action_replay import ReplayPolicy, replay
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.evaluation.analysis.results.reading import read_frame
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.diagnostic_tables import make_failure_table
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.plan.sources import Source
-from roboirg.evaluation.play.episode_record import conclude
+from roboirg.evaluation.play.call_guard import CallGuard
+from roboirg.evaluation.play.episode_record import begin_record, conclude
 from roboirg.evaluation.play.job_instruction import PreparedJob
-from roboirg.evaluation.records.action_log import read_actions
+from roboirg.evaluation.play.rollout import play_with
+from roboirg.evaluation.records.action_log import ActionLog, read_actions
 from roboirg.evaluation.records.packs import opened_run
+from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.record_codec import encode, read_record, read_summary
 from roboirg.evaluation.records.store import RECORDS_FILE
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.parallel_map import parallel_map
+from roboirg.util.short_hash import short_hash
 
 PLAYED = Path(__file__).parents[1] / "build" / "attributed"
+
+
+class NamingPolicy(ReplayPolicy):
+    """Answers and names what a planner answered and named.
+
+    Args:
+        log: the answers.
+        stored: the record with the subgoals.
+        again: the record of this play, which counts its steps.
+    """
+
+    def __init__(self, log: ActionLog, stored: Record, again: Record) -> None:
+        super().__init__(log)
+        self._stored, self._again = stored, again
+
+    @property
+    def subgoal(self) -> str | None:
+        """The last subgoal; None before the first."""
+        named = [one.text for one in self._stored.subgoals if one.step <= self._again.steps]
+        return named[-1] if named else None
+
+
+def play_again(record: Record, log: ActionLog) -> Record:
+    """Return the record that the actions and subgoals of a record lead to."""
+    if not record.subgoals:
+        return replay(record, log)[0]
+    prepared = PreparedJob(
+        msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)
+    )
+    again = begin_record(prepared)
+    policy = NamingPolicy(log, record, again)
+    needs = PolicyNeeds(cameras=("front",), actions=log.space)
+    play_with(policy, prepared, needs, again, CallGuard(again.timings, None)).conclude()
+    return again
 
 
 def attributed(line: bytes, folder: Path) -> bytes:
@@ -48,14 +88,18 @@ def attributed(line: bytes, folder: Path) -> bytes:
         RoboIRGError: its events do not lead to the goals that it says.
     """
     record = read_record(line, folder / RECORDS_FILE, 1)
-    path, goals = PLAYED / f"{record.action_log}-{record.arm}.json", record.goals
+    said, goals = [[one.step, one.text] for one in record.subgoals], record.goals
     if record.action_log is None or goals is None:
         return line  # an error
+    named = f"-{short_hash(str(said))}" if said else ""
+    path = PLAYED / f"{record.action_log}-{record.arm}{named}.json"
     if not path.exists():
-        write_atomically(path, encode(replay(record, read_actions(folder, record.action_log))[0]))
+        write_atomically(path, encode(play_again(record, read_actions(folder, record.action_log))))
     again = read_record(path.read_bytes(), path, 1)
     if again.events == record.events:
         record.attempts = again.attempts
+        if [[one.step, one.text] for one in again.subgoals] == said:
+            record.subgoals = again.subgoals
     conclude(
         record,
         PreparedJob(msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)),
