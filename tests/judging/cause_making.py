@@ -165,10 +165,6 @@ class Hands:
         """Indices of the stages that pick something up."""
         return [i for i, one in enumerate(self.stages) if one.primitive.kind.startswith("pick")]
 
-    def holds(self, kind: str, subject: str, place: str | None = None) -> bool:
-        """Whether a fact holds now."""
-        return Fact(kind, subject, place) in self.env.session.world.facts
-
     @property
     def step(self) -> int:
         """Steps of the world so far; those of `Primitive.steps` are counted in the same way."""
@@ -186,10 +182,6 @@ class Hands:
         what: Stage | Primitive,
         *,
         beside: float | tuple[float, float] = 0.0,
-        lowest: float = 0.0,
-        fingers: float | None = None,
-        open_after: float | None = None,
-        at: float = OPEN,
         until: float = 1.0,
     ) -> None:
         """Do a stage or a primitive, disturbed.
@@ -198,25 +190,18 @@ class Hands:
             what: a stage of any goal, or a `Primitive("pick_cube", name)` and the like.
             beside: by how much the whole motion is beside its object or place, m: a distance, in
                 the direction in which the least is in the way, or a vector (x, y).
-            lowest: the tool stays above this height, m.
-            fingers: the gripper all the time, +1 open to -1 closed; None as the oracle.
-            open_after: share of the motion's pieces after which the fingers are opened to `at`.
             until: share of the motion's pieces after which it is broken off.
         """
         primitive = what.primitive if isinstance(what, Stage) else what
         about = str(primitive.place or primitive.subject)
         vector = self._free_way(about, beside) if isinstance(beside, float) else beside
-        self._expert.shift, self._expert.lowest = vector, lowest
+        self._expert.shift = vector
         pieces = _PIECES.get(primitive.kind, 4)
         for number, rows in enumerate(self._expert.execute(primitive)):
             if number >= until * pieces:
                 break
-            if fingers is not None:
-                rows[:, -1] = fingers
-            if open_after is not None and number >= open_after * pieces:
-                rows[:, -1] = at
             self.execute(rows)
-        self._expert.shift, self._expert.lowest = (0.0, 0.0), 0.0
+        self._expert.shift = (0.0, 0.0)
 
     def execute(self, rows: NDArray[np.float64]) -> None:
         """Execute joint targets and gripper, (n, 8), perhaps more slowly."""
@@ -288,9 +273,9 @@ def _disturbed_expert(world: Any) -> Any:
     from roboirg.simulation.physics_settings import GRIPPER_STEPS
 
     class Disturbed(MotionPrimitives):
-        """Primitives that go beside what they mean, and stay above a height."""
+        """Primitives that go beside what they mean."""
 
-        shift, lowest = (0.0, 0.0), 0.0
+        shift = (0.0, 0.0)
 
         def execute(self, primitive: Primitive) -> Iterator[NDArray[np.float64]]:
             if primitive.kind == "pick_cube" and self.shift != (0.0, 0.0):
@@ -300,10 +285,6 @@ def _disturbed_expert(world: Any) -> Any:
         def _position(self, name: str) -> Point:
             place = super()._position(name)
             return Point(place.x + self.shift[0], place.y + self.shift[1], place.z)
-
-        def _plan(self, position: Point, rotation: Any) -> NDArray[np.float64]:
-            higher = position._replace(z=max(position.z, self.lowest))
-            return super()._plan(higher, rotation)
 
         def way(self, point: Point) -> NDArray[np.float64]:
             return self._move(point, STRAIGHT_DOWN)

@@ -31,11 +31,6 @@ WITH_WRONG = (*PICKING, *UNMASK, "BinFill", "PickByCount")
 ALL = (*WITH_WRONG, "PutInBox", "StopCube")
 
 
-def play_any(hands: Hands, goals: list[Goal]) -> None:
-    need(goals)
-    hands.play(hands.stages_of(goals[int(hands.rng.integers(len(goals)))]))
-
-
 def first_pick(hands: Hands) -> int:
     """Play up to the first pick; its index."""
     index = hands.picks()[0]
@@ -60,8 +55,15 @@ def wrong_thing(hands: Hands, name: str) -> str:
 # Another goal, hands perfect
 
 
-def another_goal(name: str, failure: str, tasks: Sequence[str], *same: str, by: int = 0) -> None:
-    """Mark as a cause a goal that agrees in some slots, and has so many more repeats."""
+def another_goal(
+    name: str,
+    failure: str,
+    tasks: Sequence[str],
+    *same: str,
+    by: int = 0,
+    fits: Callable[[Goal, Goal], bool] = lambda _goal, _meant: True,
+) -> None:
+    """Mark as a cause a goal that agrees in some slots, has so many more repeats, and fits."""
 
     def play(hands: Hands) -> None:
         meant, goals = hands.episode.goal, hands.other_goals
@@ -69,10 +71,16 @@ def another_goal(name: str, failure: str, tasks: Sequence[str], *same: str, by: 
         if by:
             repeats = meant.number("repeats") + by
             found = [goal for goal in found if goal.number("repeats") == repeats]
-        play_any(hands, found)
+        found = [goal for goal in found if fits(goal, meant)]
+        need(found)
+        hands.play(hands.stages_of(found[int(hands.rng.integers(len(found)))]))
 
     play.__name__ = name
     cause("grounding", failure, *tasks)(play)
+
+
+def colors(goal: Goal) -> tuple[str, ...]:
+    return goal.texts("colors")
 
 
 COUNTED = ("PickXtimes", "SwingXtimes", "PickByCount")
@@ -88,39 +96,35 @@ another_goal("another_disc", "wrong_place", ("VideoPlaceButton", "VideoPlaceOrde
 another_goal("another_box", "wrong_place", ("PutInBox",))
 
 
-@cause("grounding", "wrong_object", "BinFill")
-def another_color_to_bin(hands: Hands) -> None:
-    meant = hands.episode.goal
-    play_any(
-        hands,
-        [
-            goal
-            for goal in hands.other_goals
-            if set(goal.texts("colors")) - set(meant.texts("colors"))
-            and sum(goal.numbers("counts")) == sum(meant.numbers("counts"))
-        ],
-    )
-
-
-def colors_lifted(hands: Hands, keep: Callable[[tuple[str, ...], tuple[str, ...]], bool]) -> None:
-    """Play another goal of an Unmask task that a comparison of colors allows."""
-    meant = hands.episode.goal.texts("colors")
-    play_any(hands, [goal for goal in hands.other_goals if keep(goal.texts("colors"), meant)])
-
-
-@cause("grounding", "wrong_object", *UNMASK)
-def another_container(hands: Hands) -> None:
-    colors_lifted(hands, lambda said, meant: len(said) == len(meant) and said[0] not in meant)
-
-
-@cause("grounding", "wrong_order", *UNMASK)
-def the_two_the_other_way_round(hands: Hands) -> None:
-    colors_lifted(hands, lambda said, meant: len(said) > 1 and said == meant[::-1])
-
-
-@cause("grounding", "wrong_count", *UNMASK)
-def only_the_first_of_two(hands: Hands) -> None:
-    colors_lifted(hands, lambda said, meant: said == meant[:1])
+another_goal(
+    "another_color_to_bin",
+    "wrong_object",
+    ("BinFill",),
+    fits=lambda goal, meant: (
+        bool(set(colors(goal)) - set(colors(meant)))
+        and sum(goal.numbers("counts")) == sum(meant.numbers("counts"))
+    ),
+)
+another_goal(
+    "another_container",
+    "wrong_object",
+    UNMASK,
+    fits=lambda goal, meant: (
+        len(colors(goal)) == len(colors(meant)) and colors(goal)[0] not in colors(meant)
+    ),
+)
+another_goal(
+    "the_two_the_other_way_round",
+    "wrong_order",
+    UNMASK,
+    fits=lambda goal, meant: len(colors(goal)) > 1 and colors(goal) == colors(meant)[::-1],
+)
+another_goal(
+    "only_the_first_of_two",
+    "wrong_count",
+    UNMASK,
+    fits=lambda goal, meant: colors(goal) == colors(meant)[:1],
+)
 
 
 @cause("grounding", "wrong_order", "SwingXtimes")
@@ -171,34 +175,86 @@ def snatches_at_the_right_thing(hands: Hands) -> None:
     hands.snatch(hands.stages[index].primitive.subject, 6)
 
 
-@cause("execution", "missed_grasp", "PickXtimes", "SwingXtimes", "VideoRepick")
-def misses_the_only_one_and_goes_on(hands: Hands) -> None:
-    need(len(hands.picks()) == 1)
-    hands.do(hands.stages[0], beside=MISS)
-    hands.play(hands.stages[1:])
+def beside(
+    name: str,
+    failure: str,
+    tasks: Sequence[str],
+    distance: float,
+    chosen: Callable[[Hands, list[int]], Sequence[int]],
+) -> None:
+    """Mark as a cause that some stages are done beside, m, and the rest as if nothing was.
+
+    `chosen` gets the indices of the stages that pick; where it chooses none, the scene does not
+    offer the cause.
+    """
+
+    def play(hands: Hands) -> None:
+        numbers = chosen(hands, hands.picks())
+        need(numbers)
+        for number, stage in enumerate(hands.stages):
+            hands.do(stage, beside=distance if number in numbers else 0.0)
+
+    play.__name__ = name
+    cause("execution", failure, *tasks)(play)
 
 
-def go_on_after_misses(hands: Hands, missed: set[int]) -> None:
-    for number, stage in enumerate(hands.stages):
-        hands.do(stage, beside=MISS if number in missed else 0.0)
-
-
-@cause("execution", "missed_grasp", "PickXtimes", "BinFill", "VideoRepick")
-def misses_the_first_of_several(hands: Hands) -> None:
-    need(len(hands.picks()) >= 2)
-    go_on_after_misses(hands, {hands.picks()[0]})
-
-
-@cause("execution", "missed_grasp", "PickXtimes", "BinFill", "VideoRepick")
-def misses_the_last_of_several(hands: Hands) -> None:
-    need(len(hands.picks()) >= 2)
-    go_on_after_misses(hands, {hands.picks()[-1]})
-
-
-@cause("execution", "missed_grasp", "PickXtimes", "BinFill")
-def misses_all_of_several(hands: Hands) -> None:
-    need(len(hands.picks()) >= 2)
-    go_on_after_misses(hands, set(hands.picks()))
+SEVERAL = ("PickXtimes", "BinFill", "VideoRepick")
+beside(
+    "misses_the_only_one_and_goes_on",
+    "missed_grasp",
+    ("PickXtimes", "SwingXtimes", "VideoRepick"),
+    MISS,
+    lambda _, picks: picks * (len(picks) == 1),
+)
+beside(
+    "misses_the_first_of_several",
+    "missed_grasp",
+    SEVERAL,
+    MISS,
+    lambda _, picks: picks[:1] * (len(picks) >= 2),
+)
+beside(
+    "misses_the_last_of_several",
+    "missed_grasp",
+    SEVERAL,
+    MISS,
+    lambda _, picks: picks[1:][-1:],
+)
+beside(
+    "misses_all_of_several",
+    "missed_grasp",
+    ("PickXtimes", "BinFill"),
+    MISS,
+    lambda _, picks: picks * (len(picks) >= 2),
+)
+beside(
+    "misses_the_first_of_two",
+    "missed_grasp",
+    (*UNMASK, "PickByCount"),
+    MISS,
+    lambda _, picks: picks[:1] * (len(picks) == 2),
+)
+beside(
+    "puts_one_beside",
+    "misplaced",
+    ("PickXtimes", "BinFill"),
+    0.075,
+    lambda _, picks: [picks[0] + 1] * (len(picks) >= 2),
+)
+beside(
+    "the_last_visit_passes_beside",
+    "misplaced",
+    ("SwingXtimes",),
+    0.05,
+    lambda hands, _: [len(hands.stages) - 3],
+)
+beside(
+    "presses_beside_the_button",
+    "missed_press",
+    ("ButtonUnmask", "ButtonUnmaskSwap"),
+    0.05,
+    lambda hands, _: [n for n, one in enumerate(hands.stages) if one.primitive.kind == "press"],
+)
 
 
 @cause("execution", "missed_grasp", "PickXtimes")
@@ -213,14 +269,6 @@ def the_first_slips_at_once(hands: Hands) -> None:
     hands.play(rest)
 
 
-@cause("execution", "misplaced", "PickXtimes", "BinFill")
-def puts_one_beside(hands: Hands) -> None:
-    need(len(hands.picks()) >= 2)
-    place = hands.picks()[0] + 1
-    for number, stage in enumerate(hands.stages):
-        hands.do(stage, beside=0.075 if number == place else 0.0)
-
-
 @cause("execution", "dropped", "PickXtimes", "VideoPlaceOrder", "SwingXtimes")
 def opens_half_way(hands: Hands) -> None:
     pick, place, *rest = hands.stages
@@ -230,26 +278,6 @@ def opens_half_way(hands: Hands) -> None:
     hands.go(((x + about.x) / 2, (y + about.y) / 2, 0.15))
     hands.grip(OPEN)
     hands.play([place, *rest])
-
-
-@cause("execution", "misplaced", "SwingXtimes")
-def the_last_visit_passes_beside(hands: Hands) -> None:
-    last = len(hands.stages) - 3
-    for number, stage in enumerate(hands.stages):
-        hands.do(stage, beside=0.05 if number == last else 0.0)
-
-
-@cause("execution", "missed_grasp", *UNMASK, "PickByCount")
-def misses_the_first_of_two(hands: Hands) -> None:
-    need(len(hands.picks()) == 2)
-    go_on_after_misses(hands, {hands.picks()[0]})
-
-
-@cause("execution", "missed_press", "ButtonUnmask", "ButtonUnmaskSwap")
-def presses_beside_the_button(hands: Hands) -> None:
-    for stage in hands.stages:
-        is_press = stage.primitive.kind == "press"
-        hands.do(stage, beside=0.05 if is_press else 0.0)
 
 
 @cause("execution", "missed_press", "StopCube")

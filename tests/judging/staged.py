@@ -6,10 +6,10 @@ more happens after its verdict.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from roboirg.core.conditions import Fact
-from roboirg.core.episode import Episode, Stage
+from roboirg.core.episode import Episode, Scene, Stage
 from roboirg.core.motions import Shuttle
 from roboirg.judging import (
     DeclaredIntent,
@@ -23,6 +23,14 @@ from roboirg.judging import (
 
 NEAR_SHARE = 0.07
 """Of a pass, before and after its middle, in which the shuttle is near its target."""
+
+
+def judged(stages: Sequence[Stage], scene: Scene | None, *steps: Iterable[Fact]) -> Judge:
+    """The judge after an evaluation of each set of facts, from step 0 on."""
+    judge = Judge(stages, scene)
+    for step, facts in enumerate(steps):
+        judge.update(step, frozenset(facts))
+    return judge
 
 
 class Staged:

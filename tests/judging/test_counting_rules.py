@@ -1,7 +1,8 @@
 """What BinFill, SwingXtimes and StopCube reward and punish, driven by synthetic facts."""
 
-import numpy as np
 import pytest
+from drawn_scenes import drawn_scenes
+from staged import judged
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Goal
@@ -12,18 +13,9 @@ from roboirg.tasks import bin_fill, stop_cube, swing_x_times
 PRESSED = Fact("pressed", "button")
 
 
-def played(stages, scene, steps):
-    """The judge after an evaluation for each set of facts, from step 0 on."""
-    judge = Judge(stages, scene)
-    for step, facts in enumerate(steps):
-        judge.update(step, frozenset(facts))
-    return judge
-
-
 def scene_of(task, suits):
     """The first scene of a hard episode for which a test holds."""
-    drawn = (task.sample(np.random.default_rng(seed), "hard")[0] for seed in range(200))
-    return next(scene for scene in drawn if suits(scene))
+    return next(scene for scene, _ in drawn_scenes(task.TASK.name, "hard") if suits(scene))
 
 
 # BinFill: two red cubes and a blue one; there are green ones, too.
@@ -54,7 +46,7 @@ def fill(*cubes):
 
 def filled(*cubes, then=()):
     inside = [Fact("binned", cube, "bin") for cube in cubes]
-    return played(FILL, FILL_SCENE, [*fill(*cubes), *([*inside, *facts] for facts in then)])
+    return judged(FILL, FILL_SCENE, *fill(*cubes), *([*inside, *facts] for facts in then))
 
 
 @pytest.mark.parametrize(
@@ -115,18 +107,18 @@ def test_bin_fill_punishes_one_cube_too_many_as_it_lands_but_not_its_picking(ext
 
 def test_bin_fill_does_not_punish_dropping_beside_and_picking_again():
     steps = [[picked("cube_green_0")], [], [picked("cube_red_0")], [], [picked("cube_red_0")], []]
-    assert played(FILL, FILL_SCENE, steps).status is Status.ONGOING
+    assert judged(FILL, FILL_SCENE, *steps).status is Status.ONGOING
     rest = fill("cube_red_0", "cube_red_1", "cube_blue_0")
     inside = [Fact("binned", c, "bin") for c in ("cube_red_0", "cube_red_1", "cube_blue_0")]
-    judge = played(FILL, FILL_SCENE, [*steps, *rest, inside, [*inside, PRESSED]])
+    judge = judged(FILL, FILL_SCENE, *steps, *rest, inside, [*inside, PRESSED])
     assert judge.status is Status.SUCCESS
 
 
 def test_bin_fill_needs_every_drop():
     cubes = ("cube_red_0", "cube_red_1", "cube_blue_0")
     *before, _last = fill(*cubes)
-    assert played(FILL, FILL_SCENE, before).index == 5
-    assert played(FILL, FILL_SCENE, [*before, *[before[-1]] * 5]).index == 5
+    assert judged(FILL, FILL_SCENE, *before).index == 5
+    assert judged(FILL, FILL_SCENE, *before, *[before[-1]] * 5).index == 5
     assert filled(*cubes).index == 6
 
 
@@ -141,7 +133,7 @@ SWUNG = [[HELD, RIGHT], [HELD, RIGHT], [HELD], [HELD, LEFT], [HELD]]
 
 
 def swung(*steps):
-    return played(SWING, SWING_SCENE, steps)
+    return judged(SWING, SWING_SCENE, *steps)
 
 
 def test_swing_is_done_after_the_swings_the_put_down_and_the_press():
@@ -193,10 +185,10 @@ def test_swing_does_not_punish_dropping_on_the_way_nor_picking_after_the_put_dow
 
 def test_swing_with_another_cube_of_the_scene_follows_that_cube():
     stages = swing_x_times.stages(SWING_SCENE, Goal.of(color="blue", repeats=1))
-    assert played(stages, SWING_SCENE, [[HELD]]).status is Status.FAILURE
+    assert judged(stages, SWING_SCENE, [HELD]).status is Status.FAILURE
     blue = [Fact("over", "cube_blue", f"target_{side}") for side in ("right", "left")]
     steps = [[picked("cube_blue")], blue[:1], blue[1:], [Fact("lying", "cube_blue")], [PRESSED]]
-    assert played(stages, SWING_SCENE, steps).status is Status.SUCCESS
+    assert judged(stages, SWING_SCENE, *steps).status is Status.SUCCESS
 
 
 # StopCube: 120 steps a pass, the third visit, whose middle is at step 300.
@@ -241,43 +233,34 @@ def stop(**how):
     return judge, None
 
 
+OFF, EARLY = (
+    "pressed the button while the cube was off the target",
+    "stopped the cube on an earlier",
+)
+PASSED, OVER = "let the cube's third visit pass", 3 * INTERVAL + 1
+
+
 @pytest.mark.parametrize("pressed_at", [292, 300, 308])
 def test_stop_cube_is_done_when_stopped_on_the_wanted_visit(pressed_at):
     judge, step = stop(pressed_at=pressed_at)
-    assert judge.status is Status.SUCCESS
-    assert step == pressed_at
+    assert (judge.status, step) == (Status.SUCCESS, pressed_at)
 
 
-@pytest.mark.parametrize("pressed_at", [0, 20, 120, 200, 280, 291, 309])
-def test_stop_cube_punishes_a_press_off_the_target_at_once(pressed_at):
-    judge, step = stop(pressed_at=pressed_at)
-    assert judge.status is Status.FAILURE
-    assert step == pressed_at
-    assert judge.cause.startswith("pressed the button while the cube was off the target")
-    assert judge.cause.endswith("; expected: wait") == (40 < pressed_at < 270)
-
-
-@pytest.mark.parametrize("pressed_at", [60, 180, 188])
-def test_stop_cube_punishes_an_earlier_visit_when_it_is_time_to_press(pressed_at):
-    judge, step = stop(pressed_at=pressed_at)
-    assert judge.status is Status.FAILURE
-    assert step == 270 + 1
-    assert judge.cause.startswith("stopped the cube on an earlier visit")
-
-
-def test_stop_cube_punishes_a_stop_without_hovering_when_the_visit_is_over():
-    judge, step = stop(pressed_at=180, hover_at=None)
-    assert judge.status is Status.FAILURE
-    assert step == 3 * INTERVAL + 1
-    assert judge.cause.startswith("let the cube's third visit pass")
-
-
-def test_stop_cube_punishes_waiting_too_long():
-    for how in ({}, {"pressed_at": 420}, {"hover_at": None}):
-        judge, step = stop(**how)
-        assert judge.status is Status.FAILURE
-        assert step == 3 * INTERVAL + 1
-        assert judge.cause.startswith("let the cube's third visit pass")
+@pytest.mark.parametrize(
+    ("how", "at", "cause"),
+    [
+        # Off the target at once, on an earlier visit when it is time to press.
+        *(({"pressed_at": step}, step, OFF) for step in (0, 20, 120, 200, 280, 291, 309)),
+        *(({"pressed_at": step}, 270 + 1, EARLY) for step in (60, 180, 188)),
+        ({"pressed_at": 180, "hover_at": None}, OVER, PASSED),
+        *((late, OVER, PASSED) for late in ({}, {"pressed_at": 420}, {"hover_at": None})),
+    ],
+)
+def test_stop_cube_punishes_other_moments(how, at, cause):
+    judge, step = stop(**how)
+    assert (judge.status, step) == (Status.FAILURE, at)
+    assert judge.cause.startswith(cause)
+    assert judge.cause.endswith("; expected: wait") == (at in (120, 200))
 
 
 def test_stop_cube_a_late_hover_catches_up():
@@ -288,7 +271,7 @@ def test_stop_cube_a_late_hover_catches_up():
 
 
 def test_stop_cube_waiting_stages_watch_the_time_only():
-    judge = played(STOP, STOP_SCENE, run(until=270))
+    judge = judged(STOP, STOP_SCENE, *run(until=270))
     assert judge.index == len(STOP) - 2
-    judge = played(STOP, STOP_SCENE, run(until=271))
+    judge = judged(STOP, STOP_SCENE, *run(until=271))
     assert judge.index == len(STOP) - 1

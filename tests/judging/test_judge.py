@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from staged import judged
 
 from roboirg.core.conditions import Fact, Rule, facts_of
 from roboirg.core.episode import Primitive, Stage
@@ -19,59 +20,52 @@ def stage(expects: Fact, *forbids: Fact, lasting: int = 0) -> Stage:
     return Stage(expects, forbids, primitive, "do {at} it", points_at="a", lasting=lasting)
 
 
-def judged(stages, *steps):
-    judge = Judge(stages)
-    for number, facts in enumerate(steps):
-        judge.update(number, frozenset(facts))
-    return judge
-
-
 def test_stages_complete_in_order():
-    judge = judged([stage(A, BAD), stage(B, BAD)], [], [A], [A], [B])
+    judge = judged([stage(A, BAD), stage(B, BAD)], None, [], [A], [A], [B])
     assert judge.status is Status.SUCCESS
     assert judge.cause is None
 
 
 def test_a_later_stage_does_not_complete_early():
-    assert judged([stage(A), stage(B)], [B]).index == 0
+    assert judged([stage(A), stage(B)], None, [B]).index == 0
 
 
 def test_one_stage_per_evaluation():
-    judge = judged([stage(A), stage(A)], [A])
+    judge = judged([stage(A), stage(A)], None, [A])
     assert (judge.index, judge.status) == (1, Status.ONGOING)
     judge.update(1, frozenset([A]))
     assert judge.status is Status.SUCCESS
 
 
 def test_what_is_forbidden_counts_before_what_is_expected():
-    judge = judged([stage(A, BAD)], [A, BAD])
+    judge = judged([stage(A, BAD)], None, [A, BAD])
     assert judge.status is Status.FAILURE
     assert judge.cause == "pressed button; expected: do it"
 
 
 def test_what_ends_a_stage_is_not_held_against_the_next_in_the_same_step():
     # The cube is picked, which the next stage forbids; it is gone by the next evaluation.
-    judge = judged([stage(A), stage(B, A)], [A], [B])
+    judge = judged([stage(A), stage(B, A)], None, [A], [B])
     assert judge.status is Status.SUCCESS
-    assert judged([stage(A), stage(B, A)], [A], [A]).status is Status.FAILURE
+    assert judged([stage(A), stage(B, A)], None, [A], [A]).status is Status.FAILURE
 
 
 def test_verdicts_are_final():
-    judge = judged([stage(A, BAD)], [BAD], [A])
+    judge = judged([stage(A, BAD)], None, [BAD], [A])
     judge.fail("too late")
     assert (judge.status, judge.cause) == (Status.FAILURE, "pressed button; expected: do it")
-    judge = judged([stage(A, BAD)], [A], [BAD])
+    judge = judged([stage(A, BAD)], None, [A], [BAD])
     assert judge.status is Status.SUCCESS
 
 
 def test_lasting_stages_count_from_the_first_evaluation_and_start_again():
     still = Fact("still", "robot")
     watch = [stage(still, lasting=3)]
-    assert judged(watch, *[[still]] * 3).status is Status.ONGOING
-    assert judged(watch, *[[still]] * 4).status is Status.SUCCESS
+    assert judged(watch, None, *[[still]] * 3).status is Status.ONGOING
+    assert judged(watch, None, *[[still]] * 4).status is Status.SUCCESS
     interrupted = [[still], [still], [], [still], [still]]
-    assert judged(watch, *interrupted).status is Status.ONGOING
-    assert judged(watch, *interrupted, [still]).status is Status.SUCCESS
+    assert judged(watch, None, *interrupted).status is Status.ONGOING
+    assert judged(watch, None, *interrupted, [still]).status is Status.SUCCESS
 
 
 facts = st.frozensets(st.sampled_from([A, B, BAD, Fact("still", "robot")]))

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from drawn_scenes import drawn_scenes
 
 from roboirg.core import object_sizes
 from roboirg.core.conditions import Elapsed, Fact
@@ -35,14 +36,7 @@ SWINGS = {"easy": {1, 2, 3}, "medium": {1, 2}, "hard": {3}}
 
 @functools.cache
 def scenes(task, difficulty):
-    """Scene and goal of every seed that is not rejected."""
-    found = []
-    for seed in range(SEEDS):
-        try:
-            found.append(TASKS[task].sample(np.random.default_rng(seed), difficulty))
-        except SceneRejectedError:
-            continue
-    return found
+    return list(drawn_scenes(task, difficulty, range(SEEDS)))
 
 
 def of_color(scene, color):

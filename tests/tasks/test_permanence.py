@@ -7,6 +7,7 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from drawn_scenes import drawn_episodes
 
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.errors import SceneRejectedError
@@ -15,7 +16,6 @@ from roboirg.core.motions import Away, Swap
 from roboirg.tasks import get_task
 from roboirg.tasks.shared import unmask, unmask_swap
 from roboirg.tasks.shared.layouts import FOUR, LINE, PATTERNS, TRIANGLE, layout_points
-from roboirg.tasks.splits.splits import make_episode
 
 SEEDS = range(150)
 SWAP_TASKS = ("VideoUnmaskSwap", "ButtonUnmaskSwap")
@@ -36,14 +36,7 @@ each_difficulty = pytest.mark.parametrize("difficulty", DIFFICULTIES)
 
 @functools.cache
 def episodes(task, difficulty):
-    """The episodes of all seeds that are not rejected."""
-    found = []
-    for seed in SEEDS:
-        try:
-            found.append(make_episode(task, seed, difficulty))
-        except SceneRejectedError:
-            continue
-    return found
+    return list(drawn_episodes(task, difficulty, SEEDS))
 
 
 def containers(episode):

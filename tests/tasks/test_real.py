@@ -5,12 +5,13 @@ from collections import Counter
 
 import numpy as np
 import pytest
+import staged
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import BENCHMARK_SUITES, DIFFICULTIES, SUITES, Goal
 from roboirg.core.errors import SceneRejectedError, UnknownNameError
 from roboirg.core.footprints import Rectangle, Region
-from roboirg.judging import Judge, Status
+from roboirg.judging import Status
 from roboirg.language import variants
 from roboirg.tasks import all_tasks, every_task, find_tasks, get_task, pick_by_count, put_in_box
 from roboirg.tasks.pick_by_count import WAIT_STEPS
@@ -91,12 +92,8 @@ def test_a_tape_without_a_place_rejects_the_seed():
 
 
 def judged(task, goal, *steps):
-    """The judge after one evaluation for each set of facts."""
     scene, _ = scenes(task)[0]
-    judge = Judge(get_task(task).stages(scene, goal), scene)
-    for number, facts in enumerate(steps):
-        judge.update(number, frozenset(facts))
-    return judge
+    return staged.judged(get_task(task).stages(scene, goal), scene, *steps)
 
 
 def test_the_tape_belongs_into_the_one_box():

@@ -17,12 +17,11 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from drawn_scenes import drawn_scenes
 from scipy.stats import chi2_contingency, ks_2samp
 
 from roboirg.core.episode import DIFFICULTIES, SPLITS, Goal
-from roboirg.core.errors import SceneRejectedError
 from roboirg.core.motions import Away, Shuttle, Swap
-from roboirg.tasks import get_task
 from roboirg.tasks.shared import fixtures
 from roboirg.tasks.shared.fixtures import cube_footprint
 from roboirg.tasks.splits.published_episodes import published_episode
@@ -63,13 +62,8 @@ def published(task, difficulty):
 @functools.cache
 def sampled(task, difficulty):
     """Scene and goal of the first seeds that give one."""
-    found, seeds = [], itertools.count(FIRST_SEED)
-    while len(found) < SAMPLED:
-        try:
-            found.append(get_task(task).sample(np.random.default_rng(next(seeds)), difficulty))
-        except SceneRejectedError:
-            continue
-    return found
+    seeds = itertools.count(FIRST_SEED)
+    return list(itertools.islice(drawn_scenes(task, difficulty, seeds), SAMPLED))
 
 
 def distances(first, second):
