@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import typer.main
 from made_records import make_record
 from page_text import store
 from plan_files import plan_file
@@ -158,13 +157,6 @@ def test_lost_videos_are_reported_once(
         "First error: OSError: disk full\n"
     )
     assert roboirg(*words).err == ""
-
-
-def test_a_second_run_in_the_folder_is_told_so(roboirg, tmp_path: Path) -> None:
-    with RecordStore(tmp_path):
-        said = roboirg(*RUN, "--out", tmp_path, "--workers", "0")
-    assert said.code == 2
-    assert "is being written by another run" in said.err
 
 
 @pytest.mark.usefixtures("canned")
@@ -454,31 +446,6 @@ def test_unfinished_videos_of_a_run_that_died_are_deleted(
     (videos / ".d.mp4.part").mkdir()  # not ours
     assert roboirg(*RUN, "--workers", "0", "--out", tmp_path).code == 0
     assert {one.name for one in videos.iterdir()} == {"b.mp4", ".c.mp4.part.keep", ".d.mp4.part"}
-
-
-def commands(command, words=()):
-    """Yield every command and group with its words."""
-    yield command, words
-    for word, inner in getattr(command, "commands", {}).items():
-        yield from commands(inner, (*words, word))
-
-
-@pytest.mark.slow
-def test_help_cuts_no_word_and_is_no_wider_than_the_terminal(
-    roboirg, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
-    for command, words in commands(typer.main.get_command(cli.app)):
-        said = roboirg(*words, "--help")
-        assert said.code == 0
-        assert max(map(len, said.out.splitlines())) <= 80
-        # Addresses are written scheme://….
-        assert not [word for word in said.out.split() if "…" in word and "://…" not in word], words
-        names = [
-            name for one in command.params for name in (*one.opts, *one.secondary_opts)
-            if name.startswith("-")
-        ]  # fmt: skip
-        assert set(names) <= set(said.out.split()), words
 
 
 def test_long_lists_of_options_have_panels(roboirg, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,9 +23,9 @@ from roboirg.main import app
 LINES, LINES_OF_RUN, COLUMNS = 45, 60, 100
 
 
-def help_of(name, monkeypatch, capsys):
-    monkeypatch.setenv("COLUMNS", str(COLUMNS))
-    monkeypatch.setenv("TERMINAL_WIDTH", str(COLUMNS))
+def help_of(name, columns, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", str(columns))
+    monkeypatch.setenv("TERMINAL_WIDTH", str(columns))
     with pytest.raises(SystemExit):
         typer.main.get_command(app).main([*name.split(), "--help"], "roboirg")
     return capsys.readouterr().out
@@ -40,13 +40,25 @@ def test_the_command_line_is_small():
 
 @pytest.mark.parametrize("name", sorted(all_commands()))
 def test_help_is_short_and_has_an_example(name, monkeypatch, capsys):
-    text = help_of(name, monkeypatch, capsys)
+    text = help_of(name, COLUMNS, monkeypatch, capsys)
     assert len(text.strip().splitlines()) <= (LINES_OF_RUN if name == "run" else LINES)
     (example,) = re.findall(r"Example: roboirg (.*)", text)
     words = shlex.split(example)
     assert words[: len(name.split())] == name.split()
     # Click refuses what the command does not take.
     all_commands()[name].make_context(name, words[len(name.split()) :])
+
+
+@pytest.mark.parametrize("name", sorted(all_commands()))
+def test_help_cuts_no_word_and_is_no_wider_than_the_terminal(name, monkeypatch, capsys):
+    text = help_of(name, 80, monkeypatch, capsys)
+    assert max(map(len, text.splitlines())) <= 80
+    # Addresses are written scheme://….
+    assert not [word for word in text.split() if "…" in word and "://…" not in word]
+    options = {
+        name for one in all_commands()[name].params for name in one.opts + one.secondary_opts
+    }
+    assert {one for one in options if one.startswith("-")} <= set(text.split())
 
 
 @pytest.mark.parametrize("episodes", ["3,0-2,7", "7,"])  # 7 alone would be the first seven

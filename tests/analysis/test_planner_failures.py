@@ -40,6 +40,7 @@ def test_the_act_that_ended_the_episode_names_the_failure(
     said = [SubgoalRecord(step=5, text="pick it up", verdict=one) for one in verdicts.split()]
     record = replace(failed, steps=9, subgoals=tuple(said), attribution=attribution)
     assert planner_failure(record) == named
+    assert planner_failure(replace(record, policy_metadata={}, subgoals=())) is None
 
 
 @pytest.mark.parametrize(

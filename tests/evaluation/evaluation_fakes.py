@@ -16,8 +16,19 @@ from made_records import make_record
 from roboirg.core.errors import RenderDeviceError
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.records.record import NON_DETERMINISTIC_FIELDS, EventRecord, Job, Record
+from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 from roboirg.evaluation.run.executor import LocalProcesses
 from roboirg.evaluation.run.runner import run_plan
+
+
+def all_comparable(folder: Path) -> list[dict[str, object]]:
+    records = sorted(read_records(folder), key=lambda record: record.slug)
+    return [comparable(record) for record in records]
+
+
+def line_count(folder: Path) -> int:
+    path = folder / RECORDS_FILE
+    return path.read_bytes().count(b"\n") if path.exists() else 0
 
 
 @dataclass(frozen=True)

@@ -81,20 +81,10 @@ def test_one_that_is_declared_runs_next_to_the_world() -> None:
     [
         ("planner:own_planners:Insider", "has attach()"),
         ("planner:own_planners:Nothing", "has no class 'Nothing'"),
+        ("planner:own_planners:NoPlanner", "class NoPlanner has no method plan()"),
+        ("planner:own_planners:Pointer?keep=2", "no option of planner:own_planners:Pointer"),
     ],
 )
 def test_wrong_ones_are_one_sentence(spec: str, words: str) -> None:
     with pytest.raises(InvalidValueError, match=re.escape(words)):
         open_policy(read_policy(spec))
-
-
-@pytest.mark.parametrize(
-    ("spec", "words"),
-    [
-        ("planner:own_planners:NoPlanner", "class NoPlanner has no method plan()"),
-        ("planner:own_planners:Pointer?keep=2", "no option of planner:own_planners:Pointer"),
-    ],
-)
-def test_wrong_specs_are_one_sentence(spec: str, words: str) -> None:
-    with pytest.raises(InvalidValueError, match=re.escape(words)):
-        make_policy(spec, 0)

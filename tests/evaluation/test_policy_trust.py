@@ -271,18 +271,6 @@ def test_a_success_with_a_cause_is_refused(tmp_path: Path) -> None:
         read_record(line, tmp_path, 1)
 
 
-@pytest.mark.parametrize("error", [GeneratorExit, SystemExit])
-def test_in_the_worlds_process_too_it_is_the_policy(error: type[BaseException]) -> None:
-    with pytest.raises(EpisodeError) as caught, attribute_errors("policy"):
-        raise error
-    assert caught.value.kind == "policy"
-
-
-def test_ctrl_c_is_the_users_where_it_can_be() -> None:
-    with pytest.raises(KeyboardInterrupt), attribute_errors("policy"):
-        raise KeyboardInterrupt
-
-
 def test_sigterm_is_the_users_where_ctrl_c_is_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
     """A shell without a terminal starts what is in the background so."""
     monkeypatch.setattr(signal, "getsignal", lambda _number: signal.SIG_IGN)

@@ -12,13 +12,21 @@ from typing import Any
 
 import hosting_fakes
 import pytest
-from evaluation_fakes import FakePlayer, changed, comparable, is_alive, small_plan, worker_pids
+from evaluation_fakes import (
+    FakePlayer,
+    all_comparable,
+    changed,
+    is_alive,
+    line_count,
+    small_plan,
+    worker_pids,
+)
 from hosting_fakes import PatientRunner, paper_plan, paper_runner
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.evaluation.hosting.host_pool import HostSettings
 from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
-from roboirg.evaluation.records.store import RECORDS_FILE, read_records
+from roboirg.evaluation.records.store import read_records
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses
 from roboirg.evaluation.run.ray_cluster import RayCluster
 from roboirg.evaluation.run.ray_machines import MachineAgent, MachineVersions
@@ -30,11 +38,6 @@ pytestmark = pytest.mark.slow
 ray = pytest.importorskip("ray")
 
 PLAN = small_plan(5).model_copy(update={"arms": ("told", "silent")})
-
-
-def all_comparable(folder: Path) -> list[dict[str, object]]:
-    records = sorted(read_records(folder), key=lambda record: record.slug)
-    return [comparable(record) for record in records]
 
 
 @pytest.fixture(scope="module")
@@ -54,11 +57,6 @@ def cluster() -> Iterator[Any]:
     nodes.shutdown()
 
 
-def lines(folder: Path) -> int:
-    path = folder / RECORDS_FILE
-    return path.read_bytes().count(b"\n") if path.exists() else 0
-
-
 def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
     cluster: Any, tmp_path: Path, here: list[dict[str, object]]
 ) -> None:
@@ -69,7 +67,7 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
 
     def kill() -> None:
         # Until each of the three machines has one of the endless episodes in hand.
-        while lines(tmp_path) < 8 or len(players := worker_pids(tmp_path, "waiting")) < 3:
+        while line_count(tmp_path) < 8 or len(players := worker_pids(tmp_path, "waiting")) < 3:
             time.sleep(0.05)
         cluster.remove_node(doomed, allow_graceful=False)
         while all(map(is_alive, players)):  # they outlive their node for a moment
@@ -89,7 +87,7 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
     assert killed.is_set()
     assert (summary.errors, summary.missing) == ((), 0)
     # The episode that it had in hand was tried again.
-    assert lines(tmp_path) > len(here)
+    assert line_count(tmp_path) > len(here)
     assert all_comparable(tmp_path) == here
     for record in read_records(tmp_path):
         assert (tmp_path / str(record.video)).read_text() == record.slug

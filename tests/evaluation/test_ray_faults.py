@@ -14,7 +14,7 @@ from unittest import mock
 
 import pytest
 import ray_fakes
-from evaluation_fakes import FakePlayer, changed, small_plan
+from evaluation_fakes import FakePlayer, changed, line_count, small_plan
 from ray_fakes import BAD_MACHINE, NotingPlace, WithoutModule, WithoutVulkan
 
 from roboirg.core.errors import InvalidValueError, RoboIRGError
@@ -43,11 +43,6 @@ def cluster(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     nodes.shutdown()
 
 
-def lines(folder: Path) -> int:
-    path = folder / RECORDS_FILE
-    return path.read_bytes().count(b"\n") if path.exists() else 0
-
-
 def actors(cluster: Any, name: str) -> list[int]:
     """Return the processes of this cluster's actors, as other tests may have clusters, too."""
     raylets = [node.all_processes["raylet"][0].process.pid for node in cluster.list_all_nodes()]
@@ -62,7 +57,7 @@ def after(
     """Act in a thread as soon as that many records are stored; never, if the run ends before."""
 
     def run() -> None:
-        while lines(folder) < count:
+        while line_count(folder) < count:
             if run_ended is not None and run_ended():
                 return
             time.sleep(0.05)
@@ -91,7 +86,7 @@ def test_a_bad_machine_is_left_out_and_named_once(cluster: Any, tmp_path: Path) 
         player = play(folder, gate=gate, closed=7)  # Ray may start the bad machine's worker late
         summary = run_plan(plan, folder, player, executor, reporter=warnings)
         assert (summary.errors, summary.missing) == ((), 0)
-        assert lines(folder) == len(plan.jobs())  # nothing that it played was stored
+        assert line_count(folder) == len(plan.jobs())  # nothing that it played was stored
         (named,) = [text for ((text,), _) in warnings.warn.call_args_list if "left out" in text]
         assert fault.rstrip(".") in named
 
@@ -153,7 +148,7 @@ def test_a_machine_that_joins_is_used_and_a_head_without_cpus_is_not(
         ray.shutdown()
         nodes.shutdown()
     assert "Waiting for a free CPU" in warnings.warn.call_args_list[0].args[0]
-    assert lines(tmp_path) == len(PLAN.jobs())
+    assert line_count(tmp_path) == len(PLAN.jobs())
 
 
 def test_a_worker_gets_what_the_plan_asks_for(
@@ -193,8 +188,8 @@ def test_the_loss_of_the_head_is_one_sentence(
         # A call under way for the machines would wait until Ray ends this process.
         monkeypatch.setattr(ray_pool, "LOOK_S", 3600.0)
         # The one that is under way has ended when two more episodes are stored.
-        deadline, known = time.monotonic() + 60, lines(tmp_path)
-        while lines(tmp_path) < known + 2 and time.monotonic() < deadline:
+        deadline, known = time.monotonic() + 60, line_count(tmp_path)
+        while line_count(tmp_path) < known + 2 and time.monotonic() < deadline:
             time.sleep(0.05)
         os.kill(gcs, signal.SIGKILL)
 
@@ -202,4 +197,4 @@ def test_the_loss_of_the_head_is_one_sentence(
     play = FakePlayer(tmp_path, 0.5, gate=tmp_path / "gate", closed=4)
     with pytest.raises(RoboIRGError, match=r"head of the Ray cluster .* same command again"):
         run_plan(PLAN, tmp_path, play, RayCluster(address=cluster.address))
-    assert 4 <= lines(tmp_path) == len(list(read_records(tmp_path)))
+    assert 4 <= line_count(tmp_path) == len(list(read_records(tmp_path)))

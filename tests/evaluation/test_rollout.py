@@ -9,7 +9,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
 from made_records import make_record
@@ -162,22 +161,13 @@ def test_a_record_holds_what_the_job_prescribes_instead_of_the_policy(
     )
 
 
-def test_an_insider_is_attached_before_reset(stage: Callable[..., Record]) -> None:
-    policy = PaperInsider()
-    stage(
-        PaperWorld(),
-        policy,
-        msgspec.structs.replace(JOB, policy="oracle", ref=read_policy("oracle")),
-    )
-    assert policy.heard == ["PaperWorld", instruct_job(JOB).text, 3]
-
-
-def test_a_policy_that_is_not_declared_privileged_is_never_attached(
-    stage: Callable[..., Record],
+@pytest.mark.parametrize(("spec", "attached"), [("oracle", ["PaperWorld"]), ("random", [])])
+def test_a_policy_that_is_declared_privileged_is_attached_before_reset(
+    stage: Callable[..., Record], spec: str, attached: list[str]
 ) -> None:
     policy = PaperInsider()
-    stage(PaperWorld(), policy, JOB)
-    assert policy.heard == [instruct_job(JOB).text, 3]
+    stage(PaperWorld(), policy, replace(JOB, policy=spec, ref=read_policy(spec)))
+    assert policy.heard == [*attached, instruct_job(JOB).text, 3]
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,10 @@ import evaluation_fakes
 import pytest
 from evaluation_fakes import (
     FakePlay,
+    all_comparable,
     changed,
-    comparable,
     is_alive,
+    line_count,
     small_plan,
     starts,
     worker_pids,
@@ -46,20 +47,11 @@ from roboirg.policies.by_name.finding import read_policy
 WAIT_S = 300.0
 
 
-def all_comparable(records: tuple[Record, ...]) -> list[dict[str, object]]:
-    return [comparable(record) for record in sorted(records, key=lambda record: record.slug)]
-
-
 def wait_until(condition: Callable[[], bool]) -> None:
     deadline = time.monotonic() + WAIT_S
     while not condition():
         assert time.monotonic() < deadline, "it takes too long"
         time.sleep(0.02)
-
-
-def line_count(folder: Path) -> int:
-    path = folder / RECORDS_FILE
-    return path.read_bytes().count(b"\n") if path.exists() else 0
 
 
 def begin(folder: Path, workers: int = 1) -> subprocess.Popen[bytes]:
@@ -80,7 +72,7 @@ def finish(folder: Path) -> RunSummary:
 def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, object]]:
     folder = tmp_path_factory.mktemp("uninterrupted")
     run_plan(small_plan(8), folder, FakePlay(), InProcess())
-    return all_comparable(read_records(folder))
+    return all_comparable(folder)
 
 
 def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(
@@ -100,7 +92,7 @@ def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(
 
     assert summary.played == 16 - stored
     assert len((tmp_path / TORN_FILE).read_bytes().rstrip()) == 22
-    assert all_comparable(read_records(tmp_path)) == uninterrupted
+    assert all_comparable(tmp_path) == uninterrupted
     assert line_count(tmp_path) == 16
 
 
@@ -114,7 +106,7 @@ def test_a_stopped_run_ends_its_workers_and_keeps_what_ended(
     assert not any(map(is_alive, worker_pids(tmp_path)))
     assert 3 <= len(read_records(tmp_path)) < 16
     finish(tmp_path)
-    assert all_comparable(read_records(tmp_path)) == uninterrupted
+    assert all_comparable(tmp_path) == uninterrupted
 
 
 def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path: Path) -> None:
@@ -215,15 +207,6 @@ def test_tasks_that_a_policy_was_not_trained_on_are_named_once(
     )
     run_plan(plan, tmp_path, FakePlay(), InProcess(), reporter=ears)
     assert [one.args[0] for one in ears.warn.call_args_list] == warned
-
-
-def test_lost_videos_are_counted(tmp_path: Path) -> None:
-    def play(job: Job) -> Record:
-        return replace(FakePlay()(job), video_error="OSError: disk full")
-
-    summary = run_plan(small_plan(1), tmp_path, play, InProcess())
-    assert len(summary.video_errors) == 2
-    assert not run_plan(small_plan(1), tmp_path, play, InProcess()).video_errors
 
 
 def test_workers_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:

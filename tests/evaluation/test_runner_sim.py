@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import Result
-from evaluation_fakes import comparable
+from evaluation_fakes import all_comparable
 from typer.testing import CliRunner
 
 from roboirg.evaluation.plan.stored_plans import read_plan
@@ -83,11 +83,6 @@ def test_missing_vulkan_loses_no_record_and_no_video(
     assert str(said.exception).startswith("The render device 'cuda:63'")
     assert read_records(tmp_path / "o") == (record,)
     assert read_plan(tmp_path / "o") is not None
-
-
-def all_comparable(folder: Path) -> list[dict[str, object]]:
-    records = sorted(read_records(folder), key=lambda record: record.slug)
-    return [comparable(record) for record in records]
 
 
 @pytest.mark.usefixtures("without_cache")

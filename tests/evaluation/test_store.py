@@ -197,12 +197,6 @@ def test_no_records_is_one_sentence(tmp_path: Path) -> None:
         read_records(tmp_path / "nowhere")
 
 
-def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path: Path) -> None:
-    (tmp_path / "file").touch()
-    with pytest.raises(StoreError, match="Cannot write to"):
-        RecordStore(tmp_path / "file")
-
-
 def test_atomic_writing_replaces_and_leaves_no_part(tmp_path: Path) -> None:
     for text in ("one", "two"):
         write_atomically(tmp_path / "x.txt", text)

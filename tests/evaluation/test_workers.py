@@ -174,10 +174,12 @@ def test_an_overdue_worker_is_killed() -> None:
         ("policy", ConnectionRefusedError("refused"), "connection"),
         ("policy", TimeoutError("slow"), "timeout"),
         ("policy", OSError("odd"), "policy"),
+        ("policy", GeneratorExit(), "policy"),
+        ("policy", SystemExit(), "policy"),
         ("environment", TimeoutError("slow"), "environment"),
     ],
 )
-def test_whose_fault_it_is(whom: str, error: Exception, kind: str) -> None:
+def test_whose_fault_it_is(whom: str, error: BaseException, kind: str) -> None:
     with pytest.raises(EpisodeError) as caught, attribute_errors(whom):  # type: ignore[arg-type]
         raise error
     assert caught.value.kind == kind

@@ -102,22 +102,3 @@ def test_every_forbidden_fact_of_every_stage_fails(task, index):
     assert tested > 0 or all(
         isinstance(one, Rule) for stage in episode.stages for one in stage.forbids
     )
-
-
-def test_causes_call_things_by_what_they_are():
-    episode = get_episode("VideoUnmask", "test", 3)
-    first, second = episode.goal.texts("colors")
-    covers = {str(cube.color): str(cube.inside) for cube in episode.scene.of_kind("hidden_cube")}
-    judge = Judge(episode.stages, episode.scene)
-    judge.update(0, frozenset([Fact("lifted", covers[second])]))
-    assert judge.cause == (
-        f"lifted the container over the {second} cube; expected: "
-        f"pick up the container that hides the {first} cube"
-    )
-    empty = next(
-        item.name
-        for item in episode.scene.of_kind("container")
-        if episode.scene.hidden_in(item.name) is None
-    )
-    assert describe_object(empty, episode.scene) == "an empty container"
-    assert describe_object("button", get_episode("PickXtimes", "test", 0).scene) == "the button"

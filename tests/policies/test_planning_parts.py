@@ -15,7 +15,7 @@ from roboirg.core.policy_needs import (
     merge_demonstration_frames,
     merge_observe_every,
 )
-from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS, split_point
+from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.policies.planners.model_planners import merge_keyframes
 from roboirg.policies.planners.observation_merging import (
     DemonstrationSubset,
@@ -64,13 +64,6 @@ def test_a_pixel_is_floored_and_stays_in_the_picture(value):
 def test_broken_subgoals_are_unparsable(text):
     with pytest.raises(UnparsableReplyError):
         parse_points(text)
-
-
-def test_places_are_left_out_to_compare():
-    assert split_point("press the button at <3, 200> to stop") == (
-        "press the button to stop",
-        (3, 200),
-    )
 
 
 @given(st.lists(st.integers(0, 200)), st.integers(0, 20))

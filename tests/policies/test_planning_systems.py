@@ -129,6 +129,20 @@ def test_what_a_policy_needs_is_known_from_its_name(spec):
         ),
         ("vlm-listener:openai?model=x&base_url=localhost:80", InvalidValueError, "http://"),
         ("sistem", UnknownNameError, "system:NAME"),
+        ("planner:stateless", InvalidValueError, "option model is missing"),
+        (
+            "planner:stateless?model=x&recent=3",
+            InvalidValueError,
+            "no option of the planner of system planner:stateless named 'recent'",
+        ),
+        ("planner:qwen?model=x&asked=often", InvalidValueError, r"each-chunk\|when-done\|every"),
+        (
+            "planner:qwen?model=x&asked=when-done&hands=mme-vla://localhost:1",
+            InvalidValueError,
+            "does not report",
+        ),
+        ("planner:orakel", InvalidValueError, "no planner 'orakel'"),
+        ("system:pi0.5?hands=scripted", InvalidValueError, "has no planner"),
     ],
 )
 def test_wrong_specs_are_explained(spec, error, words):

@@ -5,13 +5,12 @@ import re
 
 import planner_faults
 import pytest
-from made_records import make_record
 from planning_fakes import fake_vlm, words_of
 from selection import slow_but
 
 import roboirg
 from roboirg.core.actions import choice_action
-from roboirg.core.errors import InvalidActionError, InvalidValueError
+from roboirg.core.errors import InvalidActionError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.subgoal_words import read_subgoal
 from roboirg.evaluation.analysis.stats.planner_failures import planner_failure
@@ -219,15 +218,6 @@ def test_the_record_says_how_a_planner_failed(fault, named):
     assert planner_failure(next(filter(None, records))) == named
 
 
-def test_a_record_without_a_planner_has_no_planners_failure():
-    job = planner_faults.Job(
-        policy="random", task="PickXtimes", split="test", episode=0,
-        options=planner_faults.InstructionOptions("explicit"),
-    )  # fmt: skip
-    record = make_record(job, "failure", "no")
-    assert planner_failure(record) is None
-
-
 @pytest.mark.parametrize("model", ["", "&model=x"])
 def test_specs_name_planners_and_hands(model):
     with fake_vlm(["x"]) as server:
@@ -244,25 +234,6 @@ def test_specs_name_planners_and_hands(model):
             policy = make_policy(spec, 0)
             assert "scripted hands" in policy.version
             assert policy.metadata["policy"] == {"hands": "scripted"}
-
-
-@pytest.mark.parametrize(
-    ("spec", "words"),
-    [
-        ("planner:stateless", "option model is missing"),
-        (
-            "planner:stateless?model=x&recent=3",
-            "no option of the planner of system planner:stateless named 'recent'",
-        ),
-        ("planner:qwen?model=x&asked=often", "each-chunk|when-done|every"),
-        ("planner:qwen?model=x&asked=when-done&hands=mme-vla://localhost:1", "does not report"),
-        ("planner:orakel", "no planner 'orakel'"),
-        ("system:pi0.5?hands=scripted", "has no planner"),
-    ],
-)
-def test_wrong_specs_are_one_sentence(spec, words):
-    with pytest.raises(InvalidValueError, match=re.escape(words)):
-        make_policy(spec, 0)
 
 
 @pytest.mark.sim

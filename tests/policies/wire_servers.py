@@ -6,6 +6,7 @@ they compute in the event loop, so that nothing else is answered meanwhile.
 
 import asyncio
 import contextlib
+import functools
 import threading
 import time
 import traceback
@@ -18,22 +19,22 @@ from websockets.exceptions import ConnectionClosed
 CHUNK = 20
 
 
-def encode(value):
+def encode(value, spell=str.encode):
     if isinstance(value, np.ndarray):
-        return {
-            b"__ndarray__": True,
-            b"data": value.tobytes(),
-            b"dtype": value.dtype.str,
-            b"shape": value.shape,
-        }
+        kept = {"data": value.tobytes(), "dtype": value.dtype.str, "shape": value.shape}
+        return {spell(name): part for name, part in {"__ndarray__": True, **kept}.items()}
     raise TypeError(type(value))
 
 
-def decode(value):
-    if b"__ndarray__" in value:
-        flat = np.frombuffer(value[b"data"], np.dtype(value[b"dtype"]))
-        return flat.reshape(value[b"shape"])
+def decode(value, spell=str.encode):
+    if spell("__ndarray__") in value:
+        flat = np.frombuffer(value[spell("data")], np.dtype(value[spell("dtype")]))
+        return flat.reshape(value[spell("shape")])
     return value
+
+
+encode_texts, decode_texts = (functools.partial(one, spell=str) for one in (encode, decode))
+"""As vla-eval spells it."""
 
 
 def pack(message):
@@ -264,19 +265,3 @@ class VlaEvalServer(WireServer):
 def envelope(kind, payload, number):
     message = {"type": kind, "payload": payload, "seq": number, "timestamp": time.time()}
     return msgpack.packb(message, default=encode_texts)
-
-
-def encode_texts(value):
-    if not isinstance(value, np.ndarray):
-        raise TypeError(type(value))
-    return {
-        "__ndarray__": True, "data": value.tobytes(), "dtype": value.dtype.str,
-        "shape": list(value.shape),
-    }  # fmt: skip
-
-
-def decode_texts(value):
-    if "__ndarray__" in value:
-        flat = np.frombuffer(value["data"], np.dtype(value["dtype"]))
-        return flat.reshape(value["shape"])
-    return value

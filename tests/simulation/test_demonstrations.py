@@ -301,23 +301,6 @@ def test_a_frame_hook_sees_the_right_demonstration_once(cache):
     assert seen == list(range(1, 68))
 
 
-@pytest.mark.parametrize("kind", ["actions", "frames"])
-def test_a_damaged_entry_is_made_anew(cache, caplog, kind):
-    options = {"cameras": ("front",), "demonstration_frames": 11}
-    _, _, info = reset(**options)
-    before = info["demonstration"]["front_rgb"]
-    (entry,) = cache.glob(f"{kind}/*")
-    size = entry.stat().st_size
-    with entry.open("r+b") as file:
-        file.truncate(size // 2)
-    _, _, again = reset(**options)
-    assert np.array_equal(again["demonstration"]["front_rgb"], before)
-    assert [record.getMessage() for record in caplog.records] == [
-        f"The cache entry {entry} is damaged and will be rebuilt."
-    ]
-    assert entry.stat().st_size == size
-
-
 def test_keys_change_with_what_determines_a_demonstration(monkeypatch):
     episode = get_episode(SHORT, "test", 1)
     key = demonstration_cache.recording_key(episode)

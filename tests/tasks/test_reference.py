@@ -107,17 +107,6 @@ def test_repick_scenes(difficulty):
         assert scene.past == (Fact("picked", target), Fact("lying", target))
 
 
-def test_repick_draws_every_value():
-    allowed = {"easy": {1, 2}, "medium": {2, 3}, "hard": {0}}
-    for difficulty in DIFFICULTIES:
-        pairs = drawn(VIDEO_REPICK, difficulty)
-        assert {goal.number("repeats") for _, goal in pairs} == {1, 2, 3}
-        assert {len(scene.motions) for scene, _ in pairs} == allowed[difficulty]
-        places = {scene.of_kind("cube").index(scene[scene.past[0].subject]) for scene, _ in pairs}
-        assert places == set(range(15 if difficulty == "hard" else 3))
-        assert VIDEO_REPICK.goals(pairs[0][0]) == tuple(Goal.of(repeats=n) for n in (1, 2, 3))
-
-
 @pytest.mark.parametrize("difficulty", ["easy", "medium"])
 def test_repick_swaps_begin_with_the_shown_cube_and_go_to_the_nearest(difficulty):
     for scene in scenes(VIDEO_REPICK, difficulty):
@@ -212,12 +201,7 @@ def test_place_discs_and_site_keep_their_distances(task, difficulty):
 
 
 @every_place_task
-def test_place_draws_every_cube(task):
-    chosen = Counter(
-        scene.of_kind("cube").index(scene[f"cube_{goal.text('color')}"])
-        for scene, goal in drawn(task, "medium")
-    )
-    assert set(chosen) == {0, 1, 2}
+def test_place_shows_the_cube_of_the_goal(task):
     for scene, goal in drawn(task, "medium"):
         placed = [fact for fact in scene.past if fact.kind == "placed"]
         assert {fact.subject for fact in placed} == {f"cube_{goal.text('color')}"}
@@ -271,9 +255,6 @@ def test_place_button_goals():
         answer = {"before": "target_0", "after": "target_1"}[one.text("relation")]
         stages = VIDEO_PLACE_BUTTON.stages(scene, one)
         assert shown(stages) == [("pick_cube", cube), ("place_on", cube, answer)]
-    relations = Counter(goal.text("relation") for _, goal in drawn(VIDEO_PLACE_BUTTON, "hard"))
-    assert set(relations) == {"before", "after"}
-    assert min(relations.values()) > SEEDS / 4
 
 
 @every_difficulty
@@ -295,22 +276,6 @@ def test_place_order_video(difficulty):
         expected += [("pick_cube", cube), ("place_on", cube, "site")]
         expected += [("retreat", "robot"), ("hold", "robot"), ("go_home", "robot")]
         assert shown(stages) == expected
-
-
-@every_difficulty
-def test_place_order_draws_every_order(difficulty):
-    numbers, wanted, presses, discs = Counter(), Counter(), Counter(), Counter()
-    for scene, goal in drawn(VIDEO_PLACE_ORDER, difficulty):
-        visits = [fact for fact in scene.past if fact.kind == "placed"]
-        numbers[len(visits)] += 1
-        wanted[len(visits), goal.number("placement")] += 1
-        presses[len(visits), scene.past.index(Fact("pressed", "button"))] += 1
-        discs.update([visits[0].place])
-    assert set(numbers) == {2, 3, 4}
-    cases = {(number, one) for number in (2, 3, 4) for one in range(1, number + 1)}
-    assert set(wanted) == cases
-    assert set(presses) == cases
-    assert set(discs) == {f"target_{n}" for n in range(4)}
 
 
 @every_place_task
