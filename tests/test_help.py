@@ -25,7 +25,7 @@ LINES, LINES_OF_RUN, COLUMNS = 45, 60, 100
 
 def help_of(name, columns, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", str(columns))
-    monkeypatch.setenv("TERMINAL_WIDTH", str(columns))
+    monkeypatch.setattr("typer.rich_utils.MAX_WIDTH", columns)
     with pytest.raises(SystemExit):
         typer.main.get_command(app).main([*name.split(), "--help"], "roboirg")
     return capsys.readouterr().out
