@@ -64,7 +64,7 @@ def test_help_cuts_no_word_and_is_no_wider_than_the_terminal(name, monkeypatch, 
 @pytest.mark.parametrize("episodes", ["3,0-2,7", "7,"])  # 7 alone would be the first seven
 def test_a_plan_explains_all_of_its_fields_and_is_read_back(tmp_path, episodes):
     plan = make_plan(
-        ["oracle", "b=listener"], tasks="PickXtimes,VideoUnmask", settings="direct,contextual",
+        ["oracle", "bär=listener"], tasks="PickXtimes,VideoUnmask", settings="direct,contextual",
         forms="implicit,resolved", episodes=episodes, stages="1,5;1-5", distractors=3,
         delivery="turns", frame="camera", observe_every=4, demonstration_frames="none",
         video="failures", devices="0,1", retry_on="none", wordings="train",
@@ -73,6 +73,7 @@ def test_a_plan_explains_all_of_its_fields_and_is_read_back(tmp_path, episodes):
     for one in plan_options():
         assert one.help in " ".join(text.replace("\n# ", " ").split())
         assert f"\n{one.name}:" in text
+    assert "bär=listener" in text
     (tmp_path / "plan.yaml").write_text(text)
     fields = read_plan_file(str(tmp_path / "plan.yaml"))
     assert make_plan(fields.pop("policies"), **fields) == plan

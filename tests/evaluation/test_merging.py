@@ -45,8 +45,8 @@ def test_two_halves_make_the_whole(tmp_path: Path) -> None:
     assert plan.read_bytes() == (whole / PLAN_FILE).read_bytes()
 
 
-def test_a_verdict_beats_an_error_and_the_first_verdict_a_later_one(tmp_path: Path) -> None:
-    one, two, three, *_ = (replace(record, server_version="8") for record in some())
+def test_a_verdict_beats_an_error_and_the_first_of_two_alike_a_later_one(tmp_path: Path) -> None:
+    one, two, three, four, *_ = (replace(record, server_version="8") for record in some())
     two = replace(two, code="old")
     # Another policy has versions of its own, another split seeds of its own.
     elsewhere = {"arm": "silent", "code": "older", "split": "val", "episode": 0, "seed": 5}
@@ -55,14 +55,19 @@ def test_a_verdict_beats_an_error_and_the_first_verdict_a_later_one(tmp_path: Pa
     other = {"success": "failure", "failure": "success"}[two.outcome]
     cause = None if other == "success" else "it fell"
     disputed = replace(two, outcome=other, cause=cause)
-    sources = [(replace(one, **lost), two), (one, disputed, silent), (replace(two, **lost),)]
+    broken = replace(four, outcome="error", error="connection", cause="connection: refused")
+    sources = [
+        (replace(one, **lost), two, broken),
+        (one, disputed, silent, replace(broken, cause="connection: lost")),
+        (replace(two, **lost),),
+    ]
     folders = [fill(tmp_path / str(number), *run) for number, run in enumerate(sources)]
     merged = merge_runs(folders, tmp_path / "out")
-    assert read_records(tmp_path / "out") == (one, two, silent)
+    assert read_records(tmp_path / "out") == (one, two, broken, silent)
     assert [(identity_key(conflict), conflict.outcome) for conflict in merged.conflicts] == [
         (identity_key(two), other)
     ]
-    assert (merged.added, merged.duplicates) == (3, 3)
+    assert (merged.added, merged.duplicates) == (4, 4)
     assert [warning.partition(".")[0] for warning in merged.warnings] == [
         f"Mixed states of the package's code: {one.code}, old"  # of the told ones
     ]

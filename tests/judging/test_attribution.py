@@ -134,6 +134,13 @@ def test_attempts_at_a_wrong_thing_are_the_wrong_thing() -> None:
         says(end(play.miss(other(play)).miss(other(play))), "wrong_object", other(play))
 
 
+def test_a_wrong_container_put_back_before_the_press_is_no_wrong_one() -> None:
+    play = staged("ButtonUnmask")
+    meant = play.episode.stages[1].primitive.subject
+    wrong = next(c.name for c in play.episode.scene.of_kind("container") if c.name != meant)
+    says(play.lift(wrong).put(wrong).rest(), "stopped")
+
+
 def test_fingers_that_close_between_two_things_decide_nothing() -> None:
     play = staged("PickXtimes")
     both = (Fact("clutched", first(play)), Fact("clutched", other(play)))

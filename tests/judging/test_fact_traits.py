@@ -116,6 +116,8 @@ def test_a_kind_from_outside_is_judged_and_described(toppled: FactTraits) -> Non
     picked = Fact("picked", "cube")
     plan = [stage(picked), stage(TOPPLED)]
     assert classify_grounding_error(TOPPLED, plan, 0) == "wrong_count"
+    carried = Fact("over", "cube", "target_left")  # ends no task, as a press does
+    assert classify_grounding_error(carried, [*plan, stage(carried)], 0) == "wrong_order"
     register_fact_kind("toppled", toppled)
     with pytest.raises(InvalidValueError, match="already a kind of fact 'picked'"):
         register_fact_kind("picked", toppled)
