@@ -17,6 +17,7 @@ from roboirg.evaluation.analysis.results.frame import Frame, make_frame
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
 from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.diagnostic_tables import make_failure_table
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.plan.plan_file import read_plan_file
@@ -92,11 +93,10 @@ def tables_page() -> str:
     page = TABLES.read_text(encoding="utf-8")
     answers = answers_text({part: results(pack) for part, pack in PACKS.items()})
     page = with_part(page, "paper answers", answers)
-    tables = (
-        markdown(make_table(part, RunData(frame), published=True)).rstrip()
-        for part, frame in played().items()
-    )
-    return with_part(page, "paper tables", "\n\n".join(tables))
+    tables = [make_table(part, RunData(frame), published=True) for part, frame in played().items()]
+    tables.append(make_failure_table(RunData(played()[MAIN]), means=True))
+    texts = (markdown(table).rstrip() for table in tables)
+    return with_part(page, "paper tables", "\n\n".join(texts))
 
 
 if __name__ == "__main__":
