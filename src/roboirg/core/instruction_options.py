@@ -14,6 +14,7 @@ DEFAULT_DISTRACTOR = "neutral"
 DEFAULT_DISTRACTORS = 1
 DEFAULT_FRAME = "robot"
 DEFAULT_DELIVERY = "prompt"
+DEFAULT_LANGUAGE = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +72,12 @@ class InstructionOptions:
             "prompt: the whole instruction at once; turns: one utterance after another."
         ),
     )
+    language: Whole = field(
+        default=DEFAULT_LANGUAGE,
+        metadata=described(
+            "Version of our words: 3; or 4, whole scenarios, for tasks that have them."
+        ),
+    )
 
 
 class WordKeywords(TypedDict, total=False):
@@ -82,6 +89,7 @@ class WordKeywords(TypedDict, total=False):
     frame: str
     wordings: str | Path | None
     delivery: str
+    language: int
 
 
 class InstructionKeywords(WordKeywords, total=False):

@@ -12,6 +12,7 @@ from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.instruction_options import (
     DEFAULT_FRAME,
+    DEFAULT_LANGUAGE,
     InstructionOptions,
     WordKeywords,
     as_fields,
@@ -28,10 +29,11 @@ from roboirg.language.request import (
     InstructionSpec,
     NoCommandError,
 )
+from roboirg.language.scenarios import in_language_4
 from roboirg.language.settings import all_settings, get_setting, settings_of
 from roboirg.language.settings.setting import Setting
 from roboirg.language.template_sampler import TemplateSampler, sampler_of
-from roboirg.language.templates import LANGUAGE_VERSION
+from roboirg.language.templates import DRAWS, LANGUAGE_VERSIONS
 from roboirg.language.worded_command import TaskWordings, describe_goal
 from roboirg.language.wordings.wording_store import find_wordings
 from roboirg.tasks import get_task
@@ -92,8 +94,8 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
 
     Each `variant` draws its words anew; 0 is the usual one.
     """
-    setting = get_setting(options.setting, get_task(episode.task))
-    request = _request(episode, options, variant)
+    setting = _setting_of(episode, options)
+    request = request_of(episode, options, variant)
     missing = _missing(request)
     if missing is not None:
         raise InvalidValueError(f"The {missing}.")
@@ -107,9 +109,9 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
         with contextlib.suppress(NoCommandError):
             # Both forms have a command from outside, or none of them.
             forms = {str(form): _say_outside(request, setting, form) for form in FORMS}
-            return _instruction(*forms[options.form])
-    own = replace(request, wordings=None, sampler=sampler_of(episode, variant))
-    return _instruction(own, setting.say(own))
+            return spoken_instruction(*forms[options.form])
+    own = replace(request, wordings=None, sampler=_sampler(episode, options, variant))
+    return spoken_instruction(own, setting.say(own))
 
 
 def _say_outside(
@@ -130,8 +132,8 @@ def _say_outside(
 
 def find_refusal(episode: Episode, options: InstructionOptions) -> str | None:
     """Return why a setting of the task cannot express an episode; None if it can."""
-    setting = get_setting(options.setting, get_task(episode.task))
-    request = _request(episode, options)
+    setting = _setting_of(episode, options)
+    request = request_of(episode, options)
     return _missing(request) or setting.refusal(request)
 
 
@@ -154,7 +156,10 @@ def expressible(
     return tuple(name for name in settings_of(get_task(episode.task)) if name not in refused)
 
 
-def _request(episode: Episode, options: InstructionOptions, variant: int = 0) -> InstructionRequest:
+def request_of(
+    episode: Episode, options: InstructionOptions, variant: int = 0
+) -> InstructionRequest:
+    """Return the request to put an episode into words."""
     check_options(options)
     task = get_task(episode.task)
     wordings = None
@@ -162,7 +167,19 @@ def _request(episode: Episode, options: InstructionOptions, variant: int = 0) ->
         wordings = find_wordings(options.wordings).tasks.get(task.name, TaskWordings(()))
         if wordings.own & {options.setting, all_settings()[options.setting].plain}:
             wordings = None
-    return InstructionRequest(episode, task, options, sampler_of(episode, variant), wordings)
+    sampler = _sampler(episode, options, variant)
+    return InstructionRequest(episode, task, options, sampler, wordings)
+
+
+def _sampler(episode: Episode, options: InstructionOptions, variant: int) -> TemplateSampler:
+    draws = DRAWS if options.language == DEFAULT_LANGUAGE else LANGUAGE_VERSIONS[options.language]
+    return sampler_of(episode, variant, draws)
+
+
+def _setting_of(episode: Episode, options: InstructionOptions) -> Setting:
+    """Return the setting that speaks the language that is asked for."""
+    setting = get_setting(options.setting, get_task(episode.task))
+    return setting if options.language == DEFAULT_LANGUAGE else in_language_4(setting)
 
 
 def _missing(request: InstructionRequest) -> str | None:
@@ -188,6 +205,9 @@ def check_options(options: InstructionOptions) -> None:
         raise InvalidValueError(
             f"distractors is {count!r}; it must be a whole number from 1 to {MOST_DISTRACTORS}."
         )
+    if options.language not in LANGUAGE_VERSIONS:
+        known_ones = " or ".join(map(str, LANGUAGE_VERSIONS))
+        raise InvalidValueError(f"language is {options.language!r}; it must be {known_ones}.")
     for kind, name, known in (
         ("form", options.form, FORMS),
         ("distractor", options.distractor, DISTRACTORS),
@@ -197,7 +217,8 @@ def check_options(options: InstructionOptions) -> None:
         check_names(kind, [name], known)
 
 
-def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruction:
+def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruction:
+    """Return the instruction that has the words of a request."""
     utterances, mentions = _spoken(spec, as_written=bool(request.filled))
     notes: dict[str, object] = {"wordings": request.options.wordings, "pool": request.pool}
     if request.filled:
@@ -215,7 +236,7 @@ def _instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruct
             **_DEFAULT_METADATA,
             **spec.notes,
             **notes,
-            "language_version": LANGUAGE_VERSION,
+            "language_version": LANGUAGE_VERSIONS[request.options.language],
             "templates": list(request.sampler.log),
         },
     )

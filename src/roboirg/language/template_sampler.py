@@ -47,9 +47,9 @@ class TemplateSampler:
         return options[index]
 
 
-def sampler_of(episode: Episode, variant: int = 0) -> TemplateSampler:
+def sampler_of(episode: Episode, variant: int = 0, draws: str = DRAWS) -> TemplateSampler:
     """Return the sampler of an episode; each variant draws its words anew, 0 is the usual one."""
-    key = f"{DRAWS}|{episode.task}|{episode.seed}"
+    key = f"{draws}|{episode.task}|{episode.seed}"
     return TemplateSampler(f"{key}|{variant}" if variant else key)
 
 

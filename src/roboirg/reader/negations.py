@@ -76,7 +76,7 @@ _READ_ELSEWHERE = Phrases({
     "Take the cube that is neither red nor blue.": rf"{_OF_COLORS} {COLOR} n?or {COLOR}\b",
     "Take the cube that is neither of those.": rf"{_OF_COLORS} of (?:those|these|them|the two)\b",
     "Stop the cube on the visit whose number is that minus 4.":
-        rf"\b(?:that|it|this|{NUMBER}) minus\b",
+        rf"\b(?:that|it|this|once|twice|thrice|{NUMBER})(?: many)?(?: times)? minus\b",
 })  # fmt: skip
 """Ways that other modules read; they may overlap."""
 

@@ -60,7 +60,8 @@ _STEP = Phrases({
 })  # fmt: skip
 _PLUS = Phrases({
     "that minus 4":
-        rf"\b(?P<quantity>that|it|this|{NUMBER}) (?P<way>plus|minus) (?P<step>{NUMBER})",
+        rf"\b(?P<quantity>that|it|this|once|twice|thrice|{NUMBER})(?: many)?(?: times)? "
+        rf"(?P<way>plus|minus) (?P<step>{NUMBER})",
 })  # fmt: skip
 _SCALED = Phrases({
     "half as many green cubes as 8":
@@ -121,7 +122,8 @@ def _scaled(found: re.Match[str]) -> CountExpression:
 
 def _expression(found: re.Match[str], *, factor: float = 1.0, offset: int = 0) -> CountExpression:
     """Return the expression for a quantity that a text names or points at."""
-    return CountExpression(factor, offset, number_of(found["quantity"]))
+    quantity = found["quantity"]
+    return CountExpression(factor, offset, ADVERBS.get(quantity) or number_of(quantity))
 
 
 _DERIVED: tuple[Reading, ...] = ((_STEP, _stepped, False), (_PLUS, _stepped, False),

@@ -192,6 +192,30 @@ def score_shortcuts(
     _print(shortcut_table(rows, title, grouping))
 
 
+@language_app.command("check-scenarios")
+def check_scenario_file(
+    path: Annotated[Path, typer.Argument(help="File of scenarios, TOML.")],
+    scenario: Annotated[str | None, typer.Option(help="Check this one only, by its frame.")] = None,
+    seeds: Annotated[
+        int, typer.Option(help="Random scenes for each scenario, beyond the splits.")
+    ] = 200,
+) -> None:
+    """Check scenarios of language 4, and print three texts of each; exit code 2 if a rule breaks.
+
+    Example: roboirg language check-scenarios mine.toml --scenario "school trip"
+    """
+    from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios
+    from roboirg.apps.language_lab.scenarios.scenario_report import report_lines
+    from roboirg.language.scenarios.scenario_file import read_scenario_file
+
+    broken = 0
+    for report in check_scenarios(read_scenario_file(path), scenario, seeds):
+        broken += len(report.broken)
+        typer.echo("\n".join(report_lines(report)))
+    if broken:
+        raise RoboIRGError(f"Found {counted(broken, 'broken rule')} in {path.name}.")
+
+
 def _print(*parts: RenderableType) -> None:
     """Print tables, which are neither cut nor folded in a file."""
     from rich.console import Console

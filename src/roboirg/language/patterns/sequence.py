@@ -25,12 +25,13 @@ def steps(position: int, length: int, choices: Sequence[int]) -> list[derivation
     if length == 2:  # noqa: PLR2004
         # Of two, the one right after the other is always the last: name both directions.
         return [derivations.NEIGHBORS[position]]
-    return _open_steps(derivations.STEPS, position, length, choices)
+    return open_steps(derivations.STEPS, position, length, choices)
 
 
-def _open_steps(
+def open_steps(
     known: Sequence[derivations.Step], position: int, length: int, choices: Sequence[int]
 ) -> list[derivations.Step]:
+    """Return those of the known steps that lead to a position and do not give it away."""
     return [
         step
         for step in known
@@ -58,7 +59,7 @@ def _counted_steps(request: InstructionRequest) -> list[derivations.Step]:
     return [
         step
         for goal_value in _goal_values(request)
-        for step in _open_steps(
+        for step in open_steps(
             derivations.COUNTED_STEPS,
             goal_value.number,
             ordinal.series_length(request, goal_value),

@@ -61,7 +61,7 @@ def draw_pair(request: InstructionRequest) -> PairDraw:
     pairs = rival_pairs(request)
     slot = pairs[0].slot
     pair = balanced_rival(request, pairs)
-    order = _draw_order(request)
+    order = draw_order(request)
     kind, text, fill = _remark(request, points_at_meant=order.points_at_meant)
     if slot not in COLOR_SLOTS:
         fill = "both"  # "The former, not the other number" is hard to hear
@@ -81,7 +81,7 @@ def draw_pair(request: InstructionRequest) -> PairDraw:
     )
 
 
-def _draw_order(request: InstructionRequest) -> PairOrder:
+def draw_order(request: InstructionRequest) -> PairOrder:
     """Draw the order for an episode; each block of four episodes has every one once.
 
     With independent draws a split of fifty could favor the value named first by chance.

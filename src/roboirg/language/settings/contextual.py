@@ -105,7 +105,7 @@ SETTING = Setting(
     summary="direct, with reinforcement, a distractor and a cue before the command",
     color="#009E73",
     say=say,
-    reads=frozenset({"stages", "distractor", "distractors", "delivery"}),
+    reads=frozenset({"stages", "distractor", "distractors", "delivery", "language"}),
     variants=tuple(
         {"stages": stages, "distractor": distractor}
         for stages, distractor in itertools.product(STAGE_SETS, DISTRACTORS)

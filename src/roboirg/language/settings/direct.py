@@ -52,7 +52,7 @@ SETTING = Setting(
     summary="an introduction names every value; the command points back at it",
     color="#0072B2",
     say=say,
-    reads=frozenset({"delivery"}),
+    reads=frozenset({"delivery", "language"}),
     pairing_rules=_pairing_rules,
     example=2,
 )

@@ -19,4 +19,5 @@ SETTING = Setting(
     color="#000000",
     say=say,
     implicit=False,
+    reads=frozenset({"language"}),
 )

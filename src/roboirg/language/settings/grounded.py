@@ -46,12 +46,12 @@ def refusal(request: InstructionRequest) -> str | None:
     """Return why nothing in an episode can be described by what is seen; None if something can."""
     if request.wordings is not None:
         return "it has no words for commands from outside"
-    return None if _clues(request) else "nothing to see in this scene singles out a slot's value"
+    return None if clues_of(request) else "nothing to see in this scene singles out a slot's value"
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return an introduction that describes what is seen, and a command that points back at it."""
-    clues = _clues(request)
+    clues = clues_of(request)
     remarks: list[Phrase] = []
     fields = stated(request)
     for value, clue in clues.items():
@@ -76,7 +76,7 @@ def say(request: InstructionRequest) -> InstructionSpec:
     return InstructionSpec(utterances, notes)
 
 
-def _clues(request: InstructionRequest) -> Clues:
+def clues_of(request: InstructionRequest) -> Clues:
     """Return a clue for each value that the words leave to what is seen, in order of speaking."""
     found: dict[GoalValue, Clue] = {}
     for value in request.goal_values:
@@ -197,7 +197,7 @@ SETTING = Setting(
     say=say,
     applies_to=_applies_to,
     refusal=refusal,
-    reads=frozenset({"delivery"}),
+    reads=frozenset({"delivery", "language"}),
     example=2,
     plain="direct",
 )

@@ -59,6 +59,6 @@ SETTING = Setting(
     summary="the context gives an intermediate reference, from which the goal is derived",
     color="#D55E00",
     say=say,
-    reads=frozenset({"delivery"}),
+    reads=frozenset({"delivery", "language"}),
     example=3,
 )

@@ -72,8 +72,7 @@ def refusal(request: InstructionRequest) -> str | None:
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return an introduction with a landmark for each color, and a command that points there."""
-    colors = request.color_values
-    marks = [_draw_landmark(request, one, _usable(request, one, len(colors))) for one in colors]
+    colors, marks = request.color_values, draw_landmarks(request)
     things = [
         _pointed(request, color, landmark, pointer)
         for color, landmark, pointer in zip(colors, marks, POINTING[len(colors)], strict=True)
@@ -91,12 +90,14 @@ def say(request: InstructionRequest) -> InstructionSpec:
     return InstructionSpec(utterances, notes)
 
 
-def _draw_landmark(
-    request: InstructionRequest, color: GoalValue, classes: Mapping[int, list[Landmark]]
-) -> Landmark:
-    """Draw the class first, or most landmarks would be extremes."""
-    level = request.sampler.pick(f"landmark class-{color.field}", list(classes))
-    return request.sampler.pick(f"landmark-{color.field}", classes[level])
+def draw_landmarks(request: InstructionRequest) -> list[Landmark]:
+    """Draw a landmark for each color, its class first, or most landmarks would be extremes."""
+    found: list[Landmark] = []
+    for color in request.color_values:
+        classes = _usable(request, color, len(request.color_values))
+        level = request.sampler.pick(f"landmark class-{color.field}", list(classes))
+        found.append(request.sampler.pick(f"landmark-{color.field}", classes[level]))
+    return found
 
 
 def _pointed(
@@ -168,7 +169,7 @@ SETTING = Setting(
     say=say,
     applies_to=lambda task: task.spatial,
     refusal=refusal,
-    reads=frozenset({"frame", "delivery"}),
+    reads=frozenset({"frame", "delivery", "language"}),
     variants=tuple({"frame": frame} for frame in FRAMES),
     example=6,
 )

@@ -1,0 +1,1 @@
+"""For authors of language 4: check scenarios, and have texts rated."""

@@ -1,0 +1,28 @@
+"""Language 4: whole utterances that people say, from data files.
+
+A scenario is one utterance with slots: a reason for the act, more of that reason, a remark that
+wanders off from there, a cue that returns, and words that lead to the command. Its sentences belong
+together and are never exchanged with those of another one. `docs/add-scenario.md` is for authors.
+
+The words of an episode are its context, a lead, and the task's command, in which words that point
+back take the place of values. The command is drawn for the episode, so it is the same in all
+settings; explicit is the command alone; the resolved form has the values in the command.
+
+===============  =================================================================================
+``TASK.toml``    commands and scenarios of a task
+``pointers``     the closed table of all expressions that point back
+``general``      people, and remarks about anything
+``markup``       the marks in a sentence
+``scenario``     the fields of the files; ``scenario_file`` reads and checks them
+``derived``      how the goal of an episode can follow from something else
+``choice``       what is said: derivation, then class of expression, then scenario
+``introduced``   the values that the words name
+``spoken``       the words
+===============  =================================================================================
+"""
+
+from __future__ import annotations
+
+from roboirg.language.scenarios.spoken import in_language_4
+
+__all__ = ["in_language_4"]

@@ -1,0 +1,288 @@
+"""Choose what is said of an episode: how the goal follows, the class of expression, the scenario.
+
+In this order, and all equally likely, so that neither class nor frame goes with a value.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from roboirg.language.grounded import Clue
+from roboirg.language.instruction import REFERENCE
+from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.rivals.balanced_rivals import balanced_rival
+from roboirg.language.rivals.pair_draw import draw_order
+from roboirg.language.rivals.value_pair import rival_pairs
+from roboirg.language.scenarios.derived import Derivation, derivations_of
+from roboirg.language.scenarios.introduced import (
+    Introduced,
+    IntroducedValue,
+    as_reference,
+    goal_introduced,
+    listed,
+    named,
+)
+from roboirg.language.scenarios.markup import Text, pointers_in
+from roboirg.language.scenarios.scenario import Scenario
+from roboirg.language.settings.grounded import clues_of
+from roboirg.language.settings.reasoning import BLOCK
+from roboirg.language.settings.spatial import draw_landmarks
+from roboirg.language.template_sampler import sampler_of
+
+LENGTHS = (2, 3)
+"""Of a list that the words introduce."""
+
+
+class Chosen(NamedTuple):
+    """What is said.
+
+    Attributes:
+        scenario: the scenario.
+        introduced: the values that its words name.
+        first: the words for the first of its fields.
+        remark: the name of the remark that chooses; empty if none does.
+    """
+
+    scenario: Scenario
+    introduced: Introduced
+    first: Text
+    remark: str = ""
+
+
+def choose(
+    request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
+) -> Chosen | None:
+    """Return what is said in a setting; None if no scenario fits the episode."""
+    known = [one for one in scenarios if _fits(one, request)]
+    return _CHOICES[setting](request, known) if known else None
+
+
+def _fits(scenario: Scenario, request: InstructionRequest) -> bool:
+    needs = scenario.fields.needs
+    colors, shown = len(request.color_values), len(request.scene_colors)
+    return (not needs.colors or colors in needs.colors) and (
+        not needs.shown or shown in needs.shown
+    )
+
+
+def _drawn(
+    request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
+) -> tuple[Scenario, Text] | None:
+    """Draw the class of the expression in the first field, and then a scenario that has it."""
+    classes: dict[str, list[tuple[Scenario, Text]]] = {}
+    for scenario in scenarios:
+        for text in scenario.of_kind(f"say.{scenario.said[0]}"):
+            kind = next((one.expression for one in pointers_in(text)), "")
+            classes.setdefault(kind, []).append((scenario, text))
+    if not classes:
+        return None
+    kind = request.sampler.pick(f"{setting} class", sorted(classes))
+    found = list({one.name: one for one, _ in classes[kind]}.values())
+    scenario = request.sampler.pick(f"{setting} scenario", found)
+    request.sampler.log.append(f"frame/{scenario.fields.frame}")
+    texts = [text for one, text in classes[kind] if one is scenario]
+    return scenario, request.sampler.pick(f"{setting} words", texts)
+
+
+def _says(scenarios: Sequence[Scenario], fields: Sequence[str], slot: str = "") -> list[Scenario]:
+    """Return the scenarios that point back in exactly these fields, with a list of a slot."""
+    return [
+        one for one in scenarios if set(one.said) == set(fields) and one.fields.list == slot
+    ]  # fmt: skip
+
+
+def _direct(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen | None:
+    base = goal_introduced(request)
+    fields = {one.field for one in request.goal_values}
+    possible = [
+        one
+        for one in scenarios
+        if set(one.said) == fields and (not one.fields.list or _lengths(request, one))
+    ]
+    found = _drawn(request, "direct", possible)
+    if found is None:
+        return None
+    scenario, words = found
+    if scenario.fields.list:
+        base = _with_list(request, base, scenario)
+    return Chosen(scenario, base, words)
+
+
+def _of_slot(request: InstructionRequest, slot: str) -> list[GoalValue]:
+    return [one for one in request.goal_values if one.slot == slot]
+
+
+def _others(request: InstructionRequest, slot: str) -> list[str | int]:
+    """Return the values that a slot could have in the scene, without those that it has."""
+    values = {one.value for one in _of_slot(request, slot)}
+    possible = dict.fromkeys(value for one in request.alternatives(slot) for value in one)
+    return [value for value in possible if value not in values]
+
+
+def _lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
+    """Return the lengths that the list of a scenario can have in an episode."""
+    slot, wanted = scenario.fields.list, scenario.fields.needs.list or LENGTHS
+    meant = len(_of_slot(request, slot))
+    return [one for one in wanted if meant <= one <= meant + len(_others(request, slot))]
+
+
+def _with_list(request: InstructionRequest, base: Introduced, scenario: Scenario) -> Introduced:
+    """Add the goal's values among others, in any order."""
+    slot = scenario.fields.list
+    own = _of_slot(request, slot)
+    size = request.sampler.pick("list length", _lengths(request, scenario))
+    others = request.sampler.pick(
+        "listed others", list(itertools.permutations(_others(request, slot), size - len(own)))
+    )
+    values = [named(one) for one in own] + [as_reference(own[0], one) for one in others]
+    order = request.sampler.pick("list order", list(itertools.permutations(range(size))))
+    return listed(base, [values[at] for at in order], own[0].value)
+
+
+def _reasoning(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen | None:
+    """Choose a derivation by the turn of its pattern, and then what says it."""
+    offered = [
+        (derivation, saying)
+        for derivation in derivations_of(request)
+        if (saying := [one for one in scenarios if _offers(one, derivation)])
+    ]
+    patterns = list(dict.fromkeys(one.pattern for one, _ in offered))
+    if not patterns:
+        return None
+    index = request.episode.index
+    pattern = patterns[(index + index // BLOCK) % len(patterns)]
+    derivation, saying = request.sampler.pick(
+        f"{pattern} derivation", [one for one in offered if one[0].pattern == pattern]
+    )
+    found = _drawn(request, "reasoning", saying)
+    if found is None:
+        return None
+    reference = derivation.values.get("reference", derivation.values.get("taken"))
+    notes: dict[str, object] = {
+        "pattern": pattern,
+        "patterns": list(derivation.patterns or (pattern,)),
+        "relation": derivation.relation,
+        "reference": None if reference is None else reference[0].value,
+    }
+    base = goal_introduced(request)
+    both = derivation.values.get("list")
+    if both is not None:
+        base = listed(base, both, None)
+        notes["candidates"] = {derivation.listed: [one.value for one in both]}
+    values = {**base.values, **derivation.values}
+    return Chosen(found[0], Introduced(values, None, notes), found[1])
+
+
+def _offers(scenario: Scenario, derivation: Derivation) -> bool:
+    derive = scenario.fields.derive
+    return (
+        derive is not None
+        and derive.pattern == derivation.pattern
+        and (derivation.relation is None or derivation.relation in derive.relations)
+        and bool(_says([scenario], derivation.fields, derivation.listed))
+    )
+
+
+def _spatial(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen | None:
+    colors = request.color_values
+    found = _drawn(request, "spatial", _says(scenarios, [one.field for one in colors]))
+    if found is None:
+        return None
+    marks = draw_landmarks(request)
+    places = [
+        IntroducedValue(color.slot, "place", color.value, mark.phrase)
+        for color, mark in zip(colors, marks, strict=True)
+    ]
+    notes: dict[str, object] = {
+        "landmarks": [mark.phrase for mark in marks],
+        "landmark_classes": [mark.level for mark in marks],
+        "frame": request.frame,
+    }
+    return Chosen(found[0], _several(request, "place", places, notes), found[1])
+
+
+def _several(
+    request: InstructionRequest,
+    name: str,
+    values: Sequence[IntroducedValue],
+    notes: Mapping[str, object],
+) -> Introduced:
+    """Return the goal's values with some more, one by one and all together."""
+    added = {name: tuple(values), **{f"{name}.{at}": (one,) for at, one in enumerate(values)}}
+    return Introduced({**goal_introduced(request).values, **added}, None, notes)
+
+
+def _grounded(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen | None:
+    clues: Mapping[GoalValue, Clue] = clues_of(request)
+    kinds = list(dict.fromkeys(clue.kind for clue in clues.values()))
+    saying = [
+        one
+        for one in _says(scenarios, [value.field for value in clues])
+        if not one.fields.needs.clue or set(kinds) <= set(one.fields.needs.clue)
+    ]
+    found = _drawn(request, "grounded", saying)
+    if found is None:
+        return None
+    values = [
+        IntroducedValue(one.slot, "clue", one.value, clue.words) for one, clue in clues.items()
+    ]
+    touched = list(dict.fromkeys(one.slot for one in clues))
+    notes: dict[str, object] = {"touched": touched, "pattern": kinds[0], "patterns": kinds}
+    return Chosen(found[0], _several(request, "clue", values, notes), found[1])
+
+
+def _rival(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen | None:
+    """Choose a pair as in language 3, whose partners make both values equally likely."""
+    pairs = rival_pairs(replace(request, sampler=sampler_of(request.episode)))
+    if not pairs:
+        return None
+    pair = balanced_rival(request, pairs)
+    order = draw_order(request)
+    fields = [one.field for one in pair if pair.ordered or one is pair.meant]
+    found = _drawn(request, "rival", _says(scenarios, fields, pair.slot))
+    if found is None:
+        return None
+    meant, rival = (
+        named(pair.meant),
+        IntroducedValue(pair.rival.slot, pair.meant.slot_type, pair.rival.value),
+    )
+    both = (meant, rival) if order.meant_first else (rival, meant)
+    aimed = "former" if order.meant_first == order.points_at_meant else "latter"
+    remark = aimed if order.points_at_meant else f"not_{aimed}"
+    notes: dict[str, object] = {
+        "rival": pair.rival.value,
+        "rival_slot": pair.slot,
+        "rival_position": "second" if order.meant_first else "first",
+        "rival_reference": remark,
+        "candidates": {pair.slot: [one.value for one in both]},
+    }
+    base = listed(goal_introduced(request), both, pair.meant.value)
+    taken = {"taken": (rival._replace(slot=REFERENCE),)}
+    introduced = Introduced({**base.values, **taken}, base.position, notes)
+    return Chosen(found[0], introduced, found[1], remark)
+
+
+_CHOICES: Mapping[str, Callable[[InstructionRequest, Sequence[Scenario]], Chosen | None]] = {
+    "direct": _direct,
+    "reasoning": _reasoning,
+    "spatial": _spatial,
+    "grounded": _grounded,
+    "direct-rival": _rival,
+}
+
+
+def rival_values(request: InstructionRequest, introduced: Introduced) -> Iterator[Introduced]:
+    """Yield the slots with another value for a competing remark: ``rival color`` of each color."""
+    said = {one.value for one in introduced.values.get("list", ())}
+    for slot, kind in {one.slot: one.slot_type for one in request.goal_values}.items():
+        own = {one.value for one in _of_slot(request, slot)}
+        others: Sequence[str | int] = _others(request, slot)
+        if kind == "color":
+            others = request.task.commands.colors
+        for other in others:
+            if other not in said | own:
+                rival = (IntroducedValue(REFERENCE, kind, other),)
+                yield introduced.with_values(**{f"rival {slot}": rival})

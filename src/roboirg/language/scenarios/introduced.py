@@ -1,0 +1,133 @@
+"""What a scenario's words can name: the values that its slots stand for, and how they are said."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from roboirg.language.instruction import REFERENCE, Expression
+from roboirg.language.number_words import cardinal, ordinal, plural, times
+from roboirg.language.phrases import Phrase, antecedent, plain
+from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.scenarios.markup import Slot
+from roboirg.language.templates.derivations import MOMENTS
+
+FORMER: tuple[Expression, ...] = ("former", "latter")
+RANKS: tuple[Expression, ...] = ("first", "second", "third")
+
+
+class IntroducedValue(NamedTuple):
+    """A value to be named.
+
+    Attributes:
+        slot: of its mentions; empty for words that are no mention.
+        kind: type of the value: ``color``, ``number``, ``visit``, ``place`` …
+        value: of its mentions.
+        words: how it is said; empty for the usual words of its kind.
+    """
+
+    slot: str
+    kind: str
+    value: str | int
+    words: str = ""
+
+    def said(self, form: str | None) -> str:
+        """Return the words for the value in a form, or as a number of a noun."""
+        if isinstance(self.value, str) or (self.words and form is None):
+            return self.words or MOMENTS.get(str(self.value), str(self.value))
+        if form is None:
+            form = "ordinal" if self.kind in ("visit", "placement") else "cardinal"
+        known = {"ordinal": ordinal, "cardinal": cardinal, "times": times}.get(form)
+        if known is not None:
+            return known(self.value)
+        return f"{cardinal(self.value)} {form if self.value == 1 else plural(form)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Introduced:
+    """The values that the words of an episode can name, by slot.
+
+    Attributes:
+        values: one or several for each slot; those of a list in its order.
+        position: of the meant value in the list, from 0; None without a list.
+        notes: entries of the metadata.
+    """
+
+    values: Mapping[str, tuple[IntroducedValue, ...]]
+    position: int | None = None
+    notes: Mapping[str, object] = field(default_factory=dict)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.values
+
+    def count(self, controller: str) -> int:
+        """Return the number with which words agree: that of a slot, or how many values it has."""
+        found = self.values[controller]
+        value = found[0].value
+        return value if len(found) == 1 and isinstance(value, int) else len(found)
+
+    def phrase(self, slot: Slot) -> Phrase:
+        """Return the words for a slot, each value a mention."""
+        found = self.values[slot.name]
+        joint, form = (slot.form, None) if slot.form in ("or", "nor") else ("and", slot.form)
+        pieces: list[Phrase] = []
+        for at, one in enumerate(found):
+            if at:
+                last = at == len(found) - 1
+                pieces.append(plain(f" {joint} " if last or joint == "nor" else ", "))
+            words = one.said(form)
+            pieces.append(antecedent(words, one.slot, one.value) if one.slot else plain(words))
+        return tuple(piece for phrase in pieces for piece in phrase)
+
+    def referent(self, name: str) -> tuple[str, str | int]:
+        """Return the slot and the value of mentions that point back at a slot."""
+        found = self.values[name]
+        slots = {one.slot for one in found}
+        if len(found) == 1:
+            return found[0].slot, found[0].value
+        slot = slots.pop() if len(slots) == 1 else REFERENCE
+        return slot, " and ".join(str(one.value) for one in found)
+
+    def rank(self, *, ordinals: bool) -> Expression:
+        """Return the class of the words for the meant value's position in the list."""
+        if self.position is None:
+            raise LookupError("there is no list")
+        pair = len(self.values["list"]) == len(FORMER)
+        return FORMER[self.position] if pair and not ordinals else RANKS[self.position]
+
+    def with_values(self, **added: tuple[IntroducedValue, ...]) -> Introduced:
+        """Return the same with further slots."""
+        return Introduced({**self.values, **added}, self.position, self.notes)
+
+
+def named(value: GoalValue) -> IntroducedValue:
+    """Return a value of the goal, to be named."""
+    return IntroducedValue(value.slot, value.slot_type, value.value)
+
+
+def as_reference(value: GoalValue, other: str | int) -> IntroducedValue:
+    """Return another value of the same kind, which only leads to the goal."""
+    return IntroducedValue(REFERENCE, value.slot_type, other)
+
+
+def goal_introduced(request: InstructionRequest) -> Introduced:
+    """Return the values of the goal by field, and all of a slot with several by its name."""
+    found: dict[str, tuple[IntroducedValue, ...]]
+    found = {one.field: (named(one),) for one in request.goal_values}
+    for slot in {one.slot for one in request.goal_values}:
+        found.setdefault(slot, tuple(named(one) for one in request.goal_values if one.slot == slot))
+    return Introduced(found)
+
+
+def listed(
+    base: Introduced, values: Sequence[IntroducedValue], meant: str | int | None
+) -> Introduced:
+    """Return the same with a list, in which the meant value has the position of its rank."""
+    found = {f"list.{at}": (one,) for at, one in enumerate(values)} | {"list": tuple(values)}
+    position = None if meant is None else [one.value for one in values].index(meant)
+    if position is not None:
+        pair, rank = len(values) == len(FORMER), RANKS[position]
+        words = f"the {FORMER[position]}" if pair else f"the {rank} one"
+        found["rank"] = (IntroducedValue("", "rank", position + 1, words),)
+    return Introduced({**base.values, **found}, position, base.notes)

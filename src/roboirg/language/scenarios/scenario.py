@@ -1,0 +1,149 @@
+"""The content of the data files: scenarios, the commands of a task, pointers, and what all share.
+
+`docs/add-scenario.md` explains the fields to authors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import msgspec
+
+from roboirg.core.word_pools import PoolName
+from roboirg.language.scenarios.markup import Text
+
+ScenarioSetting = Literal["direct", "reasoning", "spatial", "direct-rival", "grounded"]
+"""The settings that scenarios are written for; contextual takes those of direct."""
+Texts = tuple[str, ...]
+Operation = Literal[
+    "same", "rank", "other", "without", "minus", "plus", "double", "half", "earlier", "later",
+    "before", "after", "two before", "two after", "place", "seen",
+]  # fmt: skip
+REMARKS = ("former", "latter", "not_former", "not_latter")
+"""What a remark of direct-rival points at, and whether it sets that aside."""
+
+
+class PointerRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"kind": "class"}):
+    """An expression of the closed table; `pointers.toml` explains the fields."""
+
+    words: str
+    kind: str
+    of: tuple[str, ...]
+    operation: Operation
+    resolved: str = ""
+    quote: str = ""
+
+
+class Derive(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How the goal of a reasoning scenario follows: pattern, and the relations that it can say."""
+
+    pattern: str
+    relations: Texts = ()
+
+
+class Needs(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What must hold of an episode; nothing about the values of its goal, which it would give away.
+
+    Attributes:
+        colors: possible numbers of colors in the goal.
+        shown: possible numbers of colors in the scene that a goal can ask for.
+        list: possible lengths of the list.
+        clue: possible kinds of clues.
+    """
+
+    colors: tuple[int, ...] = ()
+    shown: tuple[int, ...] = ()
+    list: tuple[int, ...] = ()
+    clue: Texts = ()
+
+
+class People(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Who can be spoken of, by pronoun."""
+
+    he: Texts
+    she: Texts
+
+
+class ScenarioFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A scenario as written."""
+
+    frame: str
+    pool: PoolName
+    setting: ScenarioSetting
+    introduction: str
+    say: Mapping[str, Texts]
+    reinforcement: str = ""
+    distractors: Texts = ()
+    competing: Texts = ()
+    cue: str = ""
+    lead: str = ""
+    resolved: Mapping[str, str] = {}
+    remarks: Mapping[str, Texts] = {}
+    list: str = ""
+    derive: Derive | None = None
+    needs: Needs = Needs()
+    people: People | None = None
+
+
+class Scenario(msgspec.Struct, frozen=True):
+    """A scenario with its sentences parsed.
+
+    Attributes:
+        fields: as written.
+        texts: its sentences by field, ``say.color`` has several.
+        people: who can be spoken of.
+    """
+
+    fields: ScenarioFields
+    texts: Mapping[str, tuple[Text, ...]]
+    people: People
+
+    @property
+    def name(self) -> str:
+        """The frame with the setting, unique in a task and pool."""
+        return f"{self.fields.setting}/{self.fields.frame}"
+
+    def text(self, field: str) -> Text:
+        """Return the only sentence of a field; empty if it has none."""
+        return self.texts.get(field, ((),))[0]
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """The fields of the command that point back."""
+        return tuple(self.fields.say)
+
+    def of_kind(self, kind: str) -> Sequence[Text]:
+        """Return the alternatives of a field."""
+        return self.texts.get(kind, ())
+
+
+class General(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the scenarios of all tasks share: people, and remarks about anything."""
+
+    people: People
+    distractors: Mapping[PoolName, Texts]
+
+
+class TaskFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A task's file as written, but for its scenarios."""
+
+    task: str
+    commands: Mapping[PoolName, Texts] = {}
+    stated: Mapping[str, str] = {}
+
+
+class TaskScenarios(msgspec.Struct, frozen=True):
+    """The words of a task.
+
+    Attributes:
+        task: its name.
+        commands: skeletons by pool, each with its fields.
+        stated: the words that state a field's value.
+        scenarios: all of them.
+    """
+
+    task: str
+    commands: Mapping[PoolName, tuple[Text, ...]]
+    stated: Mapping[str, Text]
+    scenarios: tuple[Scenario, ...]

@@ -1,0 +1,254 @@
+"""Read the data files of language 4; complaints name file, scenario and field."""
+
+from __future__ import annotations
+
+import functools
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+import msgspec
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.goal_slots import SLOT_TYPE_NAMES
+from roboirg.language.patterns import PATTERNS
+from roboirg.language.scenarios.markup import (
+    Agreement,
+    Part,
+    Pointer,
+    Slot,
+    Text,
+    parse,
+    pointers_in,
+    slots_in,
+)
+from roboirg.language.scenarios.scenario import (
+    REMARKS,
+    General,
+    PointerRow,
+    Scenario,
+    ScenarioFields,
+    TaskFields,
+    TaskScenarios,
+)
+
+FOLDER = files("roboirg.language.scenarios")
+Stored = TypeVar("Stored")
+GIVEN = frozenset(
+    {"list", "list.0", "list.1", "list.2", "rank", "reference", "step", "excluded", "taken"}
+    | {"place", "place.0", "place.1", "clue", "clue.0", "clue.1", "total"}
+    | {f"{word}{number}" for word in ("person", "he", "him", "his") for number in ("", ".2")}
+)
+"""Slots that are no fields of the goal."""
+_CONTEXT = ("introduction", "reinforcement", "cue")
+_AGAIN = re.compile(r"\{step:[a-z -]+\}")
+
+
+@functools.cache
+def pointer_table() -> tuple[PointerRow, ...]:
+    """Return the closed table of pointers."""
+    data = _toml(FOLDER.joinpath("pointers.toml").read_text(encoding="utf-8"), "pointers.toml")
+    return _as(tuple[PointerRow, ...], data.get("pointer", []), "pointers.toml")
+
+
+@functools.cache
+def general() -> General:
+    """Return what all tasks share."""
+    data = _toml(FOLDER.joinpath("general.toml").read_text(encoding="utf-8"), "general.toml")
+    return _as(General, data, "general.toml")
+
+
+@functools.cache
+def task_scenarios(task: str) -> TaskScenarios | None:
+    """Return the words of a task; None if none have been written."""
+    path = FOLDER.joinpath(f"{task}.toml")
+    if not path.is_file():
+        return None
+    return read_task_scenarios(path.read_text(encoding="utf-8"), f"{task}.toml")
+
+
+def read_task_scenarios(text: str, where: str) -> TaskScenarios:
+    """Return the content of a file; `where` names it in complaints.
+
+    Raises:
+        InvalidValueError: it is not as `docs/add-scenario.md` says.
+    """
+    data = _toml(text, where)
+    written = data.pop("scenario", [])
+    head = _as(TaskFields, data, where)
+    if not head.commands:
+        head = _with_own_commands(head, where)
+    commands = {
+        pool: tuple(_parsed(one, f"{where}, commands") for one in texts)
+        for pool, texts in head.commands.items()
+    }
+    stated = {name: _parsed(one, f"{where}, stated") for name, one in head.stated.items()}
+    scenarios = tuple(
+        _scenario(one, head, f"{where}, scenario {one.get('frame', number)!r}")
+        for number, one in enumerate(written, 1)
+    )
+    names = [(one.fields.pool, one.name) for one in scenarios]
+    for name in names:
+        if names.count(name) > 1:
+            _fail(where, f"has the frame {name[1]!r} twice in the pool {name[0]}")
+    return TaskScenarios(head.task, commands, stated, scenarios)
+
+
+def _with_own_commands(head: TaskFields, where: str) -> TaskFields:
+    """Return the head of a file that has scenarios alone, with the commands of the task's own."""
+    path = FOLDER.joinpath(f"{head.task}.toml")
+    if not path.is_file():
+        _fail(where, f"has no commands, and there is no {path.name} to take them from")
+    data = _toml(path.read_text(encoding="utf-8"), path.name)
+    data.pop("scenario", None)
+    return _as(TaskFields, data, path.name)
+
+
+def _scenario(written: Mapping[str, Any], head: TaskFields, where: str) -> Scenario:
+    data = {**written}
+    for field in ("say", "remarks", "resolved"):
+        flat = dict(_flat(data.get(field, {})))
+        data[field] = flat if field == "resolved" else {
+            name: [one] if isinstance(one, str) else one for name, one in flat.items()
+        }  # fmt: skip
+    fields = _as(ScenarioFields, data, where)
+    texts: dict[str, tuple[Text, ...]] = {name: (fields_text,) for name in (*_CONTEXT, "lead")
+             if (fields_text := _parsed(getattr(fields, name), f"{where}, {name}"))}  # fmt: skip
+    several = {"distractors": fields.distractors, "competing": fields.competing}
+    several |= {f"say.{name}": one for name, one in fields.say.items()}
+    several |= {f"remarks.{name}": one for name, one in fields.remarks.items()}
+    several |= {f"resolved.{name}": (one,) for name, one in fields.resolved.items()}
+    texts |= {name: tuple(_parsed(one, f"{where}, {name}") for one in found)
+              for name, found in several.items()}  # fmt: skip
+    for name, found in texts.items():
+        for one in found:
+            _check_slots(one, head, f"{where}, {name}")
+            if not name.startswith("resolved"):
+                _check_pointers(one, fields, f"{where}, {name}")
+    _check_fields(fields, head, where)
+    return Scenario(fields, texts, fields.people or general().people)
+
+
+def _check_fields(fields: ScenarioFields, head: TaskFields, where: str) -> None:
+    """Check what a setting needs beyond its introduction and the words that point back."""
+    for name in fields.say:
+        if name not in head.stated:
+            _fail(where, f"has say.{name}; the fields are {', '.join(head.stated)}")
+    if not fields.say:
+        _fail(where, "has no say; give words for the fields that the command leaves open")
+    if fields.setting == "direct":
+        for name in ("reinforcement", "distractors", "competing", "cue"):
+            if not getattr(fields, name):
+                _fail(where, f"has no {name}, which contextual needs")
+    if fields.setting == "direct-rival" and set(fields.remarks) != set(REMARKS):
+        _fail(where, f"has the remarks {sorted(fields.remarks)}; it needs {', '.join(REMARKS)}")
+    if (fields.derive is not None) != (fields.setting == "reasoning"):
+        _fail(where, "must have derive if its setting is reasoning, and only then")
+    if fields.derive and fields.derive.pattern not in PATTERNS:
+        _fail(where, f"has the pattern {fields.derive.pattern!r}; known: {', '.join(PATTERNS)}")
+    if fields.list and fields.list not in head.stated and f"{fields.list}.0" not in head.stated:
+        _fail(where, f"has a list of {fields.list!r}; the slots are {', '.join(head.stated)}")
+
+
+def _check_slots(text: Text, head: TaskFields, where: str) -> None:
+    bases = {name.partition(".")[0] for name in head.stated}
+    known = GIVEN | set(head.stated) | bases
+    for name in slots_in(text):
+        if name.removeprefix("rival ") not in known:
+            _fail(where, f"has the slot {name!r}; known: {', '.join(sorted(known))}")
+
+
+def _check_pointers(text: Text, fields: ScenarioFields, where: str) -> None:
+    """Check that every pointer is one of the closed table."""
+    for pointer in pointers_in(text):
+        kind = type_of(pointer.of, fields.list)
+        if row_of(text, pointer, kind) is None:
+            of_kind = [one.words for one in pointer_table() if kind in one.of]
+            _fail(
+                where,
+                f"has the pointer <{pointer.expression} {pointer.of}: {pointer.words}>, which is "
+                f"not in pointers.toml; for a {kind} there are: {'; '.join(of_kind) or 'none'}",
+            )
+
+
+def type_of(name: str, listed: str = "") -> str:
+    """Return the type of what a slot stands for, as in ``of`` of the table of pointers."""
+    base, _, number = name.partition(".")
+    if base in ("list", "taken"):
+        several = base == "list" and not number
+        return "pair" if several else SLOT_TYPE_NAMES[listed or "color"]
+    if base == "colors":
+        return "color" if number else "colors"
+    return SLOT_TYPE_NAMES.get(base, base)
+
+
+@functools.cache
+def row_of(text: Text, pointer: Pointer, kind: str) -> PointerRow | None:
+    """Return the row of the table for a pointer in its sentence; None if there is none."""
+    said = "".join(map(_said, text))
+    of_kind = [row for row in pointer_table() if row.kind == pointer.expression and kind in row.of]
+    relations = [
+        row for row in of_kind if f"<{pointer.words}>" in row.words and row.words in said
+    ]  # fmt: skip
+    alone = [row for row in of_kind if row.words == pointer.words]
+    return next(iter((*relations, *alone)), None)
+
+
+def _said(part: Part) -> str:
+    """Return a part as the table has it: the noun of a step is any."""
+    if isinstance(part, Pointer):
+        return f"<{part.words}>"
+    if isinstance(part, Agreement):
+        return f"[{part.controller}: {part.one}|{part.many}]"
+    if isinstance(part, Slot):
+        form = "*" if part.name == "step" and part.form else part.form
+        return f"{{{part.name}:{form}}}" if form else f"{{{part.name}}}"
+    return part
+
+
+def _flat(table: object, prefix: str = "") -> Iterator[tuple[str, object]]:
+    """Yield the entries of a table whose keys may hold dots: ``colors.0`` is one."""
+    if not isinstance(table, dict):
+        yield prefix, table
+        return
+    for name, value in table.items():
+        yield from _flat(value, f"{prefix}.{name}" if prefix else name)
+
+
+def _parsed(text: str, where: str) -> Text:
+    if not (text.isascii() and (text.isprintable() or not text)):
+        _fail(where, f"has the words {text!r}; they must be printable ASCII on one line")
+    try:
+        return parse(text)
+    except ValueError as error:
+        raise InvalidValueError(f"{where}: {error}.") from error
+
+
+def _toml(text: str, where: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except ValueError as error:
+        raise InvalidValueError(f"{where} is not valid TOML: {error}.") from error
+
+
+def _as(kind: type[Stored], data: object, where: str) -> Stored:
+    try:
+        return msgspec.convert(data, kind)
+    except msgspec.ValidationError as error:
+        raise InvalidValueError(f"{where}: {error}.") from error
+
+
+def _fail(where: str, complaint: str) -> NoReturn:
+    raise InvalidValueError(f"{where} {complaint}.")
+
+
+def read_scenario_file(path: Path) -> TaskScenarios:
+    """Read a file of scenarios from anywhere."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise InvalidValueError(f"The file {str(path)!r} cannot be read: {error}.") from error
+    return read_task_scenarios(text, path.name)

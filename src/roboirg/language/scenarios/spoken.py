@@ -1,0 +1,330 @@
+"""Say a scenario: its sentences with values and people filled in, and the command after a lead."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.language.instruction import Expression, UtteranceStage
+from roboirg.language.phrases import (
+    Phrase,
+    TaggedText,
+    anaphor,
+    antecedent,
+    plain,
+    swap_particles,
+)
+from roboirg.language.request import (
+    InstructionRequest,
+    InstructionSpec,
+    NoCommandError,
+    UtteranceSpec,
+)
+from roboirg.language.scenarios.choice import Chosen, choose, rival_values
+from roboirg.language.scenarios.introduced import Introduced, IntroducedValue, goal_introduced
+from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, parse, slots_in
+from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
+from roboirg.language.scenarios.scenario_file import general, row_of, task_scenarios, type_of
+from roboirg.language.settings import contextual
+from roboirg.language.settings.setting import Setting
+
+SENTENCE_ENDS = (". ", "! ", "? ")
+PRONOUNS = {"he": ("he", "him", "his"), "she": ("she", "her", "her")}
+_EXPLICIT, _CONTEXTUAL, _DIRECT = "explicit", "contextual", "direct"
+
+
+def in_language_4(setting: Setting) -> Setting:
+    """Return a setting that speaks in scenarios."""
+
+    def refusal(request: InstructionRequest) -> str | None:
+        words = task_scenarios(request.task.name)
+        if words is None:
+            return f"language 4 has no scenarios of {request.task.name} yet"
+        if setting.name == _EXPLICIT:
+            return None
+        reason = setting.refusal(request)
+        if reason is None and _chosen(request, setting.name, words) is None:
+            reason = f"language 4 has no scenario for it in the pool {request.pool}"
+        return reason
+
+    return replace(setting, say=lambda request: say(request, setting.name), refusal=refusal)
+
+
+def say(request: InstructionRequest, setting: str) -> InstructionSpec:
+    """Return the words of an episode in language 4."""
+    words = task_scenarios(request.task.name)
+    if words is None:
+        raise InvalidValueError(f"Language 4 has no scenarios of {request.task.name} yet.")
+    if setting == _EXPLICIT:
+        command = Speech(request, words, goal_introduced(request)).command({}, ())
+        return InstructionSpec((UtteranceSpec("command", command),))
+    chosen = _chosen(request, setting, words)
+    if chosen is None:
+        raise InvalidValueError(f"Language 4 has no scenario for {request.episode.key}.")
+    return say_chosen(request, setting, words, chosen)
+
+
+def _chosen(request: InstructionRequest, setting: str, words: TaskScenarios) -> Chosen | None:
+    name = _DIRECT if setting == _CONTEXTUAL else setting
+    known = [
+        one
+        for one in words.scenarios
+        if one.fields.setting == name and one.fields.pool == request.pool
+    ]
+    return choose(request, name, known)
+
+
+def say_chosen(
+    request: InstructionRequest, setting: str, words: TaskScenarios, chosen: Chosen
+) -> InstructionSpec:
+    """Return the words of a scenario."""
+    scenario = chosen.scenario
+    introduced = _with_people(request, scenario, chosen.introduced)
+    speech = Speech(request, words, introduced, scenario)
+    utterances = [_utterance("introduction", speech.phrase(scenario.text("introduction")))]
+    notes: dict[str, object] = {**introduced.notes, "scenario": scenario.fields.frame}
+    if setting == _CONTEXTUAL:
+        utterances += _stages(request, speech, scenario)
+        notes |= _stage_notes(request)
+    fields = {name: speech.field(name, _words_for(request, chosen, name)) for name in scenario.said}
+    utterances.append(_utterance("command", speech.command(fields, _lead(request, chosen))))
+    return InstructionSpec(tuple(utterances), notes)
+
+
+def _utterance(stage: UtteranceStage, phrase: Phrase) -> UtteranceSpec:
+    return UtteranceSpec(stage, phrase)
+
+
+def _words_for(request: InstructionRequest, chosen: Chosen, field: str) -> Text:
+    """Return the words for a field; for the first one they are chosen."""
+    if field == chosen.scenario.said[0]:
+        return chosen.first
+    return request.sampler.pick(f"{field} words", chosen.scenario.of_kind(f"say.{field}"))
+
+
+def _lead(request: InstructionRequest, chosen: Chosen) -> Text:
+    """Return the words before the command: the lead, and the remark that chooses."""
+    scenario = chosen.scenario
+    if request.resolved and "resolved.lead" in scenario.texts:
+        return scenario.text("resolved.lead")
+    remark: Text = ()
+    if chosen.remark:
+        options = scenario.of_kind(f"remarks.{chosen.remark}")
+        remark = request.sampler.pick("remark", options)
+    return (*scenario.text("lead"), *remark)
+
+
+def _stages(
+    request: InstructionRequest, speech: Speech, scenario: Scenario
+) -> Iterator[UtteranceSpec]:
+    """Yield the stages between introduction and command that are asked for."""
+    stages, options = request.options.stages, request.options
+    if contextual.REINFORCEMENT in stages:
+        yield _utterance("reinforcement", speech.phrase(scenario.text("reinforcement")))
+    if contextual.DISTRACTOR in stages:
+        source = speech.competing() if options.distractor == "competing" else speech.neutral()
+        for phrase in itertools.islice(source, options.distractors):
+            yield _utterance("distractor", phrase)
+    if contextual.CUE in stages:
+        yield _utterance("cue", speech.phrase(scenario.text("cue")))
+
+
+def _stage_notes(request: InstructionRequest) -> dict[str, object]:
+    options = request.options
+    notes: dict[str, object] = {"stages": list(options.stages)}
+    if contextual.DISTRACTOR in options.stages:
+        notes |= {"distractor": options.distractor, "distractors": options.distractors}
+    return notes
+
+
+def _with_people(
+    request: InstructionRequest, scenario: Scenario, introduced: Introduced
+) -> Introduced:
+    """Add two people, who are different, and their pronouns."""
+    used = {name for texts in scenario.texts.values() for text in texts for name in slots_in(text)}
+    if used.isdisjoint({"person", "he", "him", "his"}):
+        return introduced
+    known = [
+        (name, *PRONOUNS[gender])
+        for gender in PRONOUNS
+        for name in getattr(scenario.people, gender)
+    ]
+    order = request.sampler.cycle("people", known)
+    added: dict[str, tuple[IntroducedValue, ...]] = {}
+    for number, words in zip(("", ".2"), (next(order), next(order)), strict=True):
+        for slot, word in zip(("person", "he", "him", "his"), words, strict=True):
+            added[f"{slot}{number}"] = (IntroducedValue("", "person", word, word),)
+    return introduced.with_values(**added)
+
+
+class Speech:
+    """The words of one scenario in one episode.
+
+    Args:
+        request: the episode, and how to instruct it.
+        words: of the task.
+        introduced: the values that can be named.
+        scenario: None for a command alone.
+    """
+
+    def __init__(
+        self,
+        request: InstructionRequest,
+        words: TaskScenarios,
+        introduced: Introduced,
+        scenario: Scenario | None = None,
+    ) -> None:
+        self._request, self._words, self._introduced = request, words, introduced
+        self._scenario = scenario
+        self._listed = scenario.fields.list if scenario else ""
+
+    def phrase(self, text: Text, introduced: Introduced | None = None) -> Phrase:
+        """Return a sentence with its marks filled."""
+        values = introduced or self._introduced
+        pieces: list[TaggedText] = []
+        for part in text:
+            if isinstance(part, str):
+                pieces.append(TaggedText(part))
+            elif isinstance(part, Slot):
+                pieces.extend(values.phrase(part))
+            elif isinstance(part, Agreement):
+                words = part.one if values.count(part.controller) == 1 else part.many
+                pieces.append(TaggedText(words))
+            else:
+                pieces.extend(self._pointing(part))
+        return tuple(piece for piece in pieces if piece.text)
+
+    def _pointing(self, pointer: Pointer) -> Phrase:
+        """Return words that point back."""
+        words = self._joined(self.phrase(pointer.parts))
+        slot, value = self._introduced.referent(pointer.of)
+        return anaphor(words, self._expression(pointer), slot, value)
+
+    def _expression(self, pointer: Pointer) -> Expression:
+        if pointer.expression == "rank":
+            return self._introduced.rank(ordinals="ordinal" in pointer.words)
+        return pointer.expression  # type: ignore[return-value]  # one of the table's classes
+
+    def resolved(self, text: Text) -> Phrase:
+        """Return words with the referent for every pointer."""
+        pieces: list[TaggedText] = []
+        for part in text:
+            if not isinstance(part, Pointer):
+                pieces.extend(self.phrase((part,)))
+                continue
+            slot, value = self._introduced.referent(part.of)
+            row = row_of(text, part, type_of(part.of, self._listed))
+            named = parse(row.resolved) if row and row.resolved else self._referent(part.of)
+            pieces.extend(antecedent(self._joined(self.phrase(named)), slot, value))
+        return tuple(pieces)
+
+    def _referent(self, name: str) -> Text:
+        """Return the words for what a slot stands for."""
+        one = self._introduced.values[name][0]
+        field = self._listed if name.startswith(("list.", "taken")) else name
+        stated = self._words.stated.get(field) or self._words.stated.get(f"{field}.0")
+        if stated is None or len(self._introduced.values[name]) > 1:
+            the = "the " if one.kind in ("visit", "placement") else ""
+            return (*((the,) if the else ()), Slot(name))
+        return tuple(
+            part._replace(name=name) if isinstance(part, Slot) else part for part in stated
+        )
+
+    def field(self, name: str, words: Text) -> Phrase:
+        """Return the words for a field of the command, resolved if these are asked for."""
+        if not self._request.resolved:
+            return self.phrase(words)
+        scenario = self._scenario
+        if scenario is not None and f"resolved.{name}" in scenario.texts:
+            return self.resolved(scenario.text(f"resolved.{name}"))
+        if scenario is not None and scenario.fields.setting in ("direct", "direct-rival"):
+            return self.phrase(self._words.stated[name])
+        return self.resolved(words)
+
+    def command(self, fields: Mapping[str, Phrase], lead: Text) -> Phrase:
+        """Return the command with the words for some fields; the others state their values."""
+        before = self.resolved(lead) if self._request.resolved else self.phrase(lead)
+        if self._request.wordings is not None:
+            skeleton = self._request.command(
+                {name: self._outside(name, words) for name, words in fields.items()}
+            )
+        else:
+            skeleton = self._skeleton(fields)
+        if lead and not self._joined(before).endswith(SENTENCE_ENDS):
+            first, *rest = skeleton
+            skeleton = (first._replace(text=first.text[:1].lower() + first.text[1:]), *rest)
+        return (*before, *skeleton)
+
+    def _skeleton(self, fields: Mapping[str, Phrase]) -> Phrase:
+        wanted = {one.field for one in self._request.goal_values}
+        known = self._words.commands[self._request.pool]
+        possible = [one for one in known if set(slots_in(one)) == wanted]
+        if not possible:
+            raise InvalidValueError(
+                f"Language 4 has no command of {self._words.task} with the fields "
+                f"{', '.join(sorted(wanted))}."
+            )
+        pieces: list[TaggedText] = []
+        for part in self._request.sampler.pick(f"command-{len(wanted)}", possible):
+            if not isinstance(part, Slot):
+                pieces.extend(self.phrase((part,)))
+            elif part.name in fields:
+                pieces.extend(fields[part.name])
+            else:
+                pieces.extend(self.phrase(self._words.stated[part.name]))
+        return swap_particles(tuple(pieces))
+
+    def _outside(self, name: str, words: Phrase) -> Phrase:
+        """Return words for a field of a command from outside.
+
+        They take the place of its core: *it* that of *the red cube* in *the container over it*.
+        """
+        outside = self._request.outside_phrase(name)
+        commands = self._request.task.commands
+        direct = self._scenario is None or self._scenario.fields.setting == _DIRECT
+        if outside is None or (self._request.resolved and direct):
+            return self._request.outside_stated(name)
+        if not name.startswith("color"):
+            return words
+        prefix = commands.by_color.removesuffix("{cube}")
+        core = _without_prefix(words, prefix)
+        if prefix and commands.thing not in outside.core:
+            if core == words:
+                raise NoCommandError
+            words = core
+        return self._request.around(name, words)
+
+    def neutral(self) -> Iterator[Phrase]:
+        """Yield remarks: first the scenario's own, then those about anything, for ever."""
+        yield from map(self.phrase, self._scenario.of_kind("distractors") if self._scenario else ())
+        known = general().distractors[self._request.pool]
+        yield from map(plain, self._request.sampler.cycle("distractor", known))
+
+    def competing(self) -> Iterator[Phrase]:
+        """Yield the scenario's remarks about other values, in any order, for ever."""
+        scenario = self._scenario
+        found = [
+            self.phrase(text, values)
+            for text in (scenario.of_kind("competing") if scenario else ())
+            for values in rival_values(self._request, self._introduced)
+            if set(slots_in(text)) <= set(values.values)
+        ]
+        if not found:
+            raise InvalidValueError(
+                f"Language 4 has no competing remark for {self._request.episode.key}."
+            )
+        return self._request.sampler.cycle("competing distractor", list(dict.fromkeys(found)))
+
+    @staticmethod
+    def _joined(phrase: Phrase) -> str:
+        return "".join(piece.text for piece in phrase)
+
+
+def _without_prefix(words: Phrase, prefix: str) -> Phrase:
+    first, *rest = words
+    if not prefix or not first.text.startswith(prefix):
+        return words
+    left = first.text.removeprefix(prefix)
+    return (*((first._replace(text=left),) if left else ()), *rest)
