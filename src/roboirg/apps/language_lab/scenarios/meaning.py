@@ -38,6 +38,10 @@ def meant_value(
         return None
     if chosen.remark and field == chosen.scenario.said[0]:
         return _by_remark(chosen, introduced)
+    if chosen.remark and row.operation == "other":
+        left = [one.value for one in introduced.values["list"]]
+        left.remove(_by_remark(chosen, introduced))
+        return left[0]
     return _operate(request, row, pointer, introduced)
 
 
@@ -103,7 +107,7 @@ def exchanged(request: InstructionRequest, introduced: Introduced) -> Introduced
     """Return the same with other values in place of those that are introduced."""
     values = dict(introduced.values)
     for name, found in introduced.values.items():
-        if name == "list":
+        if name == "list" or (len(found) > 1 and name in request.episode.goal.as_mapping()):
             values[name] = (*found[1:], found[0])
         elif name == "reference":
             # By two, because half of an odd number is none.

@@ -55,7 +55,7 @@ def _wrong(field: str, text: Text) -> Iterator[str]:
     if re.search(r"  | [.,;:?!]|^ ", words) or ("," * 2) in words:
         yield f"has a space or comma too many: {words!r}"
     if field in (*_SILENT, *_COMMAND):
-        outside = literal(tuple(part for part in text if part not in tuple(pointers_in(text))))
+        outside = " ".join(part for part in text if isinstance(part, str))
         values = _VALUES & set(_WORD.findall(outside.lower()))
         if field in _COMMAND:  # "twice as often as that" is a relation of the table
             values -= {"twice", "two"} if pointers_in(text) else set()
