@@ -122,7 +122,7 @@ def _say_outside(
     Which command the setting fills is known only then, so it is said again with its phrases.
     """
     options = replace(request.options, form=form)
-    sampler = TemplateSampler(request.sampler.key)
+    sampler = replace(request.sampler, log=[])
     request = replace(request, options=options, sampler=sampler, filled=[])
     spec = setting.say(request)
     if request.phrases_of is None and request.filled:
@@ -179,7 +179,7 @@ def _sampler(episode: Episode, options: InstructionOptions, variant: int) -> Tem
 def _setting_of(episode: Episode, options: InstructionOptions) -> Setting:
     """Return the setting that speaks the language that is asked for."""
     setting = get_setting(options.setting, get_task(episode.task))
-    return setting if options.language == DEFAULT_LANGUAGE else in_language_4(setting)
+    return setting if options.language == DEFAULT_LANGUAGE else in_language_4(setting.name)
 
 
 def _missing(request: InstructionRequest) -> str | None:

@@ -35,7 +35,8 @@ class TemplateSampler:
 
     def pick(self, purpose: str, options: Sequence[Option]) -> Option:
         """Pick one of the options, all equally likely."""
-        return self._take(purpose, options, _drawn(self.key, purpose, len(options)))
+        count = len(options)
+        return self._take(purpose, options, _drawn(self.key, purpose, count) if count > 1 else 0)
 
     def cycle(self, purpose: str, options: Sequence[Option]) -> Iterator[Option]:
         """Yield all options in random order, repeating the cycle forever; log what is used."""
@@ -47,16 +48,38 @@ class TemplateSampler:
         return options[index]
 
 
+class HashSampler(TemplateSampler):
+    """The same with draws from hashes alone, which take a tenth of the time."""
+
+    def pick(self, purpose: str, options: Sequence[Option]) -> Option:
+        """Pick one of the options, all equally likely."""
+        return self._take(purpose, options, _hash(self.key, purpose) % len(options))
+
+    def cycle(self, purpose: str, options: Sequence[Option]) -> Iterator[Option]:
+        """Yield all options in random order, repeating the cycle forever; log what is used."""
+        order = sorted(range(len(options)), key=lambda at: _hash(self.key, f"{purpose}|{at}"))
+        for index in itertools.cycle(order):
+            yield self._take(purpose, options, index)
+
+
 def sampler_of(episode: Episode, variant: int = 0, draws: str = DRAWS) -> TemplateSampler:
-    """Return the sampler of an episode; each variant draws its words anew, 0 is the usual one."""
+    """Return the sampler of an episode; each variant draws its words anew, 0 is the usual one.
+
+    `draws` is the key of the language's draws; all but those of language 3 are hashes.
+    """
     key = f"{draws}|{episode.task}|{episode.seed}"
-    return TemplateSampler(f"{key}|{variant}" if variant else key)
+    kind = TemplateSampler if draws == DRAWS else HashSampler
+    return kind(f"{key}|{variant}" if variant else key)
+
+
+def _hash(key: str, purpose: str) -> int:
+    digest = hashlib.sha256(f"{key}|{purpose}".encode()).digest()
+    return int.from_bytes(digest[:8], "little")
 
 
 def _generator(key: str, purpose: str) -> np.random.Generator:
     """Return the random stream of a purpose, from its start."""
-    digest = hashlib.sha256(f"{key}|{purpose}".encode()).digest()
-    return np.random.default_rng(int.from_bytes(digest[:8], "little"))
+    return np.random.default_rng(_hash(key, purpose))
 
 
 # Cached: all settings and forms of an episode draw the same.

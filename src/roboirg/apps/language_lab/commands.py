@@ -204,12 +204,12 @@ def check_scenario_file(
 
     Example: roboirg language check-scenarios mine.toml --scenario "school trip"
     """
-    from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios
+    from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
     from roboirg.apps.language_lab.scenarios.scenario_report import report_lines
     from roboirg.language.scenarios.scenario_file import read_scenario_file
 
-    broken = 0
-    for report in check_scenarios(read_scenario_file(path), scenario, seeds):
+    words, broken = read_scenario_file(path), 0
+    for report in check_scenarios(words, scenario, scenes_of(words.task, seeds)):
         broken += len(report.broken)
         typer.echo("\n".join(report_lines(report)))
     if broken:

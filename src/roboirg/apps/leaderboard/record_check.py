@@ -16,7 +16,7 @@ from roboirg.evaluation.records.action_log import ActionLog, read_actions
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.record_codec import read_record
 from roboirg.evaluation.records.store import RECORDS_FILE
-from roboirg.language import LANGUAGE_VERSION
+from roboirg.language import LANGUAGE_VERSIONS
 
 TOLERANCE = 0.02
 """Largest difference of an end state, in m, rad and s, that is granted to a record from another
@@ -136,7 +136,11 @@ def _versions(record: Record) -> Iterator[str]:
     """Yield why the record cannot be checked by this version of the benchmark."""
     for what, recorded, installed in (
         ("environment", record.environment_version, ENVIRONMENT_VERSION),
-        ("language", record.language_version, str(LANGUAGE_VERSION)),
+        (
+            "language",
+            record.language_version,
+            LANGUAGE_VERSIONS.get(record.options.language, "unknown"),
+        ),
     ):
         if recorded != installed:
             yield f"{what}_version: the record says {recorded}; this roboirg checks {installed}."

@@ -19,7 +19,7 @@ from roboirg.language import instruct_with
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction import Instruction
 from roboirg.language.settings import all_settings, settings_of
-from roboirg.language.templates import LANGUAGE_VERSION
+from roboirg.language.templates import LANGUAGE_VERSIONS
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
 from roboirg.policies.vlm.prompt_files import Prompts, load_prompts
@@ -80,7 +80,8 @@ def make_items(
 
 def item_id(episode: Episode, options: InstructionOptions) -> str:
     """Return the name of an item. It is a hash, which gives nothing away about the answer."""
-    content = (episode.key, *astuple(options), LANGUAGE_VERSION, ENVIRONMENT_VERSION)
+    *words, language = astuple(options)
+    content = (episode.key, *words, LANGUAGE_VERSIONS[language], ENVIRONMENT_VERSION)
     return "g" + hashlib.sha256(repr(content).encode()).hexdigest()[:ID_DIGITS]
 
 
@@ -136,7 +137,7 @@ def _make_item(
         else list(hidden_slots((episode, instruction))),
         pattern=cast("str | None", instruction.metadata["pattern"]),
         expressions=_expressions(instruction),
-        language_version=LANGUAGE_VERSION,
+        language_version=LANGUAGE_VERSIONS[options.language],
         environment_version=ENVIRONMENT_VERSION,
     )
 

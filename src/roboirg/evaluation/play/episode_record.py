@@ -58,7 +58,7 @@ def begin_record(prepared: PreparedJob) -> Record:
         goal=dict(words.episode.goal.as_mapping()),
         # Exactly what a reader of the file gets.
         metadata=json.loads(json.dumps(dict(words.instruction.metadata))),
-        language_version=str(language.LANGUAGE_VERSION),
+        language_version=str(words.instruction.metadata["language_version"]),
         environment_version=ENVIRONMENT_VERSION,
         package_version=__version__,
         code=code_fingerprint(),

@@ -33,14 +33,18 @@ from roboirg.evaluation.records.store import (
 )
 from roboirg.evaluation.run.executor import Executor
 from roboirg.evaluation.run.progress import Reporter
-from roboirg.language import LANGUAGE_VERSION
+from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.policies.vlm.models.reply_store import ReplySettings
 from roboirg.tasks.splits.splits import get_episode
 
 UNREACHABLE_AFTER = 20
 """After this many consecutive connection errors, skip the rest of this policy."""
 
-_OUR_VERSIONS = {"language": LANGUAGE_VERSION, "environment": ENVIRONMENT_VERSION}
+
+def _our_versions(record: Summary) -> dict[str, str | int]:
+    """Return the versions that a record has if this roboirg played it."""
+    language = LANGUAGE_VERSIONS.get(record.options.language, "unknown")
+    return {"language": language, "environment": ENVIRONMENT_VERSION}
 
 
 class RunSummary(NamedTuple):
@@ -227,7 +231,7 @@ class _RunLoop:
 
 def _check_record_version(record: Record) -> None:
     """Refuse what a worker with another version of language or environment has played."""
-    for what, ours in _OUR_VERSIONS.items():
+    for what, ours in _our_versions(record).items():
         if (version := getattr(record, f"{what}_version")) != ours:
             raise StoreError(
                 f"A worker returned {record.slug} with {what} version {version}, but this roboirg "
@@ -262,12 +266,13 @@ def _warn_of_untrained(plan: Plan, reporter: Reporter) -> None:
 
 def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> None:
     """Refuse records of other versions of words, scenes or policies: rates must not mix them."""
-    for what, ours in _OUR_VERSIONS.items():
-        for version in {getattr(record, f"{what}_version") for record in records} - {ours}:
-            raise StoreError(
-                f"{folder} holds episodes of {what} version {version}, but this roboirg has "
-                f"version {ours}; choose another --out."
-            )
+    for record in records:
+        for what, ours in _our_versions(record).items():
+            if (version := getattr(record, f"{what}_version")) != ours:
+                raise StoreError(
+                    f"{folder} holds episodes of {what} version {version}, but this roboirg has "
+                    f"version {ours}; choose another --out."
+                )
     for task, split, episode, seed in {
         (record.task, record.split, record.episode, record.seed) for record in records
     }:

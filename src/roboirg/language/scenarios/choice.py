@@ -25,7 +25,7 @@ from roboirg.language.scenarios.introduced import (
     listed,
     named,
 )
-from roboirg.language.scenarios.markup import Text, pointers_in
+from roboirg.language.scenarios.markup import Text
 from roboirg.language.scenarios.scenario import Scenario
 from roboirg.language.settings.grounded import clues_of
 from roboirg.language.settings.reasoning import BLOCK
@@ -56,35 +56,28 @@ def choose(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
 ) -> Chosen | None:
     """Return what is said in a setting; None if no scenario fits the episode."""
-    known = [one for one in scenarios if _fits(one, request)]
-    return _CHOICES[setting](request, known) if known else None
-
-
-def _fits(scenario: Scenario, request: InstructionRequest) -> bool:
-    needs = scenario.fields.needs
     colors, shown = len(request.color_values), len(request.scene_colors)
-    return (not needs.colors or colors in needs.colors) and (
-        not needs.shown or shown in needs.shown
-    )
+    known = [
+        one
+        for one in scenarios
+        if (not one.fields.needs.colors or colors in one.fields.needs.colors)
+        and (not one.fields.needs.shown or shown in one.fields.needs.shown)
+    ]
+    return _CHOICES[setting](request, known) if known else None
 
 
 def _drawn(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
 ) -> tuple[Scenario, Text] | None:
     """Draw the class of the expression in the first field, and then a scenario that has it."""
-    classes: dict[str, list[tuple[Scenario, Text]]] = {}
-    for scenario in scenarios:
-        for text in scenario.of_kind(f"say.{scenario.said[0]}"):
-            kind = next((one.expression for one in pointers_in(text)), "")
-            classes.setdefault(kind, []).append((scenario, text))
+    classes = sorted({kind for one in scenarios for kind in one.classes})
     if not classes:
         return None
-    kind = request.sampler.pick(f"{setting} class", sorted(classes))
-    found = list({one.name: one for one, _ in classes[kind]}.values())
-    scenario = request.sampler.pick(f"{setting} scenario", found)
+    kind = request.sampler.pick(f"{setting} class", classes)
+    saying = [one for one in scenarios if kind in one.classes]
+    scenario = request.sampler.pick(f"{setting} scenario", saying)
     request.sampler.log.append(f"frame/{scenario.fields.frame}")
-    texts = [text for one, text in classes[kind] if one is scenario]
-    return scenario, request.sampler.pick(f"{setting} words", texts)
+    return scenario, request.sampler.pick(f"{setting} words", scenario.classes[kind])
 
 
 def _says(scenarios: Sequence[Scenario], fields: Sequence[str], slot: str = "") -> list[Scenario]:

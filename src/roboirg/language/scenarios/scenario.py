@@ -92,26 +92,25 @@ class Scenario(msgspec.Struct, frozen=True):
     Attributes:
         fields: as written.
         texts: its sentences by field, ``say.color`` has several.
-        people: who can be spoken of.
+        people: who can be spoken of, each with his or her pronouns; empty if nobody is.
+        said: the fields of the command that point back.
+        classes: the words for the first of these, by their class of expression.
     """
 
     fields: ScenarioFields
     texts: Mapping[str, tuple[Text, ...]]
-    people: People
+    people: tuple[tuple[str, ...], ...]
+    said: Texts
+    classes: Mapping[str, tuple[Text, ...]]
 
     @property
     def name(self) -> str:
-        """The frame with the setting, unique in a task and pool."""
+        """The setting with the frame, unique in a task and pool."""
         return f"{self.fields.setting}/{self.fields.frame}"
 
     def text(self, field: str) -> Text:
         """Return the only sentence of a field; empty if it has none."""
         return self.texts.get(field, ((),))[0]
-
-    @property
-    def said(self) -> tuple[str, ...]:
-        """The fields of the command that point back."""
-        return tuple(self.fields.say)
 
     def of_kind(self, kind: str) -> Sequence[Text]:
         """Return the alternatives of a field."""

@@ -37,10 +37,12 @@ from roboirg.language.scenarios.scenario import (
 
 FOLDER = files("roboirg.language.scenarios")
 Stored = TypeVar("Stored")
+PERSON = ("person", "he", "him", "his")
+PRONOUNS = {"he": ("he", "him", "his"), "she": ("she", "her", "her")}
 GIVEN = frozenset(
     {"list", "list.0", "list.1", "list.2", "rank", "reference", "step", "excluded", "taken"}
     | {"place", "place.0", "place.1", "clue", "clue.0", "clue.1", "total"}
-    | {f"{word}{number}" for word in ("person", "he", "him", "his") for number in ("", ".2")}
+    | {f"{word}{number}" for word in PERSON for number in ("", ".2")}
 )
 """Slots that are no fields of the goal."""
 _CONTEXT = ("introduction", "reinforcement", "cue")
@@ -129,7 +131,24 @@ def _scenario(written: Mapping[str, Any], head: TaskFields, where: str) -> Scena
             if not name.startswith("resolved"):
                 _check_pointers(one, fields, f"{where}, {name}")
     _check_fields(fields, head, where)
-    return Scenario(fields, texts, fields.people or general().people)
+    classes: dict[str, tuple[Text, ...]] = {}
+    for one in texts[f"say.{next(iter(fields.say))}"]:
+        kind = next((pointer.expression for pointer in pointers_in(one)), "")
+        classes[kind] = (*classes.get(kind, ()), one)
+    return Scenario(fields, texts, _people(fields, texts), tuple(fields.say), classes)
+
+
+def _people(
+    fields: ScenarioFields, texts: Mapping[str, tuple[Text, ...]]
+) -> tuple[tuple[str, ...], ...]:
+    """Return who can be spoken of, each with his or her pronouns, if the sentences speak of any."""
+    used = {name for several in texts.values() for text in several for name in slots_in(text)}
+    if used.isdisjoint(PERSON):
+        return ()
+    people = fields.people or general().people
+    return tuple(
+        (name, *PRONOUNS[gender]) for gender in PRONOUNS for name in getattr(people, gender)
+    )
 
 
 def _check_fields(fields: ScenarioFields, head: TaskFields, where: str) -> None:

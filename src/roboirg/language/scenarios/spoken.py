@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.word_pools import PoolName
 from roboirg.language.instruction import Expression, UtteranceStage
 from roboirg.language.phrases import (
     Phrase,
@@ -26,54 +29,82 @@ from roboirg.language.scenarios.choice import Chosen, choose, rival_values
 from roboirg.language.scenarios.introduced import Introduced, IntroducedValue, goal_introduced
 from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, parse, slots_in
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
-from roboirg.language.scenarios.scenario_file import general, row_of, task_scenarios, type_of
-from roboirg.language.settings import contextual
+from roboirg.language.scenarios.scenario_file import (
+    PERSON,
+    general,
+    row_of,
+    task_scenarios,
+    type_of,
+)
+from roboirg.language.settings import all_settings, contextual
 from roboirg.language.settings.setting import Setting
 
 SENTENCE_ENDS = (". ", "! ", "? ")
-PRONOUNS = {"he": ("he", "him", "his"), "she": ("she", "her", "her")}
 _EXPLICIT, _CONTEXTUAL, _DIRECT = "explicit", "contextual", "direct"
 
 
-def in_language_4(setting: Setting) -> Setting:
+class _Choice(NamedTuple):
+    """What was chosen last, for which words, and the draws that led to it."""
+
+    key: tuple[object, ...]
+    chosen: Chosen | None
+    log: list[str]
+
+
+_LAST: dict[str, _Choice] = {}
+"""By setting: all forms and stages of an episode say the same, one after the other."""
+
+
+def _choose(request: InstructionRequest, setting: str) -> _Choice:
+    name = _DIRECT if setting == _CONTEXTUAL else setting
+    key = (request.episode, request.sampler.key, request.frame, request.pool)
+    if name not in _LAST or _LAST[name].key != key:
+        log: list[str] = []
+        drawing = replace(request, sampler=replace(request.sampler, log=log))
+        known = _known(request.task.name, name, request.pool)
+        _LAST[name] = _Choice(key, choose(drawing, name, known), log)
+    return _LAST[name]
+
+
+@functools.cache
+def in_language_4(name: str) -> Setting:
     """Return a setting that speaks in scenarios."""
+    setting = all_settings()[name]
 
     def refusal(request: InstructionRequest) -> str | None:
-        words = task_scenarios(request.task.name)
-        if words is None:
+        if task_scenarios(request.task.name) is None:
             return f"language 4 has no scenarios of {request.task.name} yet"
-        if setting.name == _EXPLICIT:
+        if name == _EXPLICIT:
             return None
         reason = setting.refusal(request)
-        if reason is None and _chosen(request, setting.name, words) is None:
+        if reason is None and _choose(request, name).chosen is None:
             reason = f"language 4 has no scenario for it in the pool {request.pool}"
         return reason
 
-    return replace(setting, say=lambda request: say(request, setting.name), refusal=refusal)
+    return replace(setting, say=lambda request: say(request, name), refusal=refusal)
 
 
 def say(request: InstructionRequest, setting: str) -> InstructionSpec:
-    """Return the words of an episode in language 4."""
+    """Return the words of an episode that a setting does not refuse."""
     words = task_scenarios(request.task.name)
     if words is None:
-        raise InvalidValueError(f"Language 4 has no scenarios of {request.task.name} yet.")
+        raise InvalidValueError(f"Language 4 has no scenarios of {request.task.name}.")
     if setting == _EXPLICIT:
         command = Speech(request, words, goal_introduced(request)).command({}, ())
         return InstructionSpec((UtteranceSpec("command", command),))
-    chosen = _chosen(request, setting, words)
-    if chosen is None:
+    choice = _choose(request, setting)
+    if choice.chosen is None:
         raise InvalidValueError(f"Language 4 has no scenario for {request.episode.key}.")
-    return say_chosen(request, setting, words, chosen)
+    request.sampler.log.extend(choice.log)
+    return say_chosen(request, setting, words, choice.chosen)
 
 
-def _chosen(request: InstructionRequest, setting: str, words: TaskScenarios) -> Chosen | None:
-    name = _DIRECT if setting == _CONTEXTUAL else setting
-    known = [
-        one
-        for one in words.scenarios
-        if one.fields.setting == name and one.fields.pool == request.pool
-    ]
-    return choose(request, name, known)
+@functools.cache
+def _known(task: str, setting: str, pool: PoolName) -> tuple[Scenario, ...]:
+    """Return the scenarios of a setting in a pool."""
+    words = task_scenarios(task)
+    every = words.scenarios if words else ()
+    return tuple(one for one in every if (one.fields.setting, one.fields.pool) == (setting, pool))
 
 
 def say_chosen(
@@ -143,18 +174,12 @@ def _with_people(
     request: InstructionRequest, scenario: Scenario, introduced: Introduced
 ) -> Introduced:
     """Add two people, who are different, and their pronouns."""
-    used = {name for texts in scenario.texts.values() for text in texts for name in slots_in(text)}
-    if used.isdisjoint({"person", "he", "him", "his"}):
+    if not scenario.people:
         return introduced
-    known = [
-        (name, *PRONOUNS[gender])
-        for gender in PRONOUNS
-        for name in getattr(scenario.people, gender)
-    ]
-    order = request.sampler.cycle("people", known)
+    order = request.sampler.cycle("people", scenario.people)
     added: dict[str, tuple[IntroducedValue, ...]] = {}
     for number, words in zip(("", ".2"), (next(order), next(order)), strict=True):
-        for slot, word in zip(("person", "he", "him", "his"), words, strict=True):
+        for slot, word in zip(PERSON, words, strict=True):
             added[f"{slot}{number}"] = (IntroducedValue("", "person", word, word),)
     return introduced.with_values(**added)
 

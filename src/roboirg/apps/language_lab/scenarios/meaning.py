@@ -39,9 +39,8 @@ def meant_value(
     if chosen.remark and field == chosen.scenario.said[0]:
         return _by_remark(chosen, introduced)
     if chosen.remark and row.operation == "other":
-        left = [one.value for one in introduced.values["list"]]
-        left.remove(_by_remark(chosen, introduced))
-        return left[0]
+        taken = _by_remark(chosen, introduced)
+        return next(one.value for one in introduced.values["list"] if one.value != taken)
     return _operate(request, row, pointer, introduced)
 
 

@@ -19,6 +19,9 @@ def report_lines(report: ScenarioReport) -> Iterator[str]:
         f"  {report.tokens} of {USUAL_LIMIT} tokens; fits {counted(report.scenes, 'scene')}; "
         f"the interpreter does not read {report.refused} of {counted(report.read, 'text')}."
     )
+    if report.misread:
+        yield f"  It gets another goal from {len(report.misread)}; if you do not, tell its authors:"
+        yield f"    {report.misread[0]}"
     if report.open < report.scenes:
         closed = report.scenes - report.open
         yield f"  In {counted(closed, 'scene')} the command alone gives the goal."

@@ -58,13 +58,13 @@ def _wrong(field: str, text: Text) -> Iterator[str]:
         outside = " ".join(part for part in text if isinstance(part, str))
         values = _VALUES & set(_WORD.findall(outside.lower()))
         if field in _COMMAND:  # "twice as often as that" is a relation of the table
-            values -= {"twice", "two"} if pointers_in(text) else set()
+            values -= {"twice", "two"} if any(pointers_in(text)) else set()
         if values:
             yield f"names {', '.join(sorted(values))}, which could be a value"
         said = {part.name for part in text if isinstance(part, Slot)} - _free(_FREE_SLOTS)
         if said:
             yield f"says {{{', '.join(sorted(said))}}}; a value may only be pointed at there"
-    if field in _SILENT and any(True for _ in pointers_in(text)) and field == "distractors":
+    if field in _SILENT and any(pointers_in(text)) and field == "distractors":
         yield "points back; a distractor leads away"
     if field in ("introduction", "reinforcement", "competing") and not text:
         yield "is empty"

@@ -33,7 +33,7 @@ from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import EventRecord, Job, Record, SubgoalRecord
 from roboirg.judging.episode_replay import Event, completed_stages
 from roboirg.judging.judge import describe_object, plain_subgoal
-from roboirg.language import LANGUAGE_VERSION
+from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.language.arms import arm_episode
 from roboirg.language.number_words import times
 from roboirg.language.settings import EXPLICIT
@@ -109,7 +109,8 @@ class EpisodeDetails:
             if is_current
             else _PlayedScene(None, {}, {})
         )
-        is_known = is_current and record.language_version == LANGUAGE_VERSION
+        ours = LANGUAGE_VERSIONS.get(record.options.language)
+        is_known = is_current and record.language_version == ours
         cause, audit = record.attribution, record.prompt
         found: Details = {
             "turns": [[index(turn.stage), index(turn.text)] for turn in record.instruction],

@@ -1,0 +1,203 @@
+"""Language 4: scenarios from data files, and the checker for their authors."""
+
+import itertools
+import re
+from dataclasses import replace
+
+import pytest
+
+from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language import instruct, instruct_with, open_wordings
+from roboirg.language.arms import say_arm
+from roboirg.language.generator import find_refusal
+from roboirg.language.scenarios.scenario_file import (
+    FOLDER,
+    pointer_table,
+    read_task_scenarios,
+    task_scenarios,
+)
+from roboirg.language.variants import expressible_options
+from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import get_episode
+
+WRITTEN = [task for task in all_tasks() if task_scenarios(task)]
+DIRECT = """
+task = "PickXtimes"
+[[scenario]]
+frame = "birthday"
+pool = "train"
+setting = "direct"
+introduction = "{person} turns {repeats} today and loves the {color} cube."
+reinforcement = "{he} keeps talking about <it color: it>."
+distractors = ["The cake isn't done."]
+competing = ["{person.2} wanted the {rival color} one, but that party is over."]
+cue = "Let's surprise {him}."
+say.color = ["<it color: it>"]
+say.repeats = ["<that repeats: that many times>"]
+"""
+RIVAL = """
+task = "PickXtimes"
+[[scenario]]
+frame = "two"
+pool = "test"
+setting = "direct-rival"
+list = "repeats"
+introduction = "One says {list.0:times}, another one {list.1:times}."
+say.repeats = ["<that repeats: that many times>"]
+remarks.former = "Do <former list.0: the former>: "
+remarks.latter = "Do <latter list.1: the latter>: "
+remarks.not_former = "Not <former list.0: the former>: "
+remarks.not_latter = "Not <latter list.1: the latter>: "
+"""
+FEWER = """
+task = "PickXtimes"
+[[scenario]]
+frame = "fewer"
+pool = "train"
+setting = "reasoning"
+derive.pattern = "number deduction"
+derive.relations = ["two fewer"]
+introduction = "{person} did it {reference:times}."
+say.repeats = ["<that reference: that many times> minus {step}"]
+"""
+
+
+def spoken(task, language=4):
+    """Yield a few episodes of both pools with every option that language 4 can express."""
+    for split, index in itertools.product(("train", "test"), range(8)):
+        episode = get_episode(task, split, index)
+        for options in expressible_options(episode):
+            wanted = replace(options, language=language)
+            if find_refusal(episode, wanted) is None:
+                yield episode, wanted, instruct_with(episode, wanted)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "complaint"),
+    [
+        ("{repeats} today", "{repeat} today", "introduction has the slot 'repeat'"),
+        ("<it color: it>.", "<it color: that thing>.", "is not in pointers.toml"),
+        ("<it color: it>.", "<it color it>.", "has a bracket that is no mark"),
+        ("\ncue = ", "\nclue = ", "Object contains unknown field `clue`"),
+        ('\ncue = "Let\'s surprise {him}."', "", "'birthday' has no cue, which contextual needs"),
+        ("say.color", "say.colour", "has say.colour; the fields are color, repeats"),
+        ('pool = "train"', 'pool = "dev"', "Invalid enum value 'dev' - at `$.pool`"),
+        ('"{he}', '"\\u2019{he}', "must be printable ASCII"),
+        ("[[scenario]]", "[[scenario", "is not valid TOML"),
+        ('task = "PickXtimes"', 'task = "Juggle"', "there is no Juggle.toml"),
+    ],
+)
+def test_a_file_with_a_mistake_is_refused_by_file_scenario_and_field(before, after, complaint):
+    assert before in DIRECT
+    with pytest.raises(InvalidValueError, match=r"^mine\.toml") as found:
+        read_task_scenarios(DIRECT.replace(before, after), "mine.toml")
+    assert complaint in str(found.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "before", "after", "rule"),
+    [
+        (DIRECT, "turns {repeats} today and ", "", "points at repeats, which the introduction"),
+        (DIRECT, "loves the {color}", "saw a {color} one and the {color}", "has 2 antecedents"),
+        (DIRECT, "Let's surprise", "You saw this. Surprise", "in turns it is heard before"),
+        (DIRECT, "The cake", "The second cake", "names second, which could be a value"),
+        (DIRECT, "The cake", "Look at that cake", "may be covered"),
+        (DIRECT, 'say.color = ["', 'lead = "Twice: "\nsay.color = ["', "names twice"),
+        (DIRECT, "The cake", "The cake " + "is so very good " * 9, "at most 64 are heard"),
+        (DIRECT, "{rival color} one", "{rival color} one {list}", "no remark has another value"),
+        (RIVAL, "Not <former list.0: the", "Not <latter list.1: the", "is not in pointers"),
+        (RIVAL, "Do <former list.0: the former>", "Do <latter list.1: the latter>", "first point"),
+        (FEWER, "minus {step}", "plus {step}", "say.repeats: means"),
+        (FEWER, " {reference:times}", "", "points at reference, which the introduction"),
+        (FEWER, "minus", "without", "is not in pointers"),
+    ],
+)  # fmt: skip
+def test_the_checker_names_the_rule_that_a_scenario_breaks(text, before, after, rule):
+    scenes = scenes_of("PickXtimes", 0)[::20]
+    assert not check_scenarios(read_task_scenarios(text, "mine.toml"), None, scenes)[0].broken
+    assert before in text
+    try:
+        words = read_task_scenarios(text.replace(before, after), "mine.toml")
+        broken = list(check_scenarios(words, None, scenes)[0].broken)
+    except InvalidValueError as error:  # said no expression of the table
+        broken = [str(error)]
+    assert any(rule in one for one in broken), broken
+
+
+@pytest.mark.parametrize("task", WRITTEN)
+@pytest.mark.parametrize("step", [25, pytest.param(1, marks=pytest.mark.slow)])
+def test_no_scenario_breaks_a_rule_in_published_and_random_scenes(task, step):
+    reports = check_scenarios(task_scenarios(task), None, scenes_of(task)[::step])
+    broken = {one.scenario.name: dict(one.broken) for one in reports if one.broken}
+    rare = "fits none of the scenes"
+    assert step > 1 or not broken
+    assert not {name: found for name, found in broken.items() if set(found) != {rare}}
+
+
+@pytest.mark.parametrize("task", WRITTEN)
+def test_instructions_of_language_4_keep_the_rules_of_every_language(task):
+    commands = {}
+    for episode, options, told in spoken(task):
+        assert told.metadata["language_version"] == "4.0.0"
+        assert told == instruct_with(episode, options)
+        assert not re.search(r"[{}<>|\[\]]|  | [.,]|[.]{2}", told.text), told.text
+        for one in told.mentions:
+            assert told.span(one).strip() == told.span(one) != ""
+        if options.setting == "contextual" and options.stages == (1, 5):
+            direct = replace(options, setting="direct")
+            assert told.turns == instruct_with(episode, direct).turns
+        if options.setting == "explicit":
+            commands[episode.key] = told.command
+        if (options.setting, options.form) == ("direct", "resolved"):
+            own = commands[episode.key]
+            assert told.command.lower().endswith(own.lower())
+
+
+@pytest.mark.parametrize("kind", ["neutral", "competing"])
+def test_a_long_context_begins_with_the_shorter_one(kind):
+    episode = get_episode("PickXtimes", "train", 2)
+    few, many = (
+        instruct(episode, "contextual", language=4, distractor=kind, distractors=number).turns
+        for number in (2, 9)
+    )
+    assert (many[:4], many[-2:], len(many)) == (few[:4], few[-2:], 13)
+
+
+def test_arms_and_wording_files_say_scenarios(tmp_path):
+    episode, options = (
+        get_episode("PickXtimes", "train", 2),
+        InstructionOptions("direct", language=4),
+    )
+    told = instruct_with(episode, options).text
+    arms = [say_arm(episode, options, arm) for arm in ("paraphrase-1", "other-goal", "scrambled")]
+    assert len({told, *(one.instruction.text for one in arms)}) == 4
+    path = tmp_path / "words.toml"
+    path.write_text(
+        'name = "theirs"\n[PickXtimes]\n[PickXtimes.phrases]\n'
+        'color = {red = "the red cube", green = "the green cube", blue = "the blue cube"}\n'
+        'repeats = {1 = "once", 2 = "twice", 3 = "thrice"}\n'
+        '[[PickXtimes.commands]]\ntext = "pick up {color} {repeats}, then stop"\n'
+    )
+    outside = replace(options, wordings=open_wordings(path))
+    said = instruct_with(episode, outside)
+    assert said.turns[0] == instruct_with(episode, replace(options, wordings="train")).turns[0]
+    assert re.search(
+        r"pick (it up|up that cube|up the \w+ one|up the one I mentioned) ", said.command
+    )
+
+
+def test_language_4_is_refused_in_a_sentence_where_it_has_no_words():
+    with pytest.raises(InvalidValueError, match=r"language 4 has no scenarios of BinFill yet\.$"):
+        instruct(get_episode("BinFill", "test", 0), "direct", language=4)
+    with pytest.raises(InvalidValueError, match=r"^language is 5; it must be 3 or 4\.$"):
+        instruct(get_episode("PickXtimes", "test", 0), language=5)
+
+
+def test_the_table_of_pointers_is_closed_and_has_each_once():
+    rows = [(one.words, one.kind, of) for one in pointer_table() for of in one.of]
+    assert len(rows) == len(set(rows))
+    assert {one.name for one in FOLDER.iterdir() if one.name.endswith(".toml")} == {
+        "general.toml", "pointers.toml", *(f"{task}.toml" for task in WRITTEN),
+    }  # fmt: skip
