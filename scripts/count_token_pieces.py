@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
 from sentencepiece import SentencePieceProcessor
 
 from roboirg.core.word_pools import POOLS
-from roboirg.language.generator import instruct_with
+from roboirg.language.generator import find_refusal, instruct_with
 from roboirg.language.token_counts import split_words
 from roboirg.language.variants import expressible_options
 from roboirg.tasks import every_task
@@ -25,6 +26,8 @@ from roboirg.util.atomic_write import write_atomically
 TABLE = Path(__file__).parent.parent / "src/roboirg/language/token_pieces.json"
 EPISODES = 400
 """Random scenes for each task; their words repeat long before the last one."""
+VARIANTS = 4
+"""Texts of language 4 for each of them: its scenarios and people are many."""
 
 
 def tokenizer() -> SentencePieceProcessor:
@@ -40,6 +43,10 @@ def texts() -> Iterator[str]:
             episode = get_episode(task, "random", index)
             for options in expressible_options(episode, POOLS[index % len(POOLS)]):
                 yield instruct_with(episode, options).text
+                scenario = replace(options, language=4)
+                if find_refusal(episode, scenario) is None:
+                    for variant in range(VARIANTS):
+                        yield instruct_with(episode, scenario, variant).text
 
 
 def main() -> None:

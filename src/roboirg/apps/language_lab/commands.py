@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboirg.cli.export_commands import export_app
-from roboirg.cli.names import known_name, known_tasks
+from roboirg.cli.names import known_name, known_settings, known_tasks
 from roboirg.cli.options import (
     AnySplit,
     PlanName,
@@ -197,7 +197,7 @@ def check_scenario_file(
     path: Annotated[Path, typer.Argument(help="File of scenarios, TOML.")],
     scenario: Annotated[str | None, typer.Option(help="Check this one only, by its frame.")] = None,
     seeds: Annotated[
-        int, typer.Option(help="Random scenes for each scenario, beyond the splits.")
+        int, typer.Option(min=0, help="Random scenes for each scenario, beyond the splits.")
     ] = 200,
 ) -> None:
     """Check scenarios of language 4, and print three texts of each; exit code 2 if a rule breaks.
@@ -214,6 +214,37 @@ def check_scenario_file(
         typer.echo("\n".join(report_lines(report)))
     if broken:
         raise RoboIRGError(f"Found {counted(broken, 'broken rule')} in {path.name}.")
+
+
+@language_app.command("sample")
+def sample_texts(
+    out: Annotated[Path, typer.Option(help="Folder for the sheets and their key.")],
+    tasks: Tasks = "all",
+    settings: Settings = "all",
+    number: Annotated[
+        int, typer.Option(min=1, help="Texts of each setting, each of another frame.")
+    ] = 44,
+    anchors: Annotated[int, typer.Option(min=0, help="Texts of language 3 among them.")] = 20,
+    raters: Annotated[int, typer.Option(min=1, help="Sheets, each in an order of its own.")] = 3,
+    seed: Annotated[int, typer.Option(min=0, help="Other scenes for each seed, from 0.")] = 0,
+) -> None:
+    """Write sheets of texts of language 4 to be rated blind, from 1 to 5, and the key to them.
+
+    Example: roboirg language sample --out rating --tasks PickXtimes,StopCube
+    """
+    from roboirg.apps.language_lab.scenarios.rating_sample import draw_sample, key, sheet
+    from roboirg.util.atomic_write import write_atomically
+
+    texts = draw_sample(known_tasks(tasks), known_settings(settings), number, anchors, seed)
+    if not texts:
+        raise InvalidValueError(f"Language 4 has no words for {tasks} in {settings}.")
+    if out.exists() and not out.is_dir():
+        raise InvalidValueError(f"{str(out)!r} is a file; --out must be a folder.")
+    out.mkdir(parents=True, exist_ok=True)
+    for rater in range(1, raters + 1):
+        write_atomically(out / f"sheet-{rater}.csv", sheet(texts, rater))
+    write_atomically(out / "key.csv", key(texts))
+    typer.echo(f"{counted(len(texts), 'text')} on {counted(raters, 'sheet')}: {out}")
 
 
 def _print(*parts: RenderableType) -> None:

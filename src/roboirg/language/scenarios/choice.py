@@ -5,6 +5,7 @@ In this order, and all equally likely, so that neither class nor frame goes with
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -21,9 +22,9 @@ from roboirg.language.scenarios.introduced import (
     Introduced,
     IntroducedValue,
     as_reference,
-    goal_introduced,
-    listed,
+    goal_values,
     named,
+    several,
 )
 from roboirg.language.scenarios.markup import Text
 from roboirg.language.scenarios.scenario import Scenario
@@ -52,10 +53,14 @@ class Chosen(NamedTuple):
     remark: str = ""
 
 
+class _NoScenarioError(Exception):
+    """None of the scenarios fits the episode."""
+
+
 def choose(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
 ) -> Chosen | None:
-    """Return what is said in a setting; None if no scenario fits the episode."""
+    """Return what is said in a setting that does not refuse; None if no scenario fits."""
     colors, shown = len(request.color_values), len(request.scene_colors)
     known = [
         one
@@ -63,16 +68,18 @@ def choose(
         if (not one.fields.needs.colors or colors in one.fields.needs.colors)
         and (not one.fields.needs.shown or shown in one.fields.needs.shown)
     ]
-    return _CHOICES[setting](request, known) if known else None
+    with contextlib.suppress(_NoScenarioError):
+        return _CHOICES[setting](request, known)
+    return None
 
 
 def _drawn(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
-) -> tuple[Scenario, Text] | None:
+) -> tuple[Scenario, Text]:
     """Draw the class of the expression in the first field, and then a scenario that has it."""
     classes = sorted({kind for one in scenarios for kind in one.classes})
     if not classes:
-        return None
+        raise _NoScenarioError
     kind = request.sampler.pick(f"{setting} class", classes)
     saying = [one for one in scenarios if kind in one.classes]
     scenario = request.sampler.pick(f"{setting} scenario", saying)
@@ -87,21 +94,18 @@ def _says(scenarios: Sequence[Scenario], fields: Sequence[str], slot: str = "") 
     ]  # fmt: skip
 
 
-def _direct(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen | None:
-    base = goal_introduced(request)
+def _direct(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen:
     fields = {one.field for one in request.goal_values}
     possible = [
         one
         for one in scenarios
         if set(one.said) == fields and (not one.fields.list or _lengths(request, one))
     ]
-    found = _drawn(request, "direct", possible)
-    if found is None:
-        return None
-    scenario, words = found
+    scenario, words = _drawn(request, "direct", possible)
+    values = goal_values(request)
     if scenario.fields.list:
-        base = _with_list(request, base, scenario)
-    return Chosen(scenario, base, words)
+        values |= several("list", _list(request, scenario))
+    return Chosen(scenario, Introduced(values), words)
 
 
 def _of_slot(request: InstructionRequest, slot: str) -> list[GoalValue]:
@@ -122,8 +126,8 @@ def _lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
     return [one for one in wanted if meant <= one <= meant + len(_others(request, slot))]
 
 
-def _with_list(request: InstructionRequest, base: Introduced, scenario: Scenario) -> Introduced:
-    """Add the goal's values among others, in any order."""
+def _list(request: InstructionRequest, scenario: Scenario) -> list[IntroducedValue]:
+    """Draw the goal's values among others, in any order."""
     slot = scenario.fields.list
     own = _of_slot(request, slot)
     size = request.sampler.pick("list length", _lengths(request, scenario))
@@ -132,10 +136,10 @@ def _with_list(request: InstructionRequest, base: Introduced, scenario: Scenario
     )
     values = [named(one) for one in own] + [as_reference(own[0], one) for one in others]
     order = request.sampler.pick("list order", list(itertools.permutations(range(size))))
-    return listed(base, [values[at] for at in order], own[0].value)
+    return [values[at] for at in order]
 
 
-def _reasoning(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen | None:
+def _reasoning(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen:
     """Choose a derivation by the turn of its pattern, and then what says it."""
     offered = [
         (derivation, saying)
@@ -144,29 +148,24 @@ def _reasoning(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Ch
     ]
     patterns = list(dict.fromkeys(one.pattern for one, _ in offered))
     if not patterns:
-        return None
+        raise _NoScenarioError
     index = request.episode.index
     pattern = patterns[(index + index // BLOCK) % len(patterns)]
     derivation, saying = request.sampler.pick(
         f"{pattern} derivation", [one for one in offered if one[0].pattern == pattern]
     )
-    found = _drawn(request, "reasoning", saying)
-    if found is None:
-        return None
-    reference = derivation.values.get("reference", derivation.values.get("taken"))
+    scenario, words = _drawn(request, "reasoning", saying)
+    values = derivation.values
+    reference = values.get("reference", values.get("taken"))
     notes: dict[str, object] = {
         "pattern": pattern,
         "patterns": list(derivation.patterns or (pattern,)),
         "relation": derivation.relation,
         "reference": None if reference is None else reference[0].value,
     }
-    base = goal_introduced(request)
-    both = derivation.values.get("list")
-    if both is not None:
-        base = listed(base, both, None)
-        notes["candidates"] = {derivation.listed: [one.value for one in both]}
-    values = {**base.values, **derivation.values}
-    return Chosen(found[0], Introduced(values, None, notes), found[1])
+    if derivation.listed:
+        notes["candidates"] = {derivation.listed: [one.value for one in values["list"]]}
+    return Chosen(scenario, Introduced({**goal_values(request), **values}, notes), words)
 
 
 def _offers(scenario: Scenario, derivation: Derivation) -> bool:
@@ -179,11 +178,9 @@ def _offers(scenario: Scenario, derivation: Derivation) -> bool:
     )
 
 
-def _spatial(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen | None:
+def _spatial(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen:
     colors = request.color_values
-    found = _drawn(request, "spatial", _says(scenarios, [one.field for one in colors]))
-    if found is None:
-        return None
+    scenario, words = _drawn(request, "spatial", _says(scenarios, [one.field for one in colors]))
     marks = draw_landmarks(request)
     places = [
         IntroducedValue(color.slot, "place", color.value, mark.phrase)
@@ -194,21 +191,11 @@ def _spatial(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chos
         "landmark_classes": [mark.level for mark in marks],
         "frame": request.frame,
     }
-    return Chosen(found[0], _several(request, "place", places, notes), found[1])
+    values = {**goal_values(request), **several("place", places)}
+    return Chosen(scenario, Introduced(values, notes), words)
 
 
-def _several(
-    request: InstructionRequest,
-    name: str,
-    values: Sequence[IntroducedValue],
-    notes: Mapping[str, object],
-) -> Introduced:
-    """Return the goal's values with some more, one by one and all together."""
-    added = {name: tuple(values), **{f"{name}.{at}": (one,) for at, one in enumerate(values)}}
-    return Introduced({**goal_introduced(request).values, **added}, None, notes)
-
-
-def _grounded(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen | None:
+def _grounded(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen:
     clues: Mapping[GoalValue, Clue] = clues_of(request)
     kinds = list(dict.fromkeys(clue.kind for clue in clues.values()))
     saying = [
@@ -216,33 +203,22 @@ def _grounded(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Cho
         for one in _says(scenarios, [value.field for value in clues])
         if not one.fields.needs.clue or set(kinds) <= set(one.fields.needs.clue)
     ]
-    found = _drawn(request, "grounded", saying)
-    if found is None:
-        return None
-    values = [
-        IntroducedValue(one.slot, "clue", one.value, clue.words) for one, clue in clues.items()
-    ]
+    scenario, words = _drawn(request, "grounded", saying)
+    seen = [IntroducedValue(one.slot, "clue", one.value, clue.words) for one, clue in clues.items()]
     touched = list(dict.fromkeys(one.slot for one in clues))
     notes: dict[str, object] = {"touched": touched, "pattern": kinds[0], "patterns": kinds}
-    return Chosen(found[0], _several(request, "clue", values, notes), found[1])
+    values = {**goal_values(request), **several("clue", seen)}
+    return Chosen(scenario, Introduced(values, notes), words)
 
 
-def _rival(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen | None:
+def _rival(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen:
     """Choose a pair as in language 3, whose partners make both values equally likely."""
     pairs = rival_pairs(replace(request, sampler=sampler_of(request.episode)))
-    if not pairs:
-        return None
-    pair = balanced_rival(request, pairs)
-    order = draw_order(request)
+    pair, order = balanced_rival(request, pairs), draw_order(request)
     fields = [one.field for one in pair if pair.ordered or one is pair.meant]
-    found = _drawn(request, "rival", _says(scenarios, fields, pair.slot))
-    if found is None:
-        return None
-    meant, rival = (
-        named(pair.meant),
-        IntroducedValue(pair.rival.slot, pair.meant.slot_type, pair.rival.value),
-    )
-    both = (meant, rival) if order.meant_first else (rival, meant)
+    scenario, words = _drawn(request, "rival", _says(scenarios, fields, pair.slot))
+    rival = IntroducedValue(pair.rival.slot, pair.meant.slot_type, pair.rival.value)
+    both = (named(pair.meant), rival) if order.meant_first else (rival, named(pair.meant))
     aimed = "former" if order.meant_first == order.points_at_meant else "latter"
     remark = aimed if order.points_at_meant else f"not_{aimed}"
     notes: dict[str, object] = {
@@ -252,13 +228,11 @@ def _rival(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen
         "rival_reference": remark,
         "candidates": {pair.slot: [one.value for one in both]},
     }
-    base = listed(goal_introduced(request), both, pair.meant.value)
-    taken = {"taken": (rival._replace(slot=REFERENCE),)}
-    introduced = Introduced({**base.values, **taken}, base.position, notes)
-    return Chosen(found[0], introduced, found[1], remark)
+    values = {**goal_values(request), **several("list", both), "taken": (rival,)}
+    return Chosen(scenario, Introduced(values, notes), words, remark)
 
 
-_CHOICES: Mapping[str, Callable[[InstructionRequest, Sequence[Scenario]], Chosen | None]] = {
+_CHOICES: Mapping[str, Callable[[InstructionRequest, Sequence[Scenario]], Chosen]] = {
     "direct": _direct,
     "reasoning": _reasoning,
     "spatial": _spatial,

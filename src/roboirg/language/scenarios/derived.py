@@ -14,7 +14,7 @@ from roboirg.language.patterns.exclusion import excluded_colors
 from roboirg.language.patterns.sequence import open_steps
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.rivals.value_pair import ValuePair, possible_pairs
-from roboirg.language.scenarios.introduced import IntroducedValue, as_reference
+from roboirg.language.scenarios.introduced import IntroducedValue, as_reference, several
 from roboirg.language.slot_types.ordinal import series_length
 from roboirg.language.templates import derivations
 
@@ -105,5 +105,5 @@ def _other(request: InstructionRequest) -> Iterator[Derivation]:
         pair: ValuePair = request.sampler.pick(f"complement {slot}", of_slot)
         both = [IntroducedValue(REFERENCE, one.slot_type, one.value) for one in pair]
         first, second = request.sampler.pick("complement order", ((0, 1), (1, 0)))
-        values = {"list": (both[first], both[second]), "taken": (both[1],)}
+        values = {**several("list", (both[first], both[second])), "taken": (both[1],)}
         yield Derivation("contextual logic", None, (pair.meant.field,), values, listed=slot)

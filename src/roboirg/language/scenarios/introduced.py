@@ -50,16 +50,11 @@ class Introduced:
 
     Attributes:
         values: one or several for each slot; those of a list in its order.
-        position: of the meant value in the list, from 0; None without a list.
         notes: entries of the metadata.
     """
 
     values: Mapping[str, tuple[IntroducedValue, ...]]
-    position: int | None = None
     notes: Mapping[str, object] = field(default_factory=dict)
-
-    def __contains__(self, name: object) -> bool:
-        return name in self.values
 
     def count(self, controller: str) -> int:
         """Return the number with which words agree: that of a slot, or how many values it has."""
@@ -89,16 +84,18 @@ class Introduced:
         slot = slots.pop() if len(slots) == 1 else REFERENCE
         return slot, " and ".join(str(one.value) for one in found)
 
-    def rank(self, *, ordinals: bool) -> Expression:
-        """Return the class of the words for the meant value's position in the list."""
-        if self.position is None:
-            raise LookupError("there is no list")
-        pair = len(self.values["list"]) == len(FORMER)
-        return FORMER[self.position] if pair and not ordinals else RANKS[self.position]
+    def ranked(self, name: str, *, ordinals: bool) -> tuple[Introduced, Expression]:
+        """Return the same with the rank of a slot's value in the list, and the rank's class."""
+        members = [one.value for one in self.values["list"]]
+        at = members.index(self.values[name][0].value)
+        pair = len(members) == len(FORMER)
+        words = f"the {FORMER[at]}" if pair else f"the {RANKS[at]} one"
+        rank = IntroducedValue("", "rank", at + 1, words)
+        return self.with_values(rank=(rank,)), FORMER[at] if pair and not ordinals else RANKS[at]
 
     def with_values(self, **added: tuple[IntroducedValue, ...]) -> Introduced:
         """Return the same with further slots."""
-        return Introduced({**self.values, **added}, self.position, self.notes)
+        return Introduced({**self.values, **added}, self.notes)
 
 
 def named(value: GoalValue) -> IntroducedValue:
@@ -111,23 +108,16 @@ def as_reference(value: GoalValue, other: str | int) -> IntroducedValue:
     return IntroducedValue(REFERENCE, value.slot_type, other)
 
 
-def goal_introduced(request: InstructionRequest) -> Introduced:
+def goal_values(request: InstructionRequest) -> dict[str, tuple[IntroducedValue, ...]]:
     """Return the values of the goal by field, and all of a slot with several by its name."""
-    found: dict[str, tuple[IntroducedValue, ...]]
     found = {one.field: (named(one),) for one in request.goal_values}
-    for slot in {one.slot for one in request.goal_values}:
-        found.setdefault(slot, tuple(named(one) for one in request.goal_values if one.slot == slot))
-    return Introduced(found)
+    slots = {one.slot for one in request.goal_values} - set(found)
+    together = {
+        slot: tuple(named(one) for one in request.goal_values if one.slot == slot) for slot in slots
+    }
+    return {**found, **together}
 
 
-def listed(
-    base: Introduced, values: Sequence[IntroducedValue], meant: str | int | None
-) -> Introduced:
-    """Return the same with a list, in which the meant value has the position of its rank."""
-    found = {f"list.{at}": (one,) for at, one in enumerate(values)} | {"list": tuple(values)}
-    position = None if meant is None else [one.value for one in values].index(meant)
-    if position is not None:
-        pair, rank = len(values) == len(FORMER), RANKS[position]
-        words = f"the {FORMER[position]}" if pair else f"the {rank} one"
-        found["rank"] = (IntroducedValue("", "rank", position + 1, words),)
-    return Introduced({**base.values, **found}, position, base.notes)
+def several(name: str, values: Sequence[IntroducedValue]) -> dict[str, tuple[IntroducedValue, ...]]:
+    """Return the slots of several values: one by one, and all together."""
+    return {name: tuple(values), **{f"{name}.{at}": (one,) for at, one in enumerate(values)}}

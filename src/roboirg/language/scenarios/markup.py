@@ -115,16 +115,3 @@ def slots_in(text: Text) -> Iterator[str]:
         elif isinstance(part, Pointer):
             yield part.of
             yield from slots_in(part.parts)
-
-
-def literal(text: Text) -> str:
-    """Return the words that are always said, with a gap for each slot: ``Put it on, _ times.``."""
-    words = []
-    for part in text:
-        if isinstance(part, Pointer):
-            words.append(literal(part.parts))
-        elif isinstance(part, Agreement):
-            words.append(f"{part.one} {part.many}")
-        else:
-            words.append("_" if isinstance(part, Slot) else part)
-    return "".join(words)

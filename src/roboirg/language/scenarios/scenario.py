@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 
@@ -125,9 +125,10 @@ class General(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TaskFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A task's file as written, but for its scenarios."""
+    """A task's file, with its scenarios as they were written."""
 
     task: str
+    scenario: tuple[dict[str, Any], ...] = ()
     commands: Mapping[PoolName, Texts] = {}
     stated: Mapping[str, str] = {}
 

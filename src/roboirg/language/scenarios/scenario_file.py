@@ -53,7 +53,7 @@ _AGAIN = re.compile(r"\{step:[a-z -]+\}")
 def pointer_table() -> tuple[PointerRow, ...]:
     """Return the closed table of pointers."""
     data = _toml(FOLDER.joinpath("pointers.toml").read_text(encoding="utf-8"), "pointers.toml")
-    return _as(tuple[PointerRow, ...], data.get("pointer", []), "pointers.toml")
+    return _as(tuple[PointerRow, ...], data["pointer"], "pointers.toml")
 
 
 @functools.cache
@@ -79,10 +79,7 @@ def read_task_scenarios(text: str, where: str) -> TaskScenarios:
         InvalidValueError: it is not as `docs/add-scenario.md` says.
     """
     data = _toml(text, where)
-    written = data.pop("scenario", [])
-    head = _as(TaskFields, data, where)
-    if not head.commands:
-        head = _with_own_commands(head, where)
+    head = _head(data, where)
     commands = {
         pool: tuple(_parsed(one, f"{where}, commands") for one in texts)
         for pool, texts in head.commands.items()
@@ -90,7 +87,7 @@ def read_task_scenarios(text: str, where: str) -> TaskScenarios:
     stated = {name: _parsed(one, f"{where}, stated") for name, one in head.stated.items()}
     scenarios = tuple(
         _scenario(one, head, f"{where}, scenario {one.get('frame', number)!r}")
-        for number, one in enumerate(written, 1)
+        for number, one in enumerate(data.get("scenario", ()), 1)
     )
     names = [(one.fields.pool, one.name) for one in scenarios]
     for name in names:
@@ -99,14 +96,16 @@ def read_task_scenarios(text: str, where: str) -> TaskScenarios:
     return TaskScenarios(head.task, commands, stated, scenarios)
 
 
-def _with_own_commands(head: TaskFields, where: str) -> TaskFields:
-    """Return the head of a file that has scenarios alone, with the commands of the task's own."""
+def _head(data: dict[str, Any], where: str) -> TaskFields:
+    """Return a file's head; a file of scenarios alone has that of the task's own file."""
+    head = _as(TaskFields, data, where)
     path = FOLDER.joinpath(f"{head.task}.toml")
+    if head.commands:
+        return head
     if not path.is_file():
         _fail(where, f"has no commands, and there is no {path.name} to take them from")
-    data = _toml(path.read_text(encoding="utf-8"), path.name)
-    data.pop("scenario", None)
-    return _as(TaskFields, data, path.name)
+    own = _toml(path.read_text(encoding="utf-8"), path.name)
+    return _as(TaskFields, own, path.name)
 
 
 def _scenario(written: Mapping[str, Any], head: TaskFields, where: str) -> Scenario:

@@ -6,11 +6,11 @@ import functools
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.word_pools import PoolName
-from roboirg.language.instruction import Expression, UtteranceStage
+from roboirg.language.instruction import Expression
 from roboirg.language.phrases import (
     Phrase,
     TaggedText,
@@ -26,7 +26,7 @@ from roboirg.language.request import (
     UtteranceSpec,
 )
 from roboirg.language.scenarios.choice import Chosen, choose, rival_values
-from roboirg.language.scenarios.introduced import Introduced, IntroducedValue, goal_introduced
+from roboirg.language.scenarios.introduced import Introduced, IntroducedValue, goal_values
 from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, parse, slots_in
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.scenario_file import (
@@ -41,6 +41,8 @@ from roboirg.language.settings.setting import Setting
 
 SENTENCE_ENDS = (". ", "! ", "? ")
 _EXPLICIT, _CONTEXTUAL, _DIRECT = "explicit", "contextual", "direct"
+_STATING = ("direct", "direct-rival")
+"""Settings whose resolved form states the value; the others keep how it follows."""
 
 
 class _Choice(NamedTuple):
@@ -85,18 +87,14 @@ def in_language_4(name: str) -> Setting:
 
 
 def say(request: InstructionRequest, setting: str) -> InstructionSpec:
-    """Return the words of an episode that a setting does not refuse."""
-    words = task_scenarios(request.task.name)
-    if words is None:
-        raise InvalidValueError(f"Language 4 has no scenarios of {request.task.name}.")
+    """Return the words of an episode that the setting does not refuse."""
+    words = cast("TaskScenarios", task_scenarios(request.task.name))
     if setting == _EXPLICIT:
-        command = Speech(request, words, goal_introduced(request)).command({}, ())
-        return InstructionSpec((UtteranceSpec("command", command),))
+        speech = Speech(request, words, Introduced(goal_values(request)))
+        return InstructionSpec((UtteranceSpec("command", speech.command({}, ())),))
     choice = _choose(request, setting)
-    if choice.chosen is None:
-        raise InvalidValueError(f"Language 4 has no scenario for {request.episode.key}.")
     request.sampler.log.extend(choice.log)
-    return say_chosen(request, setting, words, choice.chosen)
+    return say_chosen(request, setting, words, cast("Chosen", choice.chosen))
 
 
 @functools.cache
@@ -111,28 +109,21 @@ def say_chosen(
     request: InstructionRequest, setting: str, words: TaskScenarios, chosen: Chosen
 ) -> InstructionSpec:
     """Return the words of a scenario."""
-    scenario = chosen.scenario
-    introduced = _with_people(request, scenario, chosen.introduced)
-    speech = Speech(request, words, introduced, scenario)
-    utterances = [_utterance("introduction", speech.phrase(scenario.text("introduction")))]
-    notes: dict[str, object] = {**introduced.notes, "scenario": scenario.fields.frame}
+    scenario, options = chosen.scenario, request.options
+    speech = Speech(request, words, _with_people(request, chosen), scenario)
+    utterances = [UtteranceSpec("introduction", speech.phrase(scenario.text("introduction")))]
+    notes: dict[str, object] = {**chosen.introduced.notes, "scenario": scenario.fields.frame}
     if setting == _CONTEXTUAL:
         utterances += _stages(request, speech, scenario)
-        notes |= _stage_notes(request)
-    fields = {name: speech.field(name, _words_for(request, chosen, name)) for name in scenario.said}
-    utterances.append(_utterance("command", speech.command(fields, _lead(request, chosen))))
-    return InstructionSpec(tuple(utterances), notes)
-
-
-def _utterance(stage: UtteranceStage, phrase: Phrase) -> UtteranceSpec:
-    return UtteranceSpec(stage, phrase)
-
-
-def _words_for(request: InstructionRequest, chosen: Chosen, field: str) -> Text:
-    """Return the words for a field; for the first one they are chosen."""
-    if field == chosen.scenario.said[0]:
-        return chosen.first
-    return request.sampler.pick(f"{field} words", chosen.scenario.of_kind(f"say.{field}"))
+        notes["stages"] = list(options.stages)
+        if contextual.DISTRACTOR in options.stages:
+            notes |= {"distractor": options.distractor, "distractors": options.distractors}
+    said = {scenario.said[0]: chosen.first}
+    for name in scenario.said[1:]:
+        said[name] = request.sampler.pick(f"{name} words", scenario.texts[f"say.{name}"])
+    fields = {name: speech.field(name, text) for name, text in said.items()}
+    command = speech.command(fields, _lead(request, chosen))
+    return InstructionSpec((*utterances, UtteranceSpec("command", command)), notes)
 
 
 def _lead(request: InstructionRequest, chosen: Chosen) -> Text:
@@ -140,10 +131,9 @@ def _lead(request: InstructionRequest, chosen: Chosen) -> Text:
     scenario = chosen.scenario
     if request.resolved and "resolved.lead" in scenario.texts:
         return scenario.text("resolved.lead")
-    remark: Text = ()
-    if chosen.remark:
-        options = scenario.of_kind(f"remarks.{chosen.remark}")
-        remark = request.sampler.pick("remark", options)
+    if not chosen.remark:
+        return scenario.text("lead")
+    remark = request.sampler.pick("remark", scenario.texts[f"remarks.{chosen.remark}"])
     return (*scenario.text("lead"), *remark)
 
 
@@ -153,35 +143,26 @@ def _stages(
     """Yield the stages between introduction and command that are asked for."""
     stages, options = request.options.stages, request.options
     if contextual.REINFORCEMENT in stages:
-        yield _utterance("reinforcement", speech.phrase(scenario.text("reinforcement")))
+        yield UtteranceSpec("reinforcement", speech.phrase(scenario.text("reinforcement")))
     if contextual.DISTRACTOR in stages:
-        source = speech.competing() if options.distractor == "competing" else speech.neutral()
-        for phrase in itertools.islice(source, options.distractors):
-            yield _utterance("distractor", phrase)
+        remarks = speech.competing if options.distractor == "competing" else speech.neutral
+        for phrase in itertools.islice(remarks(scenario), options.distractors):
+            yield UtteranceSpec("distractor", phrase)
     if contextual.CUE in stages:
-        yield _utterance("cue", speech.phrase(scenario.text("cue")))
+        yield UtteranceSpec("cue", speech.phrase(scenario.text("cue")))
 
 
-def _stage_notes(request: InstructionRequest) -> dict[str, object]:
-    options = request.options
-    notes: dict[str, object] = {"stages": list(options.stages)}
-    if contextual.DISTRACTOR in options.stages:
-        notes |= {"distractor": options.distractor, "distractors": options.distractors}
-    return notes
-
-
-def _with_people(
-    request: InstructionRequest, scenario: Scenario, introduced: Introduced
-) -> Introduced:
-    """Add two people, who are different, and their pronouns."""
-    if not scenario.people:
-        return introduced
-    order = request.sampler.cycle("people", scenario.people)
-    added: dict[str, tuple[IntroducedValue, ...]] = {}
-    for number, words in zip(("", ".2"), (next(order), next(order)), strict=True):
-        for slot, word in zip(PERSON, words, strict=True):
-            added[f"{slot}{number}"] = (IntroducedValue("", "person", word, word),)
-    return introduced.with_values(**added)
+def _with_people(request: InstructionRequest, chosen: Chosen) -> Introduced:
+    """Add two people, who are different, and their pronouns, to what is introduced."""
+    if not chosen.scenario.people:
+        return chosen.introduced
+    order = request.sampler.cycle("people", chosen.scenario.people)
+    added = {
+        f"{slot}{number}": (IntroducedValue("", "person", word, word),)
+        for number in ("", ".2")
+        for slot, word in zip(PERSON, next(order), strict=True)
+    }
+    return chosen.introduced.with_values(**added)
 
 
 class Speech:
@@ -223,14 +204,11 @@ class Speech:
 
     def _pointing(self, pointer: Pointer) -> Phrase:
         """Return words that point back."""
-        words = self._joined(self.phrase(pointer.parts))
-        slot, value = self._introduced.referent(pointer.of)
-        return anaphor(words, self._expression(pointer), slot, value)
-
-    def _expression(self, pointer: Pointer) -> Expression:
+        values, kind = self._introduced, cast("Expression", pointer.expression)
         if pointer.expression == "rank":
-            return self._introduced.rank(ordinals="ordinal" in pointer.words)
-        return pointer.expression  # type: ignore[return-value]  # one of the table's classes
+            values, kind = values.ranked(pointer.of, ordinals="ordinal" in pointer.words)
+        words = self._joined(self.phrase(pointer.parts, values))
+        return anaphor(words, kind, *values.referent(pointer.of))
 
     def resolved(self, text: Text) -> Phrase:
         """Return words with the referent for every pointer."""
@@ -261,12 +239,10 @@ class Speech:
         """Return the words for a field of the command, resolved if these are asked for."""
         if not self._request.resolved:
             return self.phrase(words)
-        scenario = self._scenario
-        if scenario is not None and f"resolved.{name}" in scenario.texts:
-            return self.resolved(scenario.text(f"resolved.{name}"))
-        if scenario is not None and scenario.fields.setting in ("direct", "direct-rival"):
+        scenario, own = self._scenario, f"resolved.{name}"
+        if scenario and own not in scenario.texts and scenario.fields.setting in _STATING:
             return self.phrase(self._words.stated[name])
-        return self.resolved(words)
+        return self.resolved(scenario.texts.get(own, (words,))[0] if scenario else words)
 
     def command(self, fields: Mapping[str, Phrase], lead: Text) -> Phrase:
         """Return the command with the words for some fields; the others state their values."""
@@ -321,26 +297,21 @@ class Speech:
             words = core
         return self._request.around(name, words)
 
-    def neutral(self) -> Iterator[Phrase]:
+    def neutral(self, scenario: Scenario) -> Iterator[Phrase]:
         """Yield remarks: first the scenario's own, then those about anything, for ever."""
-        yield from map(self.phrase, self._scenario.of_kind("distractors") if self._scenario else ())
+        yield from map(self.phrase, scenario.of_kind("distractors"))
         known = general().distractors[self._request.pool]
         yield from map(plain, self._request.sampler.cycle("distractor", known))
 
-    def competing(self) -> Iterator[Phrase]:
+    def competing(self, scenario: Scenario) -> Iterator[Phrase]:
         """Yield the scenario's remarks about other values, in any order, for ever."""
-        scenario = self._scenario
-        found = [
+        found = dict.fromkeys(
             self.phrase(text, values)
-            for text in (scenario.of_kind("competing") if scenario else ())
+            for text in scenario.of_kind("competing")
             for values in rival_values(self._request, self._introduced)
             if set(slots_in(text)) <= set(values.values)
-        ]
-        if not found:
-            raise InvalidValueError(
-                f"Language 4 has no competing remark for {self._request.episode.key}."
-            )
-        return self._request.sampler.cycle("competing distractor", list(dict.fromkeys(found)))
+        )
+        return self._request.sampler.cycle("competing distractor", list(found))
 
     @staticmethod
     def _joined(phrase: Phrase) -> str:

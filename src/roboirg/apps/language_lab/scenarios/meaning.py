@@ -41,7 +41,7 @@ def meant_value(
     if chosen.remark and row.operation == "other":
         taken = _by_remark(chosen, introduced)
         return next(one.value for one in introduced.values["list"] if one.value != taken)
-    return _operate(request, row, pointer, introduced)
+    return _operate(request, row, pointer, introduced, chosen.introduced)
 
 
 def _by_remark(chosen: Chosen, introduced: Introduced) -> Value:
@@ -52,15 +52,20 @@ def _by_remark(chosen: Chosen, introduced: Introduced) -> Value:
 
 
 def _operate(
-    request: InstructionRequest, row: PointerRow, pointer: Pointer, introduced: Introduced
+    request: InstructionRequest,
+    row: PointerRow,
+    pointer: Pointer,
+    introduced: Introduced,
+    original: Introduced,
 ) -> Value:
+    """Return what an operation gives; a rank is that of the original introduction."""
     values = introduced.values
     operation = row.operation
     if operation == "rank":
         listed = values.get("list") or values.get(pointer.of.partition(".")[0], ())
         expression: Expression | str = pointer.expression
         if expression == "rank":
-            expression = introduced.rank(ordinals="ordinal" in pointer.words)
+            _, expression = original.ranked(pointer.of, ordinals="ordinal" in pointer.words)
         at = _RANKS[expression]
         return listed[at].value if at < len(listed) else None
     if operation == "other":
@@ -119,7 +124,7 @@ def exchanged(request: InstructionRequest, introduced: Introduced) -> Introduced
         elif name == "excluded":
             target = request.color_values[0].value
             values[name] = (found[0]._replace(value=target), *found[1:])
-    return Introduced(values, introduced.position, introduced.notes)
+    return Introduced(values, introduced.notes)
 
 
 def _another(request: InstructionRequest, one: IntroducedValue) -> str | int:

@@ -24,6 +24,7 @@ from roboirg.language.scenarios.choice import Chosen, choose, rival_values
 from roboirg.language.scenarios.markup import slots_in
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.spoken import say_chosen
+from roboirg.language.settings import all_settings
 from roboirg.language.token_counts import ADDED_TOKENS, USUAL_LIMIT, count_tokens
 from roboirg.reader import interpret
 from roboirg.tasks.splits.splits import SIZES, get_episode
@@ -158,6 +159,8 @@ def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episod
     chosen: Chosen | None = None
     for form in FORMS:
         request = request_of(episode, replace(options, form=form))
+        if all_settings()[name].refusal(request) is not None:
+            return
         try:
             chosen = choose(request, scenario.fields.setting, [scenario])
             if chosen is None:

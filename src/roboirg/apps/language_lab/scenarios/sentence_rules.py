@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Mapping
 from roboirg.core.episode import ALL_COLORS
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import CARDINALS, ORDINALS
-from roboirg.language.scenarios.markup import Slot, Text, literal, pointers_in
+from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, pointers_in
 from roboirg.language.scenarios.scenario import Scenario
 
 NEVER: Mapping[str, str] = {
@@ -118,3 +118,16 @@ def _is_named(name: str, named: Collection[str], scenario: Scenario) -> bool:
     # A value of the goal is one of the list, or follows from a reference.
     derived = {"list", "excluded", REFERENCE, "clue", "place"} & set(named)
     return bool(derived) if base == listed or scenario.fields.derive else False
+
+
+def literal(text: Text) -> str:
+    """Return the words that are always said, with a gap for each slot: ``Put it on, _ times.``."""
+    words = []
+    for part in text:
+        if isinstance(part, Pointer):
+            words.append(literal(part.parts))
+        elif isinstance(part, Agreement):
+            words.append(f"{part.one} {part.many}")
+        else:
+            words.append("_" if isinstance(part, Slot) else part)
+    return "".join(words)
