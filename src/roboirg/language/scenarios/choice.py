@@ -61,12 +61,12 @@ def choose(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
 ) -> Chosen | None:
     """Return what is said in a setting that does not refuse; None if no scenario fits."""
-    colors, shown = len(request.color_values), len(request.scene_colors)
+    colors = len(request.color_values)
     known = [
         one
         for one in scenarios
         if (not one.fields.needs.colors or colors in one.fields.needs.colors)
-        and (not one.fields.needs.shown or shown in one.fields.needs.shown)
+        and (not one.fields.needs.shown or len(request.scene_colors) in one.fields.needs.shown)
     ]
     with contextlib.suppress(_NoScenarioError):
         return _CHOICES[setting](request, known)
@@ -96,15 +96,15 @@ def _says(scenarios: Sequence[Scenario], fields: Sequence[str], slot: str = "") 
 
 def _direct(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen:
     fields = {one.field for one in request.goal_values}
+    saying = [one for one in scenarios if set(one.said) == fields]
+    others = {slot: _others(request, slot) for slot in {one.fields.list for one in saying} if slot}
     possible = [
-        one
-        for one in scenarios
-        if set(one.said) == fields and (not one.fields.list or _lengths(request, one))
-    ]
+        one for one in saying if not one.fields.list or _lengths(request, one, others)
+    ]  # fmt: skip
     scenario, words = _drawn(request, "direct", possible)
     values = goal_values(request)
     if scenario.fields.list:
-        values |= several("list", _list(request, scenario))
+        values |= several("list", _list(request, scenario, others))
     return Chosen(scenario, Introduced(values), words)
 
 
@@ -114,27 +114,28 @@ def _of_slot(request: InstructionRequest, slot: str) -> list[GoalValue]:
 
 def _others(request: InstructionRequest, slot: str) -> list[str | int]:
     """Return the values that a slot could have in the scene, without those that it has."""
-    values = {one.value for one in _of_slot(request, slot)}
-    possible = dict.fromkeys(value for one in request.alternatives(slot) for value in one)
-    return [value for value in possible if value not in values]
+    own = {one.value for one in _of_slot(request, slot)}
+    return [one for one in dict.fromkeys(sum(request.alternatives(slot), ())) if one not in own]
 
 
-def _lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
-    """Return the lengths that the list of a scenario can have in an episode."""
+def _lengths(
+    request: InstructionRequest, scenario: Scenario, others: Mapping[str, Sequence[str | int]]
+) -> list[int]:
+    """Return the lengths that the list of a scenario can have, given other values by slot."""
     slot, wanted = scenario.fields.list, scenario.fields.needs.list or LENGTHS
     meant = len(_of_slot(request, slot))
-    return [one for one in wanted if meant <= one <= meant + len(_others(request, slot))]
+    return [one for one in wanted if meant <= one <= meant + len(others[slot])]
 
 
-def _list(request: InstructionRequest, scenario: Scenario) -> list[IntroducedValue]:
+def _list(
+    request: InstructionRequest, scenario: Scenario, others: Mapping[str, Sequence[str | int]]
+) -> list[IntroducedValue]:
     """Draw the goal's values among others, in any order."""
-    slot = scenario.fields.list
-    own = _of_slot(request, slot)
-    size = request.sampler.pick("list length", _lengths(request, scenario))
-    others = request.sampler.pick(
-        "listed others", list(itertools.permutations(_others(request, slot), size - len(own)))
-    )
-    values = [named(one) for one in own] + [as_reference(own[0], one) for one in others]
+    own = _of_slot(request, scenario.fields.list)
+    size = request.sampler.pick("list length", _lengths(request, scenario, others))
+    left = list(itertools.permutations(others[scenario.fields.list], size - len(own)))
+    values = [named(one) for one in own]
+    values += [as_reference(own[0], one) for one in request.sampler.pick("listed others", left)]
     order = request.sampler.pick("list order", list(itertools.permutations(range(size))))
     return [values[at] for at in order]
 

@@ -82,9 +82,8 @@ def _counted(reference: IntroducedValue, offset: int) -> dict[str, tuple[Introdu
 def _excluded(request: InstructionRequest) -> Iterator[Derivation]:
     """Yield the color that is left without others, and a second one: of these, the other one."""
     colors = request.color_values
-    if request.values_of("amount") or len(colors) not in (1, 2):
-        return
-    if len(colors) > 1 and len(request.scene_colors) < ALL_COLORS:
+    fits = len(colors) == 1 or (len(colors), len(request.scene_colors)) == (2, ALL_COLORS)
+    if request.values_of("amount") or not fits:
         return
     excluded = excluded_colors(request)
     values = {"excluded": tuple(IntroducedValue(REFERENCE, "color", one) for one in excluded)}

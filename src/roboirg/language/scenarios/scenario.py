@@ -138,12 +138,12 @@ class TaskScenarios(msgspec.Struct, frozen=True):
 
     Attributes:
         task: its name.
-        commands: skeletons by pool, each with its fields.
+        commands: skeletons, by pool and fields.
         stated: the words that state a field's value.
         scenarios: all of them.
     """
 
     task: str
-    commands: Mapping[PoolName, tuple[Text, ...]]
+    commands: Mapping[tuple[PoolName, frozenset[str]], tuple[Text, ...]]
     stated: Mapping[str, Text]
     scenarios: tuple[Scenario, ...]

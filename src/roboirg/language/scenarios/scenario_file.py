@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from importlib.resources import files
@@ -14,6 +13,7 @@ import msgspec
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
+from roboirg.core.word_pools import PoolName
 from roboirg.language.patterns import PATTERNS
 from roboirg.language.scenarios.markup import (
     Agreement,
@@ -46,7 +46,6 @@ GIVEN = frozenset(
 )
 """Slots that are no fields of the goal."""
 _CONTEXT = ("introduction", "reinforcement", "cue")
-_AGAIN = re.compile(r"\{step:[a-z -]+\}")
 
 
 @functools.cache
@@ -80,10 +79,11 @@ def read_task_scenarios(text: str, where: str) -> TaskScenarios:
     """
     data = _toml(text, where)
     head = _head(data, where)
-    commands = {
-        pool: tuple(_parsed(one, f"{where}, commands") for one in texts)
-        for pool, texts in head.commands.items()
-    }
+    commands: dict[tuple[PoolName, frozenset[str]], tuple[Text, ...]] = {}
+    for pool, texts in head.commands.items():
+        for command in (_parsed(one, f"{where}, commands") for one in texts):
+            of = (pool, frozenset(slots_in(command)))
+            commands[of] = (*commands.get(of, ()), command)
     stated = {name: _parsed(one, f"{where}, stated") for name, one in head.stated.items()}
     scenarios = tuple(
         _scenario(one, head, f"{where}, scenario {one.get('frame', number)!r}")

@@ -39,7 +39,6 @@ from roboirg.language.scenarios.scenario_file import (
 from roboirg.language.settings import all_settings, contextual
 from roboirg.language.settings.setting import Setting
 
-SENTENCE_ENDS = (". ", "! ", "? ")
 _EXPLICIT, _CONTEXTUAL, _DIRECT = "explicit", "contextual", "direct"
 _STATING = ("direct", "direct-rival")
 """Settings whose resolved form states the value; the others keep how it follows."""
@@ -57,42 +56,50 @@ _LAST: dict[str, _Choice] = {}
 """By setting: all forms and stages of an episode say the same, one after the other."""
 
 
-def _choose(request: InstructionRequest, setting: str) -> _Choice:
-    name = _DIRECT if setting == _CONTEXTUAL else setting
-    key = (request.episode, request.sampler.key, request.frame, request.pool)
-    if name not in _LAST or _LAST[name].key != key:
+def _last(request: InstructionRequest, name: str) -> _Choice | None:
+    """Return the choice for a request if it was the last one."""
+    last = _LAST.get(name)
+    return last if last and last.key == _key(request) else None
+
+
+def _key(request: InstructionRequest) -> tuple[object, ...]:
+    own = request.wordings is None
+    return (request.episode, request.sampler.key, request.frame, request.pool, own)
+
+
+def _choose(request: InstructionRequest, name: str) -> _Choice:
+    choice = _last(request, name)
+    if choice is None:
         log: list[str] = []
         drawing = replace(request, sampler=replace(request.sampler, log=log))
         known = _known(request.task.name, name, request.pool)
-        _LAST[name] = _Choice(key, choose(drawing, name, known), log)
-    return _LAST[name]
+        choice = _LAST[name] = _Choice(_key(request), choose(drawing, name, known), log)
+    return choice
 
 
 @functools.cache
 def in_language_4(name: str) -> Setting:
     """Return a setting that speaks in scenarios."""
-    setting = all_settings()[name]
+    setting, of = all_settings()[name], _DIRECT if name == _CONTEXTUAL else name
 
     def refusal(request: InstructionRequest) -> str | None:
         if task_scenarios(request.task.name) is None:
             return f"language 4 has no scenarios of {request.task.name} yet"
-        if name == _EXPLICIT:
-            return None
-        reason = setting.refusal(request)
-        if reason is None and _choose(request, name).chosen is None:
-            reason = f"language 4 has no scenario for it in the pool {request.pool}"
-        return reason
+        reason = None if _last(request, of) else setting.refusal(request)
+        if reason or name == _EXPLICIT or _choose(request, of).chosen:
+            return reason
+        return f"language 4 has no scenario for it in the pool {request.pool}"
 
-    return replace(setting, say=lambda request: say(request, name), refusal=refusal)
+    return replace(setting, say=lambda request: say(request, name, of), refusal=refusal)
 
 
-def say(request: InstructionRequest, setting: str) -> InstructionSpec:
-    """Return the words of an episode that the setting does not refuse."""
+def say(request: InstructionRequest, setting: str, of: str) -> InstructionSpec:
+    """Return the words of an episode in a setting, which has scenarios of itself or of direct."""
     words = cast("TaskScenarios", task_scenarios(request.task.name))
     if setting == _EXPLICIT:
         speech = Speech(request, words, Introduced(goal_values(request)))
         return InstructionSpec((UtteranceSpec("command", speech.command({}, ())),))
-    choice = _choose(request, setting)
+    choice = _choose(request, of)
     request.sampler.log.extend(choice.log)
     return say_chosen(request, setting, words, cast("Chosen", choice.chosen))
 
@@ -100,8 +107,7 @@ def say(request: InstructionRequest, setting: str) -> InstructionSpec:
 @functools.cache
 def _known(task: str, setting: str, pool: PoolName) -> tuple[Scenario, ...]:
     """Return the scenarios of a setting in a pool."""
-    words = task_scenarios(task)
-    every = words.scenarios if words else ()
+    every = cast("TaskScenarios", task_scenarios(task)).scenarios
     return tuple(one for one in every if (one.fields.setting, one.fields.pool) == (setting, pool))
 
 
@@ -156,11 +162,13 @@ def _with_people(request: InstructionRequest, chosen: Chosen) -> Introduced:
     """Add two people, who are different, and their pronouns, to what is introduced."""
     if not chosen.scenario.people:
         return chosen.introduced
-    order = request.sampler.cycle("people", chosen.scenario.people)
+    people = chosen.scenario.people
+    one = request.sampler.pick("person", people)
+    other = request.sampler.pick("other person", [each for each in people if each is not one])
     added = {
         f"{slot}{number}": (IntroducedValue("", "person", word, word),)
-        for number in ("", ".2")
-        for slot, word in zip(PERSON, next(order), strict=True)
+        for number, words in (("", one), (".2", other))
+        for slot, word in zip(PERSON, words, strict=True)
     }
     return chosen.introduced.with_values(**added)
 
@@ -253,16 +261,15 @@ class Speech:
             )
         else:
             skeleton = self._skeleton(fields)
-        if lead and not self._joined(before).endswith(SENTENCE_ENDS):
+        if lead and not self._joined(before).endswith((". ", "! ", "? ")):
             first, *rest = skeleton
             skeleton = (first._replace(text=first.text[:1].lower() + first.text[1:]), *rest)
         return (*before, *skeleton)
 
     def _skeleton(self, fields: Mapping[str, Phrase]) -> Phrase:
-        wanted = {one.field for one in self._request.goal_values}
-        known = self._words.commands[self._request.pool]
-        possible = [one for one in known if set(slots_in(one)) == wanted]
-        if not possible:
+        wanted = frozenset(one.field for one in self._request.goal_values)
+        possible = self._words.commands.get((self._request.pool, wanted))
+        if possible is None:
             raise InvalidValueError(
                 f"Language 4 has no command of {self._words.task} with the fields "
                 f"{', '.join(sorted(wanted))}."
@@ -275,15 +282,14 @@ class Speech:
                 pieces.extend(fields[part.name])
             else:
                 pieces.extend(self.phrase(self._words.stated[part.name]))
-        return swap_particles(tuple(pieces))
+        return swap_particles(tuple(pieces)) if fields else tuple(pieces)
 
     def _outside(self, name: str, words: Phrase) -> Phrase:
         """Return words for a field of a command from outside.
 
         They take the place of its core: *it* that of *the red cube* in *the container over it*.
         """
-        outside = self._request.outside_phrase(name)
-        commands = self._request.task.commands
+        outside, commands = self._request.outside_phrase(name), self._request.task.commands
         direct = self._scenario is None or self._scenario.fields.setting == _DIRECT
         if outside is None or (self._request.resolved and direct):
             return self._request.outside_stated(name)
