@@ -52,6 +52,8 @@ def wrong_words(command, words):
 
 RIGHT = {
     "fetch-models": ["--wheel", "nowhere"],
+    "language check-scenarios": ["nowhere"],
+    "language sample": ["--out", "out"],
     "language import-robomme": ["nowhere", "--out", "words.toml"],
     "leaderboard verify": ["nowhere"],
     "replay": ["nowhere"],

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
 import pytest
+import rate_words
 from page_text import call
 from plan_files import plan_file
 from typer.testing import CliRunner
@@ -106,3 +108,38 @@ def test_stats_of_all_splits_leave_out_empty_tables():
     printed = call("language", "stats", "--split", "all", "--tasks", "StopCube")
     assert "Relations" in printed
     assert "Landmark" not in printed
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_an_author_sees_texts_and_the_broken_rule(tmp_path: Path, snapshot):
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        'task = "PickXtimes"\n[[scenario]]\nframe = "far"\npool = "train"\nsetting = "spatial"\n'
+        'introduction = "Look at the cube {place}."\nsay.color = ["<there place: the one there>"]\n'
+    )
+    words = ["language", "check-scenarios", str(file), "--seeds", "0", "--scenario", "far"]
+    result = CliRunner().invoke(cli.app, words)
+    assert isinstance(result.exception, RoboIRGError)
+    assert f"{result.stdout}{result.exception}" == snapshot
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_raters_get_the_texts_of_the_key_in_other_orders_and_their_table(tmp_path: Path):
+    out, tasks = tmp_path / "rating", "PickXtimes"
+    settings = ("--settings", "direct,reasoning", "--anchors", "3")
+    call("language", "sample", "--out", out, "--tasks", tasks, *settings)
+    read = [list(csv.reader(path.open())) for path in sorted(out.glob("sheet-*.csv"))]
+    key = list(csv.DictReader((out / "key.csv").open()))
+    for rows in read:
+        assert {row[0]: row[1] for row in rows[1:]} == {row["number"]: row["text"] for row in key}
+    assert len({tuple(row[0] for row in rows) for rows in read}) == len(read) == 3
+    frames = [(row["setting"], row["frame"]) for row in key if row["language"] == "4"]
+    assert len(set(frames)) == len(frames) == len(key) - 3
+    ratings = {row["number"]: 2.0 + int(row["language"]) / 2 for row in key}
+    by_number = {row["number"]: row for row in key}
+    (*rows, last) = rate_words.rows(by_number, [ratings, ratings])
+    assert all("| 4.0 | 4.0 to 4.0 |" in row for row in rows[:2])
+    assert "language 3" in last
+    assert "| 3.5 |" in last
+    with pytest.raises(SystemExit, match=r"rates text \d+ ''; it must be a number"):
+        rate_words.read_ratings(out / "sheet-1.csv", by_number)

@@ -225,14 +225,13 @@ def sample_texts(
         int, typer.Option(min=1, help="Texts of each setting, each of another frame.")
     ] = 44,
     anchors: Annotated[int, typer.Option(min=0, help="Texts of language 3 among them.")] = 20,
-    raters: Annotated[int, typer.Option(min=1, help="Sheets, each in an order of its own.")] = 3,
     seed: Annotated[int, typer.Option(min=0, help="Other scenes for each seed, from 0.")] = 0,
 ) -> None:
     """Write sheets of texts of language 4 to be rated blind, from 1 to 5, and the key to them.
 
     Example: roboirg language sample --out rating --tasks PickXtimes,StopCube
     """
-    from roboirg.apps.language_lab.scenarios.rating_sample import draw_sample, key, sheet
+    from roboirg.apps.language_lab.scenarios.rating_sample import RATERS, draw_sample, key, sheet
     from roboirg.util.atomic_write import write_atomically
 
     texts = draw_sample(known_tasks(tasks), known_settings(settings), number, anchors, seed)
@@ -241,10 +240,10 @@ def sample_texts(
     if out.exists() and not out.is_dir():
         raise InvalidValueError(f"{str(out)!r} is a file; --out must be a folder.")
     out.mkdir(parents=True, exist_ok=True)
-    for rater in range(1, raters + 1):
+    for rater in RATERS:
         write_atomically(out / f"sheet-{rater}.csv", sheet(texts, rater))
     write_atomically(out / "key.csv", key(texts))
-    typer.echo(f"{counted(len(texts), 'text')} on {counted(raters, 'sheet')}: {out}")
+    typer.echo(f"{counted(len(texts), 'text')} on {len(RATERS)} sheets: {out}")
 
 
 def _print(*parts: RenderableType) -> None:

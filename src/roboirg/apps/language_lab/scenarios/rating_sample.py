@@ -21,6 +21,8 @@ from roboirg.tasks.splits.splits import get_episode
 
 LANGUAGE = 4
 POOL = "test"
+RATERS = (1, 2, 3)
+"""Each has a sheet in an order of its own."""
 MOST_SCENES = 400
 """Scenes of a task that are looked at for a frame; each frame comes up long before the last."""
 
