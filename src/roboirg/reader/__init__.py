@@ -8,7 +8,7 @@ shows, and which goals a task can have. `docs/interpreter.md` explains its parts
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from roboirg.core.episode import Goal, Scene, SlotValue
@@ -30,6 +30,7 @@ from roboirg.reader.reference_resolution import ReferenceResolver
 from roboirg.reader.repetitions import added_up
 from roboirg.reader.selections import (
     read_selection,
+    unread_change,
     unsettled_choice,
     with_selection,
 )
@@ -74,7 +75,8 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         UnknownNameError: there is no such task.
     """
     candidates = _possible_goals(scene, task)
-    sentences, unclear = observe(paraphrased(split_sentences(text)), scene, candidates)
+    said = tuple(_leads_apart(paraphrased(split_sentences(text))))
+    sentences, unclear = observe(said, scene, candidates)
     if unclear:
         return Interpretation((), unclear)
     first, last = _command_span(sentences)
@@ -137,6 +139,23 @@ def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
     return get_task(task).goals(scene)
 
 
+def _leads_apart(sentences: Iterable[Sentence]) -> Iterator[Sentence]:
+    """Yield sentences, without values in the words before the colon of *So let's begin: lift it*.
+
+    These are a remark of their own, which may choose: *I'd take the latter: lift it*.
+    """
+    for words in sentences:
+        at = words.index(":") if ":" in words else 0
+        lead, rest = words[:at], words[at + 1 :]
+        if lead and rest and rest[0] in VERBS | {"first"} and not _commands(lead):
+            remark = read_remark(lead)
+            if not (remark.colors or remark.numbers or remark.positions or remark.places):
+                yield lead
+                yield rest
+                continue
+        yield words
+
+
 def _commands(words: Sentence) -> bool:
     """Return whether a sentence gives a command, understood or not."""
     if words[:2] in _CALLS:
@@ -175,6 +194,11 @@ def _command_gaps(sentences: tuple[Sentence, ...], first: int, last: int) -> lis
         ComprehensionGap(f'does not calculate: "{" ".join(words)}"')
         for words in sentences[:first]
         if not CALCULATIONS.isdisjoint(words)
+    ]
+    gaps += [
+        ComprehensionGap(f'does not understand what "{change}" changes')
+        for words in sentences
+        if (change := unread_change(words, sentences[first:last]))
     ]
     for words in (*negated, *(sentences[first:last] or sentences[-1:]), *following):
         gaps += find_gaps(words)

@@ -14,7 +14,7 @@ from typing import TypeVar
 from roboirg.reader.descriptions import CHOSEN
 from roboirg.reader.discourse_context import DiscourseContext
 from roboirg.reader.phrases import Phrases
-from roboirg.reader.tokens import Sentence
+from roboirg.reader.tokens import ORDINAL, Sentence
 
 Value = TypeVar("Value")
 
@@ -30,6 +30,7 @@ _POINTER = Phrases({
         r"\bthe (?P<other>other)(?: (?:ones?|cubes?|box|tape|container|place|number|visit"
         r"|placement|moment))?\b",
 })  # fmt: skip
+_POINTING = frozenset({"it", "that", "other", "then"})
 _FIRST = ("former", "first", "1st", "earlier")
 _ACCEPTED = Phrases(
     {
@@ -76,6 +77,21 @@ _REJECTED_AFTER = Phrases({
 """Ways to set a pointer aside by the words after it."""
 
 
+_CHANGE = Phrases(
+    {
+        "Scratch that.": r"\b(?:scratch|cancel|undo|strike) (?:it|that|this)\b",
+        "On second thought, double it.": r"\bon second thoughts?\b",
+        "I take that back.": r"\b(?:take|took) (?:it|that|this) back\b",
+        "I have changed my mind.": r"\bchanged? my mind\b",
+        "No, double it.": r"^(?:no )?(?:, )?(?:double|triple|halve) (?:it|that|this)$",
+    },
+)  # fmt: skip
+"""Remarks that take back or change what was said before."""
+_SKIPPED = Phrases({
+    "Skip the third one.": rf"\b(?:skip|leave out|rule out)\b(?: \w+)?? (?:the )?{ORDINAL}\b",
+    "Do not begin with the latter.": r"\bnot\b.*\bthe (?:former|latter)\b",
+})  # fmt: skip
+"""Ways to set one of two aside; unread, they leave open which one is meant."""
 _ASIDE = Phrases({"I have ruled instead out": r"\b(?:not|no|never|out|aside|without|instead|up)\b"})
 
 
@@ -103,6 +119,17 @@ def read_selection(words: Sentence) -> int | None:
             return None
         chosen.add(1 - index if rejected else index)
     return chosen.pop() if len(chosen) == 1 else None
+
+
+def unread_change(words: Sentence, command: Iterable[Sentence]) -> str | None:
+    """Return the words by which a sentence changes what was said; None if it changes nothing.
+
+    Words that set one of two aside count if the command says no value instead.
+    """
+    text = " ".join(words)
+    pointing = any(not _POINTING.isdisjoint(one) for one in command)
+    found = _CHANGE.search(text) or (_SKIPPED.search(text) if pointing else None)
+    return found[0] if found and read_selection(words) is None else None
 
 
 def _index(pointer: re.Match[str]) -> int | None:
@@ -146,12 +173,17 @@ def unsettled_choice(before: DiscourseContext, context: DiscourseContext, comman
         command: the words of the command.
     """
     pair = before.introduces_pair()
-    if context.selected and not pair and (context.colors or context.places):
+    if context.selected and not pair and _introduces(context):
         return "nothing before the command introduces two values of which to choose one"
     named_again = context.preferred_color or context.preferred_moment or context.preferred_position
     if not context.selected and pair and not named_again and CHOSEN.search(command):
         return "nothing before the command says which of two values is meant"
     return ""
+
+
+def _introduces(context: DiscourseContext) -> bool:
+    """Return whether something is introduced of which a remark may choose."""
+    return bool(context.colors or context.places or context.positions or context.moments)
 
 
 def _reordered(pair: tuple[Value, ...], index: int) -> tuple[Value, ...]:
