@@ -39,15 +39,19 @@ def read(task, text, index=2):
         ("VideoUnmask", "Show me the red cube.", (("red",),)),
         ("VideoUnmask", "I like the red and the blue cube. Lift the former and then the latter.",
          (("red", "blue"),)),
-        ("VideoUnmask", "Ann lost the red cube and Max the green one. Let's begin with the latter: "
-         "lift the container over it, put it down, then lift the container over the other one.",
+        ("VideoUnmask", ("Ann lost the red cube and Max the green one. Let's begin with the "
+         "latter: lift the container over it, put it down, then lift the container over the "
+         "other one."),
          (("green", "red"),)),
         ("PickXtimes", "We did it twice. Put the red cube on the target that many times plus one.",
          ("red", 3)),
+        ("PickXtimes", ("One doctor says three times a day, another one says once. I trust the "
+         "former: put the blue cube on the target that many times."), ("blue", 3)),
         ("PickXtimes", "Not too often: put the red cube on the target three times minus one.",
          ("red", 2)),
-        ("SwingXtimes", "We have an exercise of one lap and another of three. Leo did the exercise "
-         "with one lap. Do the other one: swing the red cube the other number of times.",
+        ("SwingXtimes", ("We have an exercise of one lap and another of three. Leo did the "
+         "exercise with one lap. Do the other one: swing the red cube between the targets the "
+         "other number of times."),
          ("red", 3)),
         ("PickXtimes", "Put the red cube on the target, then do it again.", ("red", 2)),
         ("PickXtimes", "Put the red cube on the target, and again, and again.", ("red", 3)),
@@ -79,15 +83,16 @@ def test_is_understood(task, text, goal):
 @pytest.mark.parametrize(
     ("task", "text", "named"),
     [
-        ("StopCube", "You get two chances, on the cube's second and third pass. Skip the third "
-         "one. Stop it on the other pass.", "skip the third"),
-        ("StopCube", "Ben likes the cube's fifth visit, Max the fourth. Let's do the latter: stop "
-         "the cube on that visit.", "two values of which to choose one"),
-        ("PickXtimes", "I like the red cube. We did it twice. On second thought, double it. Put it "
-         "on the target that many times.", "on second thought"),
+        ("StopCube", ("You get two chances, on the cube's second and third pass. Skip the third "
+         "one. Stop it on the other pass."), "skip the third"),
+        ("StopCube", ("Ben likes the cube's fifth visit, Max the fourth. Let's do the latter: stop "
+         "the cube on that visit."), "two values of which to choose one"),
+        ("PickXtimes", ("I like the red cube. We did it twice. On second thought, double it. Put "
+         "it on the target that many times."), "on second thought"),
         ("PickXtimes", "Put the red cube on the target twice. Scratch that.", "scratch that"),
-        ("VideoUnmask", "Ann lost the red cube and Max the green one. Don't begin with the latter: "
-         "lift the container over it, put it down, then lift the container over the other one.",
+        ("VideoUnmask", ("Ann lost the red cube and Max the green one. Don't begin with the "
+         "latter: lift the container over it, put it down, then lift the container over the "
+         "other one."),
          "not begin with the latter"),
         ("PickXtimes", "Put the red cube on the target, then put it there again.", '"there again"'),
         ("PickXtimes", "Put the red cube on the target, do the same with the blue one.",

@@ -156,12 +156,16 @@ def quantities(text: str) -> tuple[Quantity, ...]:
     return tuple(sorted(found, key=lambda one: one.start))
 
 
+_SOMEBODY = Phrases({"One doctor says": rf"^one(?! (?:times?|{COLOR}|{THING}|and|or|is|was)\b) \w"})
+
+
 def plain_numbers(words: Sentence) -> tuple[int, ...]:
     """Return the plain numbers of a sentence: *three times*, *twice*."""
     text = " ".join(words)
     found = [
         (match.start(), number_of(match["number"] or match["times"]))
         for match in _PLAIN.finditer(text)
+        if match.start() or _SOMEBODY.search(text) is None
     ]
     found += [(match.start(), ADVERBS[match[0]]) for match in _ADVERB.finditer(text)]
     return tuple(number for _, number in sorted(found) if number is not None)
