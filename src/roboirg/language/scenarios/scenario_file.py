@@ -46,6 +46,7 @@ GIVEN = frozenset(
 )
 """Slots that are no fields of the goal."""
 _CONTEXT = ("introduction", "reinforcement", "cue")
+_CONTEXTUAL = ("reinforcement", "distractors", "competing", "cue")
 
 
 @functools.cache
@@ -152,23 +153,32 @@ def _people(
 
 def _check_fields(fields: ScenarioFields, head: TaskFields, where: str) -> None:
     """Check what a setting needs beyond its introduction and the words that point back."""
-    for name in fields.say:
-        if name not in head.stated:
-            _fail(where, f"has say.{name}; the fields are {', '.join(head.stated)}")
-    if not fields.say:
-        _fail(where, "has no say; give words for the fields that the command leaves open")
-    if fields.setting == "direct":
-        for name in ("reinforcement", "distractors", "competing", "cue"):
-            if not getattr(fields, name):
-                _fail(where, f"has no {name}, which contextual needs")
-    if fields.setting == "direct-rival" and set(fields.remarks) != set(REMARKS):
-        _fail(where, f"has the remarks {sorted(fields.remarks)}; it needs {', '.join(REMARKS)}")
-    if (fields.derive is not None) != (fields.setting == "reasoning"):
-        _fail(where, "must have derive if its setting is reasoning, and only then")
-    if fields.derive and fields.derive.pattern not in PATTERNS:
-        _fail(where, f"has the pattern {fields.derive.pattern!r}; known: {', '.join(PATTERNS)}")
-    if fields.list and fields.list not in head.stated and f"{fields.list}.0" not in head.stated:
-        _fail(where, f"has a list of {fields.list!r}; the slots are {', '.join(head.stated)}")
+    derive, rules = fields.derive, list(PATTERNS)
+    stated = {*head.stated, *(name.partition(".")[0] for name in head.stated)}
+    unknown = sorted(set(fields.say) - set(head.stated))
+    lacking = [name for name in _CONTEXTUAL if not getattr(fields, name)]
+    wrong = {
+        "has no say; give words for the fields that the command leaves open": not fields.say,
+        f"has say.{', say.'.join(unknown)}; the fields are {', '.join(head.stated)}": unknown,
+        f"has no {' and no '.join(lacking)}, which contextual needs": (
+            fields.setting == "direct" and lacking
+        ),
+        f"has the remarks {sorted(fields.remarks)}; it needs {', '.join(REMARKS)}": (
+            fields.setting == "direct-rival" and set(fields.remarks) != set(REMARKS)
+        ),
+        "must have derive if its setting is reasoning, and only then": (
+            (derive is not None) != (fields.setting == "reasoning")
+        ),
+        f"has derive = {derive}; its pattern is one of {', '.join(rules)}": (
+            derive is not None and derive.pattern not in rules
+        ),
+        f"has a list of {fields.list!r}; the slots are {', '.join(sorted(stated))}": (
+            fields.list and fields.list not in stated
+        ),
+    }
+    for complaint, holds in wrong.items():
+        if holds:
+            _fail(where, complaint)
 
 
 def _check_slots(text: Text, head: TaskFields, where: str) -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple, cast
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.word_pools import PoolName
-from roboirg.language.instruction import Expression
+from roboirg.language.instruction import REFERENCE, Expression
 from roboirg.language.phrases import (
     Phrase,
     TaggedText,
@@ -233,15 +233,12 @@ class Speech:
 
     def _referent(self, name: str) -> Text:
         """Return the words for what a slot stands for."""
-        one = self._introduced.values[name][0]
-        field = self._listed if name.startswith(("list.", "taken")) else name
-        stated = self._words.stated.get(field) or self._words.stated.get(f"{field}.0")
-        if stated is None or len(self._introduced.values[name]) > 1:
-            the = "the " if one.kind in ("visit", "placement") else ""
-            return (*((the,) if the else ()), Slot(name))
-        return tuple(
-            part._replace(name=name) if isinstance(part, Slot) else part for part in stated
-        )
+        found = self._introduced.values[name]
+        kind = found[0].kind if len(found) == 1 else "several"
+        ends = {"color": f" {self._request.task.commands.colored}", "visit": "", "placement": ""}
+        if kind in ends:
+            return ("the ", Slot(name), ends[kind])
+        return (Slot(name, "times" if kind == "number" and name != REFERENCE else None),)
 
     def field(self, name: str, words: Text) -> Phrase:
         """Return the words for a field of the command, resolved if these are asked for."""
@@ -261,9 +258,10 @@ class Speech:
             )
         else:
             skeleton = self._skeleton(fields)
-        if lead and not self._joined(before).endswith((". ", "! ", "? ")):
-            first, *rest = skeleton
-            skeleton = (first._replace(text=first.text[:1].lower() + first.text[1:]), *rest)
+        if lead:
+            before = _begun(before, str.upper)
+            ended = self._joined(before).endswith((". ", "! ", "? "))
+            skeleton = skeleton if ended else _begun(skeleton, str.lower)
         return (*before, *skeleton)
 
     def _skeleton(self, fields: Mapping[str, Phrase]) -> Phrase:
@@ -293,8 +291,8 @@ class Speech:
         direct = self._scenario is None or self._scenario.fields.setting == _DIRECT
         if outside is None or (self._request.resolved and direct):
             return self._request.outside_stated(name)
-        if not name.startswith("color"):
-            return words
+        if name in {one.field for one in self._request.values_of("number")}:
+            return words  # what stays around it is added to numbers later
         prefix = commands.by_color.removesuffix("{cube}")
         core = _without_prefix(words, prefix)
         if prefix and commands.thing not in outside.core:
@@ -322,6 +320,11 @@ class Speech:
     @staticmethod
     def _joined(phrase: Phrase) -> str:
         return "".join(piece.text for piece in phrase)
+
+
+def _begun(words: Phrase, case: Callable[[str], str]) -> Phrase:
+    first, *rest = words
+    return (first._replace(text=case(first.text[:1]) + first.text[1:]), *rest)
 
 
 def _without_prefix(words: Phrase, prefix: str) -> Phrase:

@@ -14,6 +14,7 @@ from roboirg.apps.language_lab.scenarios.sentence_rules import (
     broken_sentences,
     undeclared,
 )
+from roboirg.apps.language_lab.validation.leaks import find_leaks
 from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
@@ -198,6 +199,9 @@ def _broken(request: InstructionRequest, chosen: Chosen, told: Instruction) -> I
                 yield f"say.{name}: means {found}, but the goal is {goal[name]}"
             if meant_value(request, chosen, name, text, others) == goal[name] and _moves(text):
                 yield f"say.{name}: other values in the introduction leave the goal as it is"
+    leaks = find_leaks(told, request.episode.goal)
+    if leaks:
+        yield f"the command gives away {' and '.join(sorted(leaks))}"
     yield from _broken_pointers(told, listed=bool(scenario.fields.list))
     if scenario.fields.setting == "direct" and not _can_compete(request, chosen):
         yield "competing: no remark has another value here; add one with {rival …} of a number"
