@@ -3,6 +3,7 @@
 import itertools
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -23,20 +24,9 @@ from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
 WRITTEN = [task for task in all_tasks() if task_scenarios(task)]
-DIRECT = """
-task = "PickXtimes"
-[[scenario]]
-frame = "birthday"
-pool = "train"
-setting = "direct"
-introduction = "{person} turns {repeats} today and loves the {color} cube."
-reinforcement = "{he} keeps talking about <it color: it>."
-distractors = ["The cake isn't done."]
-competing = ["{person.2} wanted the {rival color} one, but that party is over."]
-cue = "Let's surprise {him}."
-say.color = ["<it color: it>"]
-say.repeats = ["<that repeats: that many times>"]
-"""
+PAGE = Path(__file__).parents[2] / "docs/add-scenario.md"
+DIRECT = PAGE.read_text().partition("```toml\n")[2].partition("```")[0]
+"""The page's example."""
 RIVAL = """
 task = "PickXtimes"
 [[scenario]]
@@ -84,7 +74,7 @@ def spoken(task, language=4):
         ('\ncue = "Let\'s surprise {him}."', "", "'birthday' has no cue, which contextual needs"),
         ("say.color", "say.colour", "has say.colour; the fields are color, repeats"),
         ('pool = "train"', 'pool = "dev"', "Invalid enum value 'dev' - at `$.pool`"),
-        ('"{he}', '"\\u2019{he}', "must be printable ASCII"),
+        ('"{he}', '"\u2019{he}', "must be printable ASCII"),
         ("[[scenario]]", "[[scenario", "is not valid TOML"),
         ('task = "PickXtimes"', 'task = "Juggle"', "there is no Juggle.toml"),
     ],
@@ -100,7 +90,7 @@ def test_a_file_with_a_mistake_is_refused_by_file_scenario_and_field(before, aft
     ("text", "before", "after", "rule"),
     [
         (DIRECT, "turns {repeats} today and ", "", "points at repeats, which the introduction"),
-        (DIRECT, "loves the {color}", "saw a {color} one and the {color}", "has 2 antecedents"),
+        (DIRECT, "loves the", "has a {color} one and loves the", "has 2 antecedents"),
         (DIRECT, "Let's surprise", "You saw this. Surprise", "in turns it is heard before"),
         (DIRECT, "The cake", "The second cake", "names second, which could be a value"),
         (DIRECT, "The cake", "Look at that cake", "may be covered"),

@@ -117,7 +117,7 @@ def test_an_author_sees_texts_and_the_broken_rule(tmp_path: Path, snapshot):
         'task = "PickXtimes"\n[[scenario]]\nframe = "far"\npool = "train"\nsetting = "spatial"\n'
         'introduction = "Look at the cube {place}."\nsay.color = ["<there place: the one there>"]\n'
     )
-    words = ["language", "check-scenarios", str(file), "--seeds", "0", "--scenario", "far"]
+    words = ["language", "check-scenarios", str(file), "--seeds", "0"]
     result = CliRunner().invoke(cli.app, words)
     assert isinstance(result.exception, RoboIRGError)
     assert f"{result.stdout}{result.exception}" == snapshot

@@ -204,14 +204,18 @@ def check_scenario_file(
 
     Example: roboirg language check-scenarios mine.toml --scenario "school trip"
     """
+    from roboirg.apps.language_lab.scenarios.coverage import coverage_lines
     from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
     from roboirg.apps.language_lab.scenarios.scenario_report import report_lines
     from roboirg.language.scenarios.scenario_file import read_scenario_file
 
     words, broken = read_scenario_file(path), 0
-    for report in check_scenarios(words, scenario, scenes_of(words.task, seeds)):
+    scenes = scenes_of(words.task, seeds)
+    for report in check_scenarios(words, scenario, scenes):
         broken += len(report.broken)
         typer.echo("\n".join(report_lines(report)))
+    if scenario is None:
+        typer.echo("\n".join(coverage_lines(words, scenes)))
     if broken:
         raise RoboIRGError(f"Found {counted(broken, 'broken rule')} in {path.name}.")
 

@@ -145,7 +145,7 @@ def _reasoning(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Ch
     offered = [
         (derivation, saying)
         for derivation in derivations_of(request)
-        if (saying := [one for one in scenarios if _offers(one, derivation)])
+        if (saying := [one for one in scenarios if offers(one, derivation)])
     ]
     patterns = list(dict.fromkeys(one.pattern for one, _ in offered))
     if not patterns:
@@ -169,7 +169,8 @@ def _reasoning(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Ch
     return Chosen(scenario, Introduced({**goal_values(request), **values}, notes), words)
 
 
-def _offers(scenario: Scenario, derivation: Derivation) -> bool:
+def offers(scenario: Scenario, derivation: Derivation) -> bool:
+    """Return whether a scenario says a derivation."""
     derive = scenario.fields.derive
     return (
         derive is not None
