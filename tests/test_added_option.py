@@ -40,7 +40,7 @@ CHANGES = {
             ),
         ),
         ("phrases import sentences", "phrases import plain, sentences"),
-        ('reads=frozenset({"delivery"})', 'reads=frozenset({"delivery", "greeting"})'),
+        ('reads=frozenset({"delivery", ', 'reads=frozenset({"greeting", "delivery", '),
     ],
 }
 """All that is changed in the package to add it: texts and what they become, by file."""
