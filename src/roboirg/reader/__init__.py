@@ -140,20 +140,30 @@ def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
 
 
 def _leads_apart(sentences: Iterable[Sentence]) -> Iterator[Sentence]:
-    """Yield sentences, without values in the words before the colon of *So let's begin: lift it*.
+    """Yield sentences, with the words before the colon of *So let's begin: lift it* apart.
 
-    These are a remark of their own, which may choose: *I'd take the latter: lift it*.
+    These are a remark of their own, which may choose: *I'd take the latter: lift it*. If they name
+    a value, what follows must name it again: *Two, not three: lift it twice*.
     """
     for words in sentences:
         at = words.index(":") if ":" in words else 0
         lead, rest = words[:at], words[at + 1 :]
-        if lead and rest and rest[0] in VERBS | {"first"} and not _commands(lead):
-            remark = read_remark(lead)
-            if not (remark.colors or remark.numbers or remark.positions or remark.places):
-                yield lead
-                yield rest
-                continue
-        yield words
+        leads = lead and rest and rest[0] in VERBS | {"first"} and not _commands(lead)
+        if leads and all(map(_repeats, _values(lead), _values(rest))):
+            yield lead
+            yield rest
+        else:
+            yield words
+
+
+def _values(words: Sentence) -> tuple[frozenset[object], ...]:
+    remark = read_remark(words)
+    kinds = (remark.colors, remark.numbers, remark.positions, remark.places)
+    return tuple(map(frozenset, kinds))
+
+
+def _repeats(before: frozenset[object], after: frozenset[object]) -> bool:
+    return not before or (bool(after) and after <= before)
 
 
 def _commands(words: Sentence) -> bool:
