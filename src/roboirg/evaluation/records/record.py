@@ -22,7 +22,11 @@ from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.failures import FailureKind
 from roboirg.core.field_types import MOST_CAUSE_LETTERS, Cause, Name, Subgoal, Whole
 from roboirg.core.inference_facts import InferenceFacts
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import (
+    DEFAULT_LANGUAGE,
+    OPTION_NAMES,
+    InstructionOptions,
+)
 from roboirg.core.observations import DemonstrationSource
 from roboirg.core.plain_text import clip_text
 from roboirg.core.policy_ref import PolicyRef
@@ -123,6 +127,9 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
         """Short unique name that is safe in file names."""
         words = [self.policy, self.task, self.split, self.episode, self.setting, self.form]
         identity = {name: getattr(self, name) for name in IDENTITY}
+        if self.options.language == DEFAULT_LANGUAGE:  # those of the usual language keep theirs
+            said = (name for name in OPTION_NAMES if name != "language")
+            identity["options"] = {name: getattr(self.options, name) for name in said}
         if self.arm == TOLD:
             del identity["arm"]  # files of runs without arms keep their names
         else:
