@@ -204,18 +204,18 @@ def check_scenario_file(
 
     Example: roboirg language check-scenarios mine.toml --scenario "school trip"
     """
-    from roboirg.apps.language_lab.scenarios.coverage import coverage_lines
     from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
-    from roboirg.apps.language_lab.scenarios.scenario_report import report_lines
+    from roboirg.apps.language_lab.scenarios.scenario_report import coverage_lines, report_lines
     from roboirg.language.scenarios.scenario_file import read_scenario_file
 
-    words, broken = read_scenario_file(path), 0
+    words = read_scenario_file(path)
     scenes = scenes_of(words.task, seeds)
-    for report in check_scenarios(words, scenario, scenes):
-        broken += len(report.broken)
+    reports = check_scenarios(words, scenario, scenes)
+    for report in reports:
         typer.echo("\n".join(report_lines(report)))
     if scenario is None:
-        typer.echo("\n".join(coverage_lines(words, scenes)))
+        typer.echo("\n".join(coverage_lines(words.task, reports, scenes)))
+    broken = sum(len(report.broken) for report in reports)
     if broken:
         raise RoboIRGError(f"Found {counted(broken, 'broken rule')} in {path.name}.")
 
@@ -225,20 +225,17 @@ def sample_texts(
     out: Annotated[Path, typer.Option(help="Folder for the sheets and their key.")],
     tasks: Tasks = "all",
     settings: Settings = "all",
-    number: Annotated[
-        int, typer.Option(min=1, help="Texts of each setting, each of another frame.")
-    ] = 44,
     anchors: Annotated[int, typer.Option(min=0, help="Texts of language 3 among them.")] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Other scenes for each seed, from 0.")] = 0,
 ) -> None:
-    """Write sheets of texts of language 4 to be rated blind, from 1 to 5, and the key to them.
+    """Write sheets of 44 texts a setting of language 4 to be rated blind, 1 to 5, and their key.
 
     Example: roboirg language sample --out rating --tasks PickXtimes,StopCube
     """
     from roboirg.apps.language_lab.scenarios.rating_sample import RATERS, draw_sample, key, sheet
     from roboirg.util.atomic_write import write_atomically
 
-    texts = draw_sample(known_tasks(tasks), known_settings(settings), number, anchors, seed)
+    texts = draw_sample(known_tasks(tasks), known_settings(settings), anchors, seed)
     if not texts:
         raise InvalidValueError(f"Language 4 has no words for {tasks} in {settings}.")
     if out.exists() and not out.is_dir():

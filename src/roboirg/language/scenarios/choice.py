@@ -27,7 +27,7 @@ from roboirg.language.scenarios.introduced import (
     several,
 )
 from roboirg.language.scenarios.markup import Text
-from roboirg.language.scenarios.scenario import Scenario
+from roboirg.language.scenarios.scenario import PERSON, Scenario
 from roboirg.language.settings.grounded import clues_of
 from roboirg.language.settings.reasoning import BLOCK
 from roboirg.language.settings.spatial import draw_landmarks
@@ -62,15 +62,25 @@ def choose(
 ) -> Chosen | None:
     """Return what is said in a setting that does not refuse; None if no scenario fits."""
     colors = len(request.color_values)
-    known = [
-        one
-        for one in scenarios
-        if (not one.fields.needs.colors or colors in one.fields.needs.colors)
-        and (not one.fields.needs.shown or len(request.scene_colors) in one.fields.needs.shown)
-    ]
+    known = [one for one in scenarios if colors in (one.fields.needs.colors or (colors,))]
     with contextlib.suppress(_NoScenarioError):
-        return _CHOICES[setting](request, known)
+        return _with_people(request, _CHOICES[setting](request, known))
     return None
+
+
+def _with_people(request: InstructionRequest, chosen: Chosen) -> Chosen:
+    """Add two people, who are different, and their pronouns, to what is introduced."""
+    people = chosen.scenario.people
+    if not people:
+        return chosen
+    one = request.sampler.pick("person", people)
+    other = request.sampler.pick("other person", [each for each in people if each is not one])
+    added = {
+        f"{slot}{number}": (IntroducedValue("", "person", word, word),)
+        for number, words in (("", one), (".2", other))
+        for slot, word in zip(PERSON, words, strict=True)
+    }
+    return chosen._replace(introduced=chosen.introduced.with_values(**added))
 
 
 def _drawn(
@@ -200,11 +210,7 @@ def _spatial(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chos
 def _grounded(request: InstructionRequest, scenarios: Sequence[Scenario]) -> Chosen:
     clues: Mapping[GoalValue, Clue] = clues_of(request)
     kinds = list(dict.fromkeys(clue.kind for clue in clues.values()))
-    saying = [
-        one
-        for one in _says(scenarios, [value.field for value in clues])
-        if not one.fields.needs.clue or set(kinds) <= set(one.fields.needs.clue)
-    ]
+    saying = _says(scenarios, [value.field for value in clues])
     scenario, words = _drawn(request, "grounded", saying)
     seen = [IntroducedValue(one.slot, "clue", one.value, clue.words) for one, clue in clues.items()]
     touched = list(dict.fromkeys(one.slot for one in clues))

@@ -12,7 +12,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import NamedTuple, Union
+
+from roboirg.language.phrases import TaggedText
 
 _NAME = r"(?:rival )?[a-z]+(?:\.\d)?"
 _SLOT = re.compile(rf"\{{(?P<name>{_NAME})(?::(?P<form>[a-z -]+))?\}}")
@@ -48,6 +50,11 @@ class Agreement(NamedTuple):
     many: str
 
 
+Part = Union[TaggedText, Slot, Agreement, "Pointer"]
+Text = tuple[Part, ...]
+"""A sentence, parsed."""
+
+
 class Pointer(NamedTuple):
     """Words that point back.
 
@@ -56,45 +63,46 @@ class Pointer(NamedTuple):
         of: the slot that they stand for.
         words: as written, marks included.
         parts: the same, parsed.
+        resolved: what stands for them in the resolved form; empty for the value.
+        operation: how the value follows from that of the slot.
     """
 
     expression: str
     of: str
     words: str
-    parts: tuple[str | Slot | Agreement, ...]
+    parts: Text
+    resolved: Text = ()
+    operation: str = "same"
 
 
-Part = str | Slot | Agreement | Pointer
-Text = tuple[Part, ...]
-"""A sentence, parsed."""
-
-
-def parse(text: str) -> Text:
+def parse(text: object) -> Text:
     """Return the parts of a sentence.
 
     Raises:
-        ValueError: it has a bracket that is none of the marks.
+        ValueError: it is none, or it has a bracket that is none of the marks.
     """
+    if not isinstance(text, str) or not text.isascii() or not text.isprintable():
+        raise ValueError(f"has the words {text!r}; they must be printable ASCII on one line")
     parts: list[Part] = []
     end = 0
-    for mark in _MARK.finditer(text):
-        parts.append(text[end : mark.start()])
-        parts.append(_parsed(mark))
-        end = mark.end()
-    parts.append(text[end:])
-    for part in parts:
-        if isinstance(part, str) and _BRACKET.search(part):
+    for mark in (*_MARK.finditer(text), None):
+        between = text[end : mark.start() if mark else None]
+        if _BRACKET.search(between):
             raise ValueError(
-                f"{text!r} has a bracket that is no mark; marks are like {{color}}, "
+                f"has a bracket that is no mark in {text!r}; marks are like {{color}}, "
                 "{repeats:lap}, <it color: it> and [repeats: lap|laps]"
             )
-    return tuple(part for part in parts if part)
+        if between:
+            parts.append(TaggedText(between))
+        if mark:
+            parts.append(_parsed(mark))
+            end = mark.end()
+    return tuple(parts)
 
 
 def _parsed(mark: re.Match[str]) -> Part:
     if mark["expression"]:
-        inner = tuple(part for part in parse(mark["words"]) if not isinstance(part, Pointer))
-        return Pointer(mark["expression"], mark["of"], mark["words"], inner)
+        return Pointer(mark["expression"], mark["of"], mark["words"], parse(mark["words"]))
     if mark["name"]:
         return Slot(mark["name"], mark["form"])
     return Agreement(mark["controller"], mark["one"], mark["many"])

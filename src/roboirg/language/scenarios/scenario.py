@@ -20,6 +20,8 @@ Operation = Literal[
     "same", "rank", "other", "without", "minus", "plus", "double", "half", "earlier", "later",
     "before", "after", "two before", "two after", "place", "seen",
 ]  # fmt: skip
+PERSON = ("person", "he", "him", "his")
+"""The slots of a person; those of another one end in ``.2``."""
 REMARKS = ("former", "latter", "not_former", "not_latter")
 """What a remark of direct-rival points at, and whether it sets that aside."""
 
@@ -38,7 +40,9 @@ class PointerRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename
 class Derive(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How the goal of a reasoning scenario follows: pattern, and the relations that it can say."""
 
-    pattern: str
+    pattern: Literal[
+        "number deduction", "sequential relation", "color exclusion", "contextual logic"
+    ]
     relations: Texts = ()
 
 
@@ -47,15 +51,11 @@ class Needs(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         colors: possible numbers of colors in the goal.
-        shown: possible numbers of colors in the scene that a goal can ask for.
         list: possible lengths of the list.
-        clue: possible kinds of clues.
     """
 
     colors: tuple[int, ...] = ()
-    shown: tuple[int, ...] = ()
     list: tuple[int, ...] = ()
-    clue: Texts = ()
 
 
 class People(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -66,20 +66,11 @@ class People(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ScenarioFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A scenario as written."""
+    """What a scenario's file has besides sentences."""
 
     frame: str
     pool: PoolName
     setting: ScenarioSetting
-    introduction: str
-    say: Mapping[str, Texts]
-    reinforcement: str = ""
-    distractors: Texts = ()
-    competing: Texts = ()
-    cue: str = ""
-    lead: str = ""
-    resolved: Mapping[str, str] = {}
-    remarks: Mapping[str, Texts] = {}
     list: str = ""
     derive: Derive | None = None
     needs: Needs = Needs()
@@ -90,7 +81,7 @@ class Scenario(msgspec.Struct, frozen=True):
     """A scenario with its sentences parsed.
 
     Attributes:
-        fields: as written.
+        fields: the others, as written.
         texts: its sentences by field, ``say.color`` has several.
         people: who can be spoken of, each with his or her pronouns; empty if nobody is.
         said: the fields of the command that point back.
@@ -99,7 +90,7 @@ class Scenario(msgspec.Struct, frozen=True):
 
     fields: ScenarioFields
     texts: Mapping[str, tuple[Text, ...]]
-    people: tuple[tuple[str, ...], ...]
+    people: tuple[Texts, ...]
     said: Texts
     classes: Mapping[str, tuple[Text, ...]]
 
@@ -144,6 +135,6 @@ class TaskScenarios(msgspec.Struct, frozen=True):
     """
 
     task: str
-    commands: Mapping[tuple[PoolName, frozenset[str]], tuple[Text, ...]]
+    commands: Mapping[tuple[PoolName, frozenset[str]], Texts]
     stated: Mapping[str, Text]
     scenarios: tuple[Scenario, ...]

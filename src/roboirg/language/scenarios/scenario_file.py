@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import functools
+import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
@@ -14,18 +15,9 @@ import msgspec
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.core.word_pools import PoolName
-from roboirg.language.patterns import PATTERNS
-from roboirg.language.scenarios.markup import (
-    Agreement,
-    Part,
-    Pointer,
-    Slot,
-    Text,
-    parse,
-    pointers_in,
-    slots_in,
-)
+from roboirg.language.scenarios.markup import Pointer, Text, parse, pointers_in, slots_in
 from roboirg.language.scenarios.scenario import (
+    PERSON,
     REMARKS,
     General,
     PointerRow,
@@ -33,11 +25,11 @@ from roboirg.language.scenarios.scenario import (
     ScenarioFields,
     TaskFields,
     TaskScenarios,
+    Texts,
 )
 
 FOLDER = files("roboirg.language.scenarios")
 Stored = TypeVar("Stored")
-PERSON = ("person", "he", "him", "his")
 PRONOUNS = {"he": ("he", "him", "his"), "she": ("she", "her", "her")}
 GIVEN = frozenset(
     {"list", "list.0", "list.1", "list.2", "rank", "reference", "step", "excluded", "taken"}
@@ -45,22 +37,25 @@ GIVEN = frozenset(
     | {f"{word}{number}" for word in PERSON for number in ("", ".2")}
 )
 """Slots that are no fields of the goal."""
-_CONTEXT = ("introduction", "reinforcement", "cue")
 _CONTEXTUAL = ("reinforcement", "distractors", "competing", "cue")
+SENTENCES = frozenset({"introduction", *_CONTEXTUAL, "lead", "say", "resolved", "remarks"})
+"""The fields that hold sentences."""
 
 
 @functools.cache
 def pointer_table() -> tuple[PointerRow, ...]:
     """Return the closed table of pointers."""
-    data = _toml(FOLDER.joinpath("pointers.toml").read_text(encoding="utf-8"), "pointers.toml")
-    return _as(tuple[PointerRow, ...], data["pointer"], "pointers.toml")
+    return _as(tuple[PointerRow, ...], _shared("pointers.toml")["pointer"], "pointers.toml")
 
 
 @functools.cache
 def general() -> General:
     """Return what all tasks share."""
-    data = _toml(FOLDER.joinpath("general.toml").read_text(encoding="utf-8"), "general.toml")
-    return _as(General, data, "general.toml")
+    return _as(General, _shared("general.toml"), "general.toml")
+
+
+def _shared(name: str) -> dict[str, Any]:
+    return _toml(FOLDER.joinpath(name).read_text(encoding="utf-8"), name)
 
 
 @functools.cache
@@ -75,75 +70,63 @@ def task_scenarios(task: str) -> TaskScenarios | None:
 def read_task_scenarios(text: str, where: str) -> TaskScenarios:
     """Return the content of a file; `where` names it in complaints.
 
+    A file of scenarios alone takes the commands of the task's own file.
+
     Raises:
         InvalidValueError: it is not as `docs/add-scenario.md` says.
     """
     data = _toml(text, where)
-    head = _head(data, where)
-    commands: dict[tuple[PoolName, frozenset[str]], tuple[Text, ...]] = {}
-    for pool, texts in head.commands.items():
-        for command in (_parsed(one, f"{where}, commands") for one in texts):
-            of = (pool, frozenset(slots_in(command)))
-            commands[of] = (*commands.get(of, ()), command)
-    stated = {name: _parsed(one, f"{where}, stated") for name, one in head.stated.items()}
+    head = _as(TaskFields, data, where)
+    own = None if head.commands else task_scenarios(head.task)
+    if own is None and not head.commands:
+        _fail(where, f"has no commands, and there is no {head.task}.toml to take them from")
+    stated = own.stated if own else {
+        name: _parsed(one, f"{where}, stated") for name, one in head.stated.items()
+    }  # fmt: skip
     scenarios = tuple(
-        _scenario(one, head, f"{where}, scenario {one.get('frame', number)!r}")
-        for number, one in enumerate(data.get("scenario", ()), 1)
+        _scenario(one, stated, f"{where}, scenario {one.get('frame', number)!r}")
+        for number, one in enumerate(head.scenario, 1)
     )
     names = [(one.fields.pool, one.name) for one in scenarios]
-    for name in names:
-        if names.count(name) > 1:
-            _fail(where, f"has the frame {name[1]!r} twice in the pool {name[0]}")
+    for pool, name in names:
+        if names.count((pool, name)) > 1:
+            _fail(where, f"has the frame {name!r} twice in the pool {pool}")
+    commands = own.commands if own else _commands(head, where)
     return TaskScenarios(head.task, commands, stated, scenarios)
 
 
-def _head(data: dict[str, Any], where: str) -> TaskFields:
-    """Return a file's head; a file of scenarios alone has that of the task's own file."""
-    head = _as(TaskFields, data, where)
-    path = FOLDER.joinpath(f"{head.task}.toml")
-    if head.commands:
-        return head
-    if not path.is_file():
-        _fail(where, f"has no commands, and there is no {path.name} to take them from")
-    own = _toml(path.read_text(encoding="utf-8"), path.name)
-    return _as(TaskFields, own, path.name)
+def _commands(head: TaskFields, where: str) -> dict[tuple[PoolName, frozenset[str]], Texts]:
+    found: dict[tuple[PoolName, frozenset[str]], Texts] = {}
+    for pool, texts in head.commands.items():
+        for command in texts:
+            of = (pool, frozenset(slots_in(_parsed(command, f"{where}, commands"))))
+            found[of] = (*found.get(of, ()), command)
+    return found
 
 
-def _scenario(written: Mapping[str, Any], head: TaskFields, where: str) -> Scenario:
-    data = {**written}
-    for field in ("say", "remarks", "resolved"):
-        flat = dict(_flat(data.get(field, {})))
-        data[field] = flat if field == "resolved" else {
-            name: [one] if isinstance(one, str) else one for name, one in flat.items()
-        }  # fmt: skip
-    fields = _as(ScenarioFields, data, where)
-    texts: dict[str, tuple[Text, ...]] = {name: (fields_text,) for name in (*_CONTEXT, "lead")
-             if (fields_text := _parsed(getattr(fields, name), f"{where}, {name}"))}  # fmt: skip
-    several = {"distractors": fields.distractors, "competing": fields.competing}
-    several |= {f"say.{name}": one for name, one in fields.say.items()}
-    several |= {f"remarks.{name}": one for name, one in fields.remarks.items()}
-    several |= {f"resolved.{name}": (one,) for name, one in fields.resolved.items()}
-    texts |= {name: tuple(_parsed(one, f"{where}, {name}") for one in found)
-              for name, found in several.items()}  # fmt: skip
-    for name, found in texts.items():
-        for one in found:
-            _check_slots(one, head, f"{where}, {name}")
-            if not name.startswith("resolved"):
-                _check_pointers(one, fields, f"{where}, {name}")
-    _check_fields(fields, head, where)
+def _scenario(written: Mapping[str, Any], stated: Collection[str], where: str) -> Scenario:
+    others = {name: value for name, value in written.items() if name not in SENTENCES}
+    fields = _as(ScenarioFields, others, where)
+    texts: dict[str, tuple[Text, ...]] = {}
+    for name, value in _flat({name: written[name] for name in written if name in SENTENCES}):
+        at = f"{where}, {name}"
+        several = _as(Texts, [value] if isinstance(value, str) else value, at)
+        texts[name] = tuple(_sentence(one, fields.list, stated, at) for one in several)
+    said = tuple(name.removeprefix("say.") for name in texts if name.startswith("say."))
+    _check_fields(fields, texts, said, stated, where)
     classes: dict[str, tuple[Text, ...]] = {}
-    for one in texts[f"say.{next(iter(fields.say))}"]:
+    for one in texts[f"say.{said[0]}"]:
         kind = next((pointer.expression for pointer in pointers_in(one)), "")
         classes[kind] = (*classes.get(kind, ()), one)
-    return Scenario(fields, texts, _people(fields, texts), tuple(fields.say), classes)
+    return Scenario(fields, texts, _people(fields, texts), said, classes)
 
 
 def _people(
     fields: ScenarioFields, texts: Mapping[str, tuple[Text, ...]]
 ) -> tuple[tuple[str, ...], ...]:
     """Return who can be spoken of, each with his or her pronouns, if the sentences speak of any."""
-    used = {name for several in texts.values() for text in several for name in slots_in(text)}
-    if used.isdisjoint(PERSON):
+    said = (name for several in texts.values() for text in several for name in slots_in(text))
+    if {name.partition(".")[0] for name in said}.isdisjoint(PERSON):
         return ()
     people = fields.people or general().people
     return tuple(
@@ -151,29 +134,28 @@ def _people(
     )
 
 
-def _check_fields(fields: ScenarioFields, head: TaskFields, where: str) -> None:
-    """Check what a setting needs beyond its introduction and the words that point back."""
-    derive, rules = fields.derive, list(PATTERNS)
-    stated = {*head.stated, *(name.partition(".")[0] for name in head.stated)}
-    unknown = sorted(set(fields.say) - set(head.stated))
-    lacking = [name for name in _CONTEXTUAL if not getattr(fields, name)]
+def _check_fields(
+    fields: ScenarioFields,
+    texts: Mapping[str, tuple[Text, ...]],
+    said: Texts,
+    stated: Collection[str],
+    where: str,
+) -> None:
+    """Check what a setting needs."""
+    needed = ["introduction", *(_CONTEXTUAL if fields.setting == "direct" else ())]
+    if fields.setting == "direct-rival":
+        needed += [f"remarks.{name}" for name in REMARKS]
+    lacking = [name for name in needed if not any(texts.get(name, ()))]
+    unknown = sorted(set(said) - set(stated))
     wrong = {
-        "has no say; give words for the fields that the command leaves open": not fields.say,
-        f"has say.{', say.'.join(unknown)}; the fields are {', '.join(head.stated)}": unknown,
-        f"has no {' and no '.join(lacking)}, which contextual needs": (
-            fields.setting == "direct" and lacking
-        ),
-        f"has the remarks {sorted(fields.remarks)}; it needs {', '.join(REMARKS)}": (
-            fields.setting == "direct-rival" and set(fields.remarks) != set(REMARKS)
-        ),
+        "has no say; give words for the fields that the command leaves open": not said,
+        f"has say.{', say.'.join(unknown)}; the fields are {', '.join(stated)}": unknown,
+        f"has no {' and no '.join(lacking)}; {fields.setting} needs {', '.join(needed)}": lacking,
         "must have derive if its setting is reasoning, and only then": (
-            (derive is not None) != (fields.setting == "reasoning")
+            (fields.derive is not None) != (fields.setting == "reasoning")
         ),
-        f"has derive = {derive}; its pattern is one of {', '.join(rules)}": (
-            derive is not None and derive.pattern not in rules
-        ),
-        f"has a list of {fields.list!r}; the slots are {', '.join(sorted(stated))}": (
-            fields.list and fields.list not in stated
+        f"has a list of {fields.list!r}; the slots are {', '.join(sorted(_slots(stated)))}": (
+            fields.list and fields.list not in _slots(stated)
         ),
     }
     for complaint, holds in wrong.items():
@@ -181,25 +163,42 @@ def _check_fields(fields: ScenarioFields, head: TaskFields, where: str) -> None:
             _fail(where, complaint)
 
 
-def _check_slots(text: Text, head: TaskFields, where: str) -> None:
-    bases = {name.partition(".")[0] for name in head.stated}
-    known = GIVEN | set(head.stated) | bases
-    for name in slots_in(text):
+def _slots(stated: Collection[str]) -> set[str]:
+    """Return the slots of a task, and its fields: ``colors`` and ``colors.0``."""
+    return {*stated, *(name.partition(".")[0] for name in stated)}
+
+
+def _sentence(text: str, listed: str, stated: Collection[str], where: str) -> Text:
+    """Return a sentence, with the rows of the closed table for what points back."""
+    parts = _parsed(text, where)
+    known = GIVEN | _slots(stated)
+    for name in slots_in(parts):
         if name.removeprefix("rival ") not in known:
             _fail(where, f"has the slot {name!r}; known: {', '.join(sorted(known))}")
+    # As the table has it: without class and slot, and with any noun for a step.
+    said = re.sub(r"\{step:[^}]+\}", "{step:*}", re.sub(r"<[^:<>]+: ", "<", text))
+    return tuple(
+        _pointing(one, said, type_of(one.of, listed), where) if isinstance(one, Pointer) else one
+        for one in parts
+    )
 
 
-def _check_pointers(text: Text, fields: ScenarioFields, where: str) -> None:
-    """Check that every pointer is one of the closed table."""
-    for pointer in pointers_in(text):
-        kind = type_of(pointer.of, fields.list)
-        if row_of(text, pointer, kind) is None:
-            of_kind = [one.words for one in pointer_table() if kind in one.of]
-            _fail(
-                where,
-                f"has the pointer <{pointer.expression} {pointer.of}: {pointer.words}>, which is "
-                f"not in pointers.toml; for a {kind} there are: {'; '.join(of_kind) or 'none'}",
-            )
+def _pointing(pointer: Pointer, said: str, kind: str, where: str) -> Pointer:
+    """Return a pointer with what its row says."""
+    words = pointer.words
+    of_kind = [row for row in pointer_table() if kind in row.of]
+    # First those that are said with the words around them.
+    rows = [one for one in of_kind if f"<{words}>" in one.words and one.words in said]
+    rows += [one for one in of_kind if words == one.words]
+    row = next((one for one in rows if one.kind == pointer.expression), None)
+    if row is None:
+        _fail(
+            where,
+            f"has the pointer <{pointer.expression} {pointer.of}: {words}>, which is not in "
+            f"pointers.toml; for a {kind} there are: "
+            f"{'; '.join(one.words for one in of_kind) or 'none'}",
+        )
+    return pointer._replace(resolved=parse(row.resolved), operation=row.operation)
 
 
 def type_of(name: str, listed: str = "") -> str:
@@ -213,30 +212,6 @@ def type_of(name: str, listed: str = "") -> str:
     return SLOT_TYPE_NAMES.get(base, base)
 
 
-@functools.cache
-def row_of(text: Text, pointer: Pointer, kind: str) -> PointerRow | None:
-    """Return the row of the table for a pointer in its sentence; None if there is none."""
-    said = "".join(map(_said, text))
-    of_kind = [row for row in pointer_table() if row.kind == pointer.expression and kind in row.of]
-    relations = [
-        row for row in of_kind if f"<{pointer.words}>" in row.words and row.words in said
-    ]  # fmt: skip
-    alone = [row for row in of_kind if row.words == pointer.words]
-    return next(iter((*relations, *alone)), None)
-
-
-def _said(part: Part) -> str:
-    """Return a part as the table has it: the noun of a step is any."""
-    if isinstance(part, Pointer):
-        return f"<{part.words}>"
-    if isinstance(part, Agreement):
-        return f"[{part.controller}: {part.one}|{part.many}]"
-    if isinstance(part, Slot):
-        form = "*" if part.name == "step" and part.form else part.form
-        return f"{{{part.name}:{form}}}" if form else f"{{{part.name}}}"
-    return part
-
-
 def _flat(table: object, prefix: str = "") -> Iterator[tuple[str, object]]:
     """Yield the entries of a table whose keys may hold dots: ``colors.0`` is one."""
     if not isinstance(table, dict):
@@ -247,12 +222,10 @@ def _flat(table: object, prefix: str = "") -> Iterator[tuple[str, object]]:
 
 
 def _parsed(text: str, where: str) -> Text:
-    if not (text.isascii() and (text.isprintable() or not text)):
-        _fail(where, f"has the words {text!r}; they must be printable ASCII on one line")
     try:
         return parse(text)
     except ValueError as error:
-        raise InvalidValueError(f"{where}: {error}.") from error
+        raise InvalidValueError(f"{where} {error}.") from error
 
 
 def _toml(text: str, where: str) -> dict[str, Any]:

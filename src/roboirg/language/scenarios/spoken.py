@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple, cast
 
+from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.word_pools import PoolName
 from roboirg.language.instruction import REFERENCE, Expression
@@ -16,6 +17,7 @@ from roboirg.language.phrases import (
     TaggedText,
     anaphor,
     antecedent,
+    fill,
     plain,
     swap_particles,
 )
@@ -26,16 +28,10 @@ from roboirg.language.request import (
     UtteranceSpec,
 )
 from roboirg.language.scenarios.choice import Chosen, choose, rival_values
-from roboirg.language.scenarios.introduced import Introduced, IntroducedValue, goal_values
-from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, parse, slots_in
+from roboirg.language.scenarios.introduced import Introduced, goal_values
+from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, slots_in
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
-from roboirg.language.scenarios.scenario_file import (
-    PERSON,
-    general,
-    row_of,
-    task_scenarios,
-    type_of,
-)
+from roboirg.language.scenarios.scenario_file import general, task_scenarios
 from roboirg.language.settings import all_settings, contextual
 from roboirg.language.settings.setting import Setting
 
@@ -45,52 +41,50 @@ _STATING = ("direct", "direct-rival")
 
 
 class _Choice(NamedTuple):
-    """What was chosen last, for which words, and the draws that led to it."""
+    """What is said of an episode; the draws that led to it, or why there is nothing."""
 
-    key: tuple[object, ...]
+    episode: Episode
     chosen: Chosen | None
     log: list[str]
+    refusal: str | None
 
 
-_LAST: dict[str, _Choice] = {}
-"""By setting: all forms and stages of an episode say the same, one after the other."""
-
-
-def _last(request: InstructionRequest, name: str) -> _Choice | None:
-    """Return the choice for a request if it was the last one."""
-    last = _LAST.get(name)
-    return last if last and last.key == _key(request) else None
-
-
-def _key(request: InstructionRequest) -> tuple[object, ...]:
-    own = request.wordings is None
-    return (request.episode, request.sampler.key, request.frame, request.pool, own)
+_CHOICES: dict[tuple[object, ...], _Choice] = {}
+"""All forms and stages of an episode say the same, and a split is said again and again."""
+_MOST_CHOICES = 256
 
 
 def _choose(request: InstructionRequest, name: str) -> _Choice:
-    choice = _last(request, name)
-    if choice is None:
+    """Return what a setting says of an episode; no choice if it refuses."""
+    sampler, own = request.sampler, request.wordings is None
+    key = (name, sampler.key, request.frame, request.pool, own)
+    found = _CHOICES.get(key)
+    if found is None or found.episode != request.episode:
+        if len(_CHOICES) >= _MOST_CHOICES:
+            _CHOICES.clear()
         log: list[str] = []
-        drawing = replace(request, sampler=replace(request.sampler, log=log))
-        known = _known(request.task.name, name, request.pool)
-        choice = _LAST[name] = _Choice(_key(request), choose(drawing, name, known), log)
-    return choice
+        reason, chosen = all_settings()[name].refusal(request), None
+        if reason is None:
+            known = _known(request.task.name, name, request.pool)
+            chosen = choose(replace(request, sampler=replace(sampler, log=log)), name, known)
+        if chosen is None:
+            reason = reason or f"language 4 has no scenario for it in the pool {request.pool}"
+        found = _CHOICES[key] = _Choice(request.episode, chosen, log, reason)
+    return found
 
 
 @functools.cache
 def in_language_4(name: str) -> Setting:
     """Return a setting that speaks in scenarios."""
-    setting, of = all_settings()[name], _DIRECT if name == _CONTEXTUAL else name
+    of = _DIRECT if name == _CONTEXTUAL else name
 
     def refusal(request: InstructionRequest) -> str | None:
         if task_scenarios(request.task.name) is None:
             return f"language 4 has no scenarios of {request.task.name} yet"
-        reason = None if _last(request, of) else setting.refusal(request)
-        if reason or name == _EXPLICIT or _choose(request, of).chosen:
-            return reason
-        return f"language 4 has no scenario for it in the pool {request.pool}"
+        return None if name == _EXPLICIT else _choose(request, of).refusal
 
-    return replace(setting, say=lambda request: say(request, name, of), refusal=refusal)
+    say_it = functools.partial(say, setting=name, of=of)
+    return replace(all_settings()[name], say=say_it, refusal=refusal)
 
 
 def say(request: InstructionRequest, setting: str, of: str) -> InstructionSpec:
@@ -116,7 +110,7 @@ def say_chosen(
 ) -> InstructionSpec:
     """Return the words of a scenario."""
     scenario, options = chosen.scenario, request.options
-    speech = Speech(request, words, _with_people(request, chosen), scenario)
+    speech = Speech(request, words, chosen.introduced, scenario)
     utterances = [UtteranceSpec("introduction", speech.phrase(scenario.text("introduction")))]
     notes: dict[str, object] = {**chosen.introduced.notes, "scenario": scenario.fields.frame}
     if setting == _CONTEXTUAL:
@@ -158,21 +152,6 @@ def _stages(
         yield UtteranceSpec("cue", speech.phrase(scenario.text("cue")))
 
 
-def _with_people(request: InstructionRequest, chosen: Chosen) -> Introduced:
-    """Add two people, who are different, and their pronouns, to what is introduced."""
-    if not chosen.scenario.people:
-        return chosen.introduced
-    people = chosen.scenario.people
-    one = request.sampler.pick("person", people)
-    other = request.sampler.pick("other person", [each for each in people if each is not one])
-    added = {
-        f"{slot}{number}": (IntroducedValue("", "person", word, word),)
-        for number, words in (("", one), (".2", other))
-        for slot, word in zip(PERSON, words, strict=True)
-    }
-    return chosen.introduced.with_values(**added)
-
-
 class Speech:
     """The words of one scenario in one episode.
 
@@ -192,22 +171,23 @@ class Speech:
     ) -> None:
         self._request, self._words, self._introduced = request, words, introduced
         self._scenario = scenario
-        self._listed = scenario.fields.list if scenario else ""
 
-    def phrase(self, text: Text, introduced: Introduced | None = None) -> Phrase:
-        """Return a sentence with its marks filled."""
+    def phrase(
+        self, text: Text, introduced: Introduced | None = None, *, resolved: bool = False
+    ) -> Phrase:
+        """Return a sentence with its marks filled; resolved, pointers are replaced."""
         values = introduced or self._introduced
         pieces: list[TaggedText] = []
         for part in text:
-            if isinstance(part, str):
-                pieces.append(TaggedText(part))
+            if isinstance(part, TaggedText):
+                pieces.append(part)
             elif isinstance(part, Slot):
                 pieces.extend(values.phrase(part))
             elif isinstance(part, Agreement):
                 words = part.one if values.count(part.controller) == 1 else part.many
                 pieces.append(TaggedText(words))
             else:
-                pieces.extend(self._pointing(part))
+                pieces.extend(self._named(part) if resolved else self._pointing(part))
         return tuple(piece for piece in pieces if piece.text)
 
     def _pointing(self, pointer: Pointer) -> Phrase:
@@ -218,18 +198,10 @@ class Speech:
         words = self._joined(self.phrase(pointer.parts, values))
         return anaphor(words, kind, *values.referent(pointer.of))
 
-    def resolved(self, text: Text) -> Phrase:
-        """Return words with the referent for every pointer."""
-        pieces: list[TaggedText] = []
-        for part in text:
-            if not isinstance(part, Pointer):
-                pieces.extend(self.phrase((part,)))
-                continue
-            slot, value = self._introduced.referent(part.of)
-            row = row_of(text, part, type_of(part.of, self._listed))
-            named = parse(row.resolved) if row and row.resolved else self._referent(part.of)
-            pieces.extend(antecedent(self._joined(self.phrase(named)), slot, value))
-        return tuple(pieces)
+    def _named(self, pointer: Pointer) -> Phrase:
+        """Return words that name what a pointer stands for."""
+        words = self._joined(self.phrase(pointer.resolved or self._referent(pointer.of)))
+        return antecedent(words, *self._introduced.referent(pointer.of))
 
     def _referent(self, name: str) -> Text:
         """Return the words for what a slot stands for."""
@@ -237,21 +209,21 @@ class Speech:
         kind = found[0].kind if len(found) == 1 else "several"
         ends = {"color": f" {self._request.task.commands.colored}", "visit": "", "placement": ""}
         if kind in ends:
-            return ("the ", Slot(name), ends[kind])
+            return (TaggedText("the "), Slot(name), TaggedText(ends[kind]))
         return (Slot(name, "times" if kind == "number" and name != REFERENCE else None),)
 
     def field(self, name: str, words: Text) -> Phrase:
         """Return the words for a field of the command, resolved if these are asked for."""
-        if not self._request.resolved:
-            return self.phrase(words)
-        scenario, own = self._scenario, f"resolved.{name}"
-        if scenario and own not in scenario.texts and scenario.fields.setting in _STATING:
-            return self.phrase(self._words.stated[name])
-        return self.resolved(scenario.texts.get(own, (words,))[0] if scenario else words)
+        scenario = self._scenario
+        if self._request.resolved and scenario:
+            states = scenario.fields.setting in _STATING
+            usual = self._words.stated[name] if states else words
+            words = scenario.texts.get(f"resolved.{name}", (usual,))[0]
+        return self.phrase(words, resolved=self._request.resolved)
 
     def command(self, fields: Mapping[str, Phrase], lead: Text) -> Phrase:
         """Return the command with the words for some fields; the others state their values."""
-        before = self.resolved(lead) if self._request.resolved else self.phrase(lead)
+        before = self.phrase(lead, resolved=self._request.resolved)
         if self._request.wordings is not None:
             skeleton = self._request.command(
                 {name: self._outside(name, words) for name, words in fields.items()}
@@ -260,7 +232,7 @@ class Speech:
             skeleton = self._skeleton(fields)
         if lead:
             before = _begun(before, str.upper)
-            ended = self._joined(before).endswith((". ", "! ", "? "))
+            ended = before[-1].text.endswith((". ", "! ", "? "))
             skeleton = skeleton if ended else _begun(skeleton, str.lower)
         return (*before, *skeleton)
 
@@ -272,15 +244,9 @@ class Speech:
                 f"Language 4 has no command of {self._words.task} with the fields "
                 f"{', '.join(sorted(wanted))}."
             )
-        pieces: list[TaggedText] = []
-        for part in self._request.sampler.pick(f"command-{len(wanted)}", possible):
-            if not isinstance(part, Slot):
-                pieces.extend(self.phrase((part,)))
-            elif part.name in fields:
-                pieces.extend(fields[part.name])
-            else:
-                pieces.extend(self.phrase(self._words.stated[part.name]))
-        return swap_particles(tuple(pieces)) if fields else tuple(pieces)
+        template = self._request.sampler.pick(f"command-{len(wanted)}", possible)
+        words = {one: fields.get(one) or self.phrase(self._words.stated[one]) for one in wanted}
+        return swap_particles(fill(template, words)) if fields else fill(template, words)
 
     def _outside(self, name: str, words: Phrase) -> Phrase:
         """Return words for a field of a command from outside.
@@ -315,6 +281,8 @@ class Speech:
             for values in rival_values(self._request, self._introduced)
             if set(slots_in(text)) <= set(values.values)
         )
+        if not found:
+            raise InvalidValueError("no competing remark has another value than the goal's")
         return self._request.sampler.cycle("competing distractor", list(found))
 
     @staticmethod

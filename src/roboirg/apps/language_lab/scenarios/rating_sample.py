@@ -8,97 +8,81 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from roboirg.core.instruction_options import DEFAULT_LANGUAGE, InstructionOptions
-from roboirg.language.generator import find_refusal, instruct_with
-from roboirg.language.settings import EXPLICIT, settings_of
-from roboirg.tasks import get_task
+from roboirg.language.settings import EXPLICIT
+from roboirg.language.variants import instructions
 from roboirg.tasks.splits.splits import get_episode
 
 LANGUAGE = 4
 POOL = "test"
+TEXTS = 44
+"""Of each setting, each of another frame."""
 RATERS = (1, 2, 3)
 """Each has a sheet in an order of its own."""
 MOST_SCENES = 400
 """Scenes of a task that are looked at for a frame; each frame comes up long before the last."""
 
-
-class SampledText(NamedTuple):
-    """A text to be rated.
-
-    Attributes:
-        setting: in which it was said.
-        language: version of the language.
-        task: name of the task.
-        frame: of its scenario; empty if it has none.
-        seed: of the scene.
-        text: what is said.
-    """
-
-    setting: str
-    language: int
-    task: str
-    frame: str
-    seed: int
-    text: str
+SampledText = Mapping[str, str | int]
+"""A text to be rated: setting, language, task, frame of its scenario (empty if it has none), seed
+of the scene, text."""
 
 
 def draw_sample(
-    tasks: Sequence[str], settings: Sequence[str], number: int, anchors: int, seed: int
+    tasks: Sequence[str], settings: Sequence[str], anchors: int, seed: int
 ) -> list[SampledText]:
-    """Return up to `number` texts of each setting, and as many anchors over all, shuffled."""
+    """Return up to `TEXTS` texts of each setting, and as many anchors over all, shuffled."""
     rng = np.random.default_rng(seed)
-    found: list[SampledText] = []
+    found, old = list[SampledText](), list[SampledText]()
     for setting in settings:
-        every = [one for task in tasks for one in _texts(task, setting, LANGUAGE, seed, number)]
-        found += [every[at] for at in rng.permutation(len(every))[:number]]
-    old = [
-        one
-        for setting in settings
-        for task in tasks
-        for one in _texts(task, setting, DEFAULT_LANGUAGE, seed, anchors)
-    ]
+        every = [one for task in tasks for one in _texts(task, setting, LANGUAGE, seed, TEXTS)]
+        found += [every[at] for at in rng.permutation(len(every))[:TEXTS]]
+        for task in tasks:
+            old += _texts(task, setting, DEFAULT_LANGUAGE, seed, anchors)
     found += [old[at] for at in rng.permutation(len(old))[:anchors]]
     return [found[at] for at in rng.permutation(len(found))]
 
 
 def _texts(task: str, setting: str, language: int, seed: int, number: int) -> Iterator[SampledText]:
     """Yield a text for each frame; without frames, as many as are asked for."""
-    if setting not in settings_of(get_task(task)):
-        return
-    options = InstructionOptions(setting, language=language, wordings=POOL)
+    options = InstructionOptions(language=language, wordings=POOL)
+    scenes = range(seed * MOST_SCENES, (seed + 1) * MOST_SCENES)
+    episodes = (get_episode(task, "random", index) for index in scenes)
     frames: set[str] = set()
-    for index in range(seed * MOST_SCENES, (seed + 1) * MOST_SCENES):
-        episode = get_episode(task, "random", index)
-        if find_refusal(episode, options) is not None:
-            continue
-        told = instruct_with(episode, options)
+    for episode, told in instructions(episodes, [setting], ["implicit"], options):
         frame = str(told.metadata.get("scenario", ""))
-        if frame in frames or len(frames) >= number:
-            continue
-        frames.add(frame if setting != EXPLICIT and language == LANGUAGE else str(index))
-        yield SampledText(setting, language, task, frame, episode.seed, told.text)
+        if len(frames) >= number:
+            return
+        if frame not in frames:
+            has_frames = setting != EXPLICIT and language == LANGUAGE
+            frames.add(frame if has_frames else episode.key)
+            yield {
+                "setting": setting, "language": language, "task": task, "frame": frame,
+                "seed": episode.seed, "text": told.text,
+            }  # fmt: skip
 
 
 def sheet(texts: Sequence[SampledText], order: int) -> str:
     """Return a rater's sheet: number and text in an order of its own, and a column to fill in."""
     rng = np.random.default_rng(order)
-    rows = [(at + 1, texts[at].text, "") for at in rng.permutation(len(texts)).tolist()]
-    return _table(("number", "text", "rating"), rows)
+    rows = [
+        {"number": at + 1, "text": texts[at]["text"], "rating": ""}
+        for at in rng.permutation(len(texts)).tolist()
+    ]
+    return _table(rows)
 
 
 def key(texts: Sequence[SampledText]) -> str:
     """Return what the numbers of the sheets stand for."""
-    rows = [(number, *one) for number, one in enumerate(texts, 1)]
-    return _table(("number", *SampledText._fields), rows)
+    return _table([{"number": number, **one} for number, one in enumerate(texts, 1)])
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+def _table(rows: Sequence[SampledText]) -> str:
     out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerows([head, *rows])
+    writer = csv.DictWriter(out, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
     return out.getvalue()
