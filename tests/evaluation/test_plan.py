@@ -129,6 +129,20 @@ def test_turns_are_other_jobs_where_there_is_more_than_one_utterance() -> None:
         assert other.options.delivery == ("prompt" if same_job else "turns")
 
 
+def test_language_4_is_another_plan_and_other_jobs_and_the_usual_language_keeps_its_names() -> None:
+    usual, other = (
+        make_plan(["random"], tasks="PickXtimes", settings="direct", language=version)
+        for version in (3, 4)
+    )
+    # As before there was another one.
+    assert usual.fingerprint == "eaf2b54d24f6"
+    assert usual.jobs()[0].slug == "random-PickXtimes-test-0-direct-implicit-8c9f1b01fbb5"
+    assert other.fingerprint != usual.fingerprint
+    for one, another in zip(usual.jobs(), other.jobs(), strict=True):
+        assert one.slug != another.slug
+        assert identity_key(one) != identity_key(another)
+
+
 def test_harder_settings_are_played_only_where_they_are_named() -> None:
     told = {job.setting for job in make_plan(["random"], tasks="StopCube,VideoUnmask").jobs()}
     assert told == set(plain_settings())

@@ -43,6 +43,13 @@ def read(task, text, index=2):
          "latter: lift the container over it, put it down, then lift the container over the "
          "other one."),
          (("green", "red"),)),
+        ("VideoUnmask", ("Ann wants the red and the green cube, but took the green one. Lift the "
+         "container over the cube that is neither of those, put it down, then lift the container "
+         "over the other one."), (("blue", "red"),)),
+        ("StopCube", ("Raffle tickets are for the cube's second and fifth visit. The former won: "
+         "press the button to stop the cube on the target on that visit."), (2,)),
+        ("StopCube", ("Ann got the cube's fifth or fourth visit. Ben took the fifth visit. Stop "
+         "the cube on the target on the other visit."), (4,)),
         ("PickXtimes", "We did it twice. Put the red cube on the target that many times plus one.",
          ("red", 3)),
         ("PickXtimes", ("One doctor says three times a day, another one says once. I trust the "
@@ -89,6 +96,22 @@ def test_is_understood(task, text, goal):
          "the cube on that visit."), "two values of which to choose one"),
         ("PickXtimes", ("I like the red cube. We did it twice. On second thought, double it. Put "
          "it on the target that many times."), "on second thought"),
+        ("StopCube", ("The exam is on the cube's fourth visit to the target, the other exam on its "
+         "third. You're taking the latter: use the button to make the cube stop on the target on "
+         "that visit."), "it can be 3 or 4"),
+        ("StopCube", ("We rehearsed the cube's fifth and fourth visit. We dropped the third visit. "
+         "Do the latter: stop the cube on the target on that visit."), "more than two values"),
+        ("StopCube", ("We want the cube's fifth, second and fourth visit. Let's go with the first "
+         "one: stop the cube on the target on that visit."), "introduces two values"),
+        ("StopCube", ("We want the cube's fifth or second visit. Ben has taken the second one. "
+         "Stop the cube on the target on the other one."), "introduces an element"),
+        ("VideoUnmask", ("We need blue, then green. We love both. The red cube doesn't count. Lift "
+         "the container over the former, put it down, then lift the container over the latter."),
+         "more than two values"),
+        ("PickXtimes", ("My cat knows that one tap with the red cube means dinner. Her cat needs "
+         "three taps. Put it on the target that many times."), "it can be 1 or 3"),
+        ("PickXtimes", ("We vote on the red and the blue cube. Leo just voted out the blue one. "
+         "Put it on the target twice."), "it can be blue or red"),
         ("PickXtimes", "Put the red cube on the target twice. Scratch that.", "scratch that"),
         ("VideoUnmask", ("Ann lost the red cube and Max the green one. Don't begin with the "
          "latter: lift the container over it, put it down, then lift the container over the "

@@ -95,7 +95,7 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
     if unread:
         return Interpretation((), tuple(f'does not understand "{one}"' for one in unread))
     command = read_command(words)
-    open_choice = unsettled_choice(introduced, context, command.text)
+    open_choice = unsettled_choice(introduced, context, before, command.text)
     unused = (*left_over(command, tuple(slots)), *([open_choice] if open_choice else []))
     if unused:
         return Interpretation((), unused)

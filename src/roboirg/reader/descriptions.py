@@ -36,7 +36,8 @@ CHOSEN = Phrases({
 })  # fmt: skip
 _OTHERS = Phrases({
     "the other one":
-        r"\bthe (?:other (?P<noun>cubes?|ones?|box|container|tape|place|spot)|others)\b"
+        r"\bthe (?:other (?P<noun>cubes?|ones?|box|container|tape|place|spot)|others"
+        r"|other(?=$| color$)|one (?:that is left|left over))(?!\w)"
         r"(?! (?:of|from|than)\b| in (?:those|these|them|the two)\b)",
 })  # fmt: skip
 

@@ -130,8 +130,14 @@ def read_discourse(sentences: Iterable[Sentence]) -> DiscourseContext:
 
 
 def _again(introduced: tuple[Value, ...], named: tuple[Value, ...]) -> Value | None:
-    """Return the value that a sentence names alone, if it was introduced before."""
-    return named[0] if len(named) == 1 and named[0] in introduced else None
+    """Return the value that a sentence names alone, if it was introduced before.
+
+    It may have been in the same sentence: *Green and red are taken, red by Leo.*
+    """
+    if len(named) == 1 and named[0] in introduced:
+        return named[0]
+    twice = {one for one in named if named.count(one) > 1}
+    return twice.pop() if len(twice) == 1 and len(set(named)) > 1 else None
 
 
 def _with_remark(context: DiscourseContext, remark: Remark) -> DiscourseContext:

@@ -18,11 +18,13 @@ _ELEMENT = Phrases({
     "during visit number 3":
         rf"\b{_NOUN} (?:number |no )?(?P<number>{NUMBER})\b(?! (?:after|before|visits|placements))",
 })  # fmt: skip
-_PAIR = Phrases({
-    "the second and third visits":
-        rf"\b(?P<first>{ORDINAL}) and (?:the )?(?P<second>{ORDINAL}) {_NOUN}s\b",
+_LIST = Phrases({
+    "the second, fourth and third visit":
+        rf"\b(?:{ORDINAL}(?: (?:,|and|or|, and|, or))?(?: the| its)? )+{_NOUN}s?\b",
+    "his on its third": rf"\b(?:on|at|during|for) (?:its|the) {ORDINAL}(?= ,|$)",
 })  # fmt: skip
-"""The noun goes with both."""
+"""The noun goes with all; in the second, it was said before."""
+_ORDINAL = Phrases({"third": rf"\b{ORDINAL}\b"})
 _ACTS = (
     "reache[sd]|arrive[sd]|passe[sd]|stop(?:s|ped)|move[sd]|goes|went|enter(?:s|ed)|return(?:s|ed)"
 )
@@ -73,11 +75,13 @@ _BARE = Phrases({
 _POINTER = Phrases({
     "during that very visit": rf"\b(?:that|this|the same) (?:very )?(?:one|number|{_NOUN})\b",
     "during the visit I mentioned": rf"\bthe {_NOUN} i\b",
+    "stop the cube then": r"\b(?:target|disc|cube|it) then(?= by\b| ,|$)|\bat that point\b",
 })  # fmt: skip
 _OTHER = Phrases({
     "during the other visit": rf"\bthe (?:other|remaining) {_NOUN}\b",
     "during the other of the two visits":
         rf"\bthe other (?:one )?of (?:the two|those|these|them) {_NOUN}s?\b",
+    "on the other one": r"\bon the other(?: one)?(?: of the two)?(?= (?:by|and|,)|$)",
     "during the visit that is left": rf"\bthe {_NOUN} that is left\b",
     "during the visit other than that":
         rf"\bthe {_NOUN} (?:of (?:the two|them|those) )?other than that\b",
@@ -134,11 +138,14 @@ class OrdinalExpression(NamedTuple):
 
 def named_positions(text: str) -> tuple[int, ...]:
     """Return the elements of a series that a sentence names by number, in order."""
-    pair = _PAIR.search(text)
-    if pair is not None:
-        return tuple(ordinal_of(pair[part]) or 0 for part in ("first", "second"))
-    numbers = (_number(found) for found in _ELEMENT.finditer(text))
-    return tuple(one for one in numbers if isinstance(one, int))
+    named = [(found.start(), _number(found)) for found in _ELEMENT.finditer(text)]
+    for listed in _LIST.finditer(text):
+        named += [
+            (listed.start() + one.start(), ordinal_of(one[0]) or 0)
+            for one in _ORDINAL.finditer(listed[0])
+        ]
+    # The last one of a list is found twice.
+    return tuple(number for _, number in sorted(set(named)) if isinstance(number, int))
 
 
 def read_position(text: str) -> OrdinalExpression | None:

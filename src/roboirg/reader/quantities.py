@@ -87,14 +87,17 @@ _ADVERB = Phrases({
 })  # fmt: skip
 _NOT_AFTER = (
     "the", "that", "this", "those", "these", "which", "other", "another", "every", "each", "any",
-    "some", "no", "than", "as", "from", "red", "green", "blue", "yellow", "gray", "purple",
-    "number", "visit", "placement",
+    "some", "no", "first", "second", "third", "last", "than", "as", "from", "red", "green",
+    "blue", "yellow", "gray", "purple", "number", "visit", "placement",
 )  # fmt: skip
 _POINTED = "".join(rf"(?<!\b{word} )" for word in _NOT_AFTER)
 """After one of these words a number word only points: ``those two``, ``the red one``."""
 _PLAIN = Phrases({
     "three red cubes": rf"{_POINTED}\b(?P<number>{NUMBER})\b(?! times as)",
     "I say this three times": rf"(?<=\b(?:this|that) )(?P<times>{NUMBER})(?= times\b(?! as))",
+    "My cat knows that one tap means dinner":
+        r"\b(?:know|say|think|bet|mean|agree|hear)\w* that "
+        rf"(?P<said>{NUMBER}) (?!times|is\b|was\b|has\b|of\b|and\b|or\b)(?=[a-z])",
 })  # fmt: skip
 _SINGLE = Phrases({
     "a blue cube":
@@ -136,7 +139,7 @@ _READINGS: tuple[Reading, ...] = (
     (_ADVERB, lambda found: CountExpression(quantity=ADVERBS[found[0]]), True),
     (
         _PLAIN,
-        lambda found: CountExpression(quantity=number_of(found["number"] or found["times"])),
+        lambda found: CountExpression(quantity=number_of(next(filter(None, found.groups())))),
         True,
     ),
     (_SINGLE, lambda _found: CountExpression(quantity=1), True),
@@ -163,7 +166,7 @@ def plain_numbers(words: Sentence) -> tuple[int, ...]:
     """Return the plain numbers of a sentence: *three times*, *twice*."""
     text = " ".join(words)
     found = [
-        (match.start(), number_of(match["number"] or match["times"]))
+        (match.start(), number_of(next(filter(None, match.groups()))))
         for match in _PLAIN.finditer(text)
         if match.start() or _SOMEBODY.search(text) is None
     ]

@@ -117,7 +117,9 @@ class ReferenceResolver:
         if position is None:
             return None
         positions, numbers = self._context.positions, self._context.numbers
-        if position.base == "other":
+        if position.base == "other" and self._context.selected:
+            positions = numbers = ()  # what is taken, "the second one", may be a rank or a visit
+        elif position.base == "other":
             preferred = self._context.preferred_position
             positions = tuple(one for one in positions if one != preferred)
         if position.points and not positions and not numbers:

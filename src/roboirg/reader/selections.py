@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
 from roboirg.reader.descriptions import CHOSEN
-from roboirg.reader.discourse_context import DiscourseContext
+from roboirg.reader.discourse_context import DiscourseContext, read_remark
 from roboirg.reader.phrases import Phrases
 from roboirg.reader.tokens import ORDINAL, Sentence
 
@@ -23,7 +23,9 @@ _POINTER = Phrases({
     "I want the former.": r"\bthe (?P<rank>former|latter)\b(?: one)?",
     "I want the first color I mentioned.":
         rf"\bthe (?P<ordinal>first|second|1st|2nd|last) (?:ones?|\w+){_SAID}\b",
-    "I want the second one.": rf"\bthe (?P<bare>first|second|1st|2nd) ones?\b(?!{_SAID}\b| from\b)",
+    "I want the second one.":
+        r"\bthe (?P<bare>first|second|1st|2nd) (?:ones?|of (?:them|those|the two))\b"
+        rf"(?!{_SAID}\b| from\b)",
     "I want the one I mentioned first.":
         rf"\bthe (?:ones?|\w+){_SAID} (?P<time>first|earlier|second|1st|2nd|last|later)\b",
     "I want the other one.":
@@ -164,15 +166,24 @@ def with_selection(context: DiscourseContext, sentences: Iterable[Sentence]) -> 
     )
 
 
-def unsettled_choice(before: DiscourseContext, context: DiscourseContext, command: str) -> str:
+def unsettled_choice(
+    before: DiscourseContext, context: DiscourseContext, sentences: Sequence[Sentence], command: str
+) -> str:
     """Return why a choice between two values stays open; empty if it does not.
 
     Args:
         before: what the sentences introduce.
         context: the same, with the selection.
-        command: the words of the command.
+        sentences: those before the command.
+        command: its words.
     """
     pair = before.introduces_pair()
+    if context.selected or not {"former", "latter"}.isdisjoint(command.split()):
+        for kind in ("colors", "places", "positions"):
+            most = max((len(set(getattr(read_remark(one), kind))) for one in sentences), default=0)
+            # The latter of a list is its last; but after a pair, a third value is none of it.
+            if len(getattr(before, kind)) > max(2, most):
+                return "before the command there are more than two values of which to choose one"
     if context.selected and not pair and _introduces(context):
         return "nothing before the command introduces two values of which to choose one"
     named_again = context.preferred_color or context.preferred_moment or context.preferred_position
