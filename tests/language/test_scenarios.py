@@ -13,6 +13,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import instruct, instruct_with, open_wordings
 from roboirg.language.arms import say_arm
 from roboirg.language.generator import find_refusal
+from roboirg.language.number_words import ordinal, times
 from roboirg.language.scenarios.scenario_file import (
     FOLDER,
     pointer_table,
@@ -20,6 +21,7 @@ from roboirg.language.scenarios.scenario_file import (
     task_scenarios,
 )
 from roboirg.language.variants import expressible_options
+from roboirg.reader import interpret
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
@@ -200,9 +202,70 @@ def test_language_4_is_refused_in_a_sentence_where_it_has_no_words():
         instruct(get_episode("PickXtimes", "test", 0), language=5)
 
 
-def test_the_table_of_pointers_is_closed_and_has_each_once():
-    rows = [(one.words, one.kind, of) for one in pointer_table() for of in one.of]
-    assert len(rows) == len(set(rows))
+PUT, TIMES = "Put {} on the target twice.", "Put the red cube on the target {}."
+THAT_OFTEN = TIMES.format("that many times")
+STOP, VISITS = "Stop the cube on the target {}.", "Leo got its third visit, Mia its fourth visit. "
+COLORS, NUMBERS = "We have the red and the green cube. ", "Leo says twice, Mia says three times. "
+LEAST = {
+    ("color", "same"): (f"We need the red cube. {PUT}", "red"),
+    ("color", "rank"): (COLORS + PUT, "red", "green"),
+    ("color", "other"): (f"{COLORS}Leo has taken the green one. {PUT}", "red"),
+    ("number", "same"): (f"We did it three times. {TIMES}", 3),
+    ("number", "rank"): (f"{NUMBERS}Let's go by {{}}: {THAT_OFTEN}", 2, 3),
+    ("number", "other"): (f"{NUMBERS}Let's forget the former and go by {{}}: {THAT_OFTEN}", 3),
+    ("visit", "same"): (f"Leo got its third visit. {STOP}", 3),
+    ("visit", "rank"): (f"{VISITS}Let's do {{}}: {STOP.format('on that visit')}", 3, 4),
+    ("visit", "other"): (f"{VISITS}Mia did the fourth visit. {STOP.format('on {}')}", 3),
+    ("excluded", "without"): (f"Red and blue are gone. {PUT.format('the cube {}')}", "green"),
+    ("place", "place"): (f"Do you see the cube farthest to your left? {PUT}", "blue"),
+    ("place", "rank"): (
+        "Do you see the cube farthest to your left and the cube farthest to your right? " + PUT,
+        "blue", "red",
+    ),
+    ("clue", "seen"): (f"We need the red cube. {PUT}", "red"),
+    ("clue", "rank"): (COLORS + PUT, "red", "green"),
+}  # fmt: skip
+"""The least that is said around a pointer, by type and operation, and its values by rank."""
+FROM_FOUR = {"minus": 3, "plus": 5, "half": 2, "earlier": 3, "later": 5,
+             "before": 3, "after": 5, "two before": 2}  # fmt: skip
+"""What these operations give from four; the others from two."""
+
+
+def least(row, of):
+    """Return the least that is said around a pointer, and the value that it means."""
+    words = re.sub(r"\{step[^}]*\}", "one", re.sub("[<>]", "", row.words))
+    one_of_two = r"\1" if "step" in words else r"\2"
+    words = re.sub(r"\[[a-z]+: ?([^|]*)\|([^]]*)\]", one_of_two, words)
+    words = words.replace("{rank:ordinal}", "second").replace("{rank}", "the latter")
+    if of in ("colors", "pair") or words == "that":
+        return f"They all talk of {words}. {PUT.format('the red cube')}", "red"
+    if of == "reference":
+        base, value = (4, FROM_FOUR[row.operation]) if row.operation in FROM_FOUR else (2, 4)
+        if re.search("earlier|later|before|after", words):
+            told = f"Leo got its {ordinal(base)} visit. {STOP.format(f'on the visit {words}')}"
+        else:
+            told = f"Leo did it {times(base)}. {TIMES.format(words)}"
+        return told, value
+    text, *values = LEAST[of, row.operation]
+    later = row.kind in ("rank", "second", "latter")
+    text = (
+        text.replace("the cube that is {}", "a cube of {}")
+        if words.endswith("other color")
+        else text
+    )
+    return text.format(words), values[-1 if later else 0]
+
+
+def test_every_pointer_of_the_closed_table_is_read():
+    rows = [(one, of) for one in pointer_table() for of in one.of if of != "amount"]
+    assert len(rows) == len({(one.words, one.kind, of) for one, of in rows})
+    episodes = {task: get_episode(task, "test", 2) for task in ("PickXtimes", "StopCube")}
+    for row, of in rows:
+        text, value = least(row, of)
+        episode = episodes["StopCube" if "Stop the" in text else "PickXtimes"]
+        goals = interpret(text, episode.scene, episode.task).goals
+        slot = "visit" if "Stop the" in text else "repeats" if isinstance(value, int) else "color"
+        assert [one[slot] for one in goals] == [value], text
     assert {one.name for one in FOLDER.iterdir() if one.name.endswith(".toml")} == {
         "general.toml", "pointers.toml", *(f"{task}.toml" for task in WRITTEN),
     }  # fmt: skip

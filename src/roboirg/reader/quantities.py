@@ -95,6 +95,8 @@ _POINTED = "".join(rf"(?<!\b{word} )" for word in _NOT_AFTER)
 _PLAIN = Phrases({
     "three red cubes": rf"{_POINTED}\b(?P<number>{NUMBER})\b(?! times as)",
     "I say this three times": rf"(?<=\b(?:this|that) )(?P<times>{NUMBER})(?= times\b(?! as))",
+    "He picked the number two":
+        rf"(?<=\bthe number )(?P<value>{NUMBER})\b(?! (?:visit|placement|times as))",
     "My cat knows that one tap means dinner":
         r"\b(?:know|say|think|bet|mean|agree|hear)\w* that "
         rf"(?P<said>{NUMBER}) (?!times|is\b|was\b|has\b|of\b|and\b|or\b)(?=[a-z])",

@@ -24,8 +24,8 @@ _POINTER = Phrases({
     "I want the first color I mentioned.":
         rf"\bthe (?P<ordinal>first|second|1st|2nd|last) (?:ones?|\w+){_SAID}\b",
     "I want the second one.":
-        r"\bthe (?P<bare>first|second|1st|2nd) (?:ones?|of (?:them|those|the two))\b"
-        rf"(?!{_SAID}\b| from\b)",
+        r"\bthe (?P<bare>first|second|1st|2nd)(?: (?:ones?|number|of (?:them|those|the two))\b"
+        rf"(?!{_SAID}\b| from\b)|$)",
     "I want the one I mentioned first.":
         rf"\bthe (?:ones?|\w+){_SAID} (?P<time>first|earlier|second|1st|2nd|last|later)\b",
     "I want the other one.":

@@ -61,8 +61,13 @@ def choose(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
 ) -> Chosen | None:
     """Return what is said in a setting that does not refuse; None if no scenario fits."""
-    colors = len(request.color_values)
-    known = [one for one in scenarios if colors in (one.fields.needs.colors or (colors,))]
+    colors, shown = len(request.color_values), len(request.scene_colors)
+    known = [
+        one
+        for one in scenarios
+        if colors in (one.fields.needs.colors or (colors,))
+        and shown in (one.fields.needs.shown or (shown,))
+    ]
     with contextlib.suppress(_NoScenarioError):
         return _with_people(request, _CHOICES[setting](request, known))
     return None

@@ -51,10 +51,12 @@ class Needs(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         colors: possible numbers of colors in the goal.
+        shown: possible numbers of colors in the scene that a goal can ask for.
         list: possible lengths of the list.
     """
 
     colors: tuple[int, ...] = ()
+    shown: tuple[int, ...] = ()
     list: tuple[int, ...] = ()
 
 
