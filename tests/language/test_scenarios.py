@@ -10,6 +10,7 @@ import pytest
 from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import POOLS
 from roboirg.language import instruct, instruct_with, open_wordings
 from roboirg.language.arms import say_arm
 from roboirg.language.generator import find_refusal
@@ -20,6 +21,7 @@ from roboirg.language.scenarios.scenario_file import (
     read_task_scenarios,
     task_scenarios,
 )
+from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.variants import expressible_options
 from roboirg.reader import interpret
 from roboirg.tasks import all_tasks
@@ -143,6 +145,15 @@ def test_no_scenario_breaks_a_rule_in_published_and_random_scenes(task, step):
     rare = "fits none of the scenes"
     assert step > 1 or not broken
     assert not {name: found for name, found in broken.items() if set(found) != {rare}}
+
+
+@pytest.mark.parametrize("task", WRITTEN)
+def test_every_published_scene_has_words_in_both_pools(task):
+    for episode, name, pool in itertools.product(scenes_of(task, 0), all_settings(), POOLS):
+        if name in settings_of(all_tasks()[task]):
+            usual = InstructionOptions(name, wordings=pool)
+            refusals = (find_refusal(episode, replace(usual, language=one)) for one in (3, 4))
+            assert len(set(refusals)) == 1, (episode.key, name, pool)
 
 
 @pytest.mark.parametrize("task", WRITTEN)

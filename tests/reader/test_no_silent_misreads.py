@@ -108,8 +108,8 @@ def test_is_understood(task, text, goal):
         ("VideoUnmask", ("We need blue, then green. We love both. The red cube doesn't count. Lift "
          "the container over the former, put it down, then lift the container over the latter."),
          "more than two values"),
-        ("PickXtimes", ("For the red cube's trick, Ben picked the number two. Ann wanted three, but "
-         "it's not her turn. Put it on the target that many times."), "it can be 2 or 3"),
+        ("PickXtimes", ("For the red cube's trick, Ben picked the number two. Ann wanted three, "
+         "but it's not her turn. Put it on the target that many times."), "it can be 2 or 3"),
         ("PickXtimes", ("My cat knows that one tap with the red cube means dinner. Her cat needs "
          "three taps. Put it on the target that many times."), "it can be 1 or 3"),
         ("PickXtimes", ("We vote on the red and the blue cube. Leo just voted out the blue one. "

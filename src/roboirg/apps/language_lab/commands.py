@@ -205,16 +205,13 @@ def check_scenario_file(
     Example: roboirg language check-scenarios mine.toml --scenario "school trip"
     """
     from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
-    from roboirg.apps.language_lab.scenarios.scenario_report import coverage_lines, report_lines
+    from roboirg.apps.language_lab.scenarios.scenario_report import report_lines
     from roboirg.language.scenarios.scenario_file import read_scenario_file
 
     words = read_scenario_file(path)
-    scenes = scenes_of(words.task, seeds)
-    reports = check_scenarios(words, scenario, scenes)
+    reports = check_scenarios(words, scenario, scenes_of(words.task, seeds))
     for report in reports:
         typer.echo("\n".join(report_lines(report)))
-    if scenario is None:
-        typer.echo("\n".join(coverage_lines(words.task, reports, scenes)))
     broken = sum(len(report.broken) for report in reports)
     if broken:
         raise RoboIRGError(f"Found {counted(broken, 'broken rule')} in {path.name}.")

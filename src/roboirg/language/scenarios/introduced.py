@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -44,6 +44,10 @@ class IntroducedValue(NamedTuple):
         return f"{cardinal(self.value)} {form if self.value == 1 else plural(form)}"
 
 
+Values = Mapping[str, tuple[IntroducedValue, ...]]
+"""By slot: one value, or several."""
+
+
 @dataclass(frozen=True, slots=True)
 class Introduced:
     """The values that the words of an episode can name, by slot.
@@ -53,7 +57,7 @@ class Introduced:
         notes: entries of the metadata.
     """
 
-    values: Mapping[str, tuple[IntroducedValue, ...]]
+    values: Values
     notes: Mapping[str, object] = field(default_factory=dict)
 
     def count(self, controller: str) -> int:
@@ -98,6 +102,24 @@ class Introduced:
         return Introduced({**self.values, **added}, self.notes)
 
 
+class Offer(NamedTuple):
+    """One way to lead to the goal, for scenarios to say.
+
+    Attributes:
+        fields: of the command, that point back.
+        values: what is introduced, by slot; those of the goal are known anyway.
+        notes: entries of the metadata.
+        listed: the slot of which a list is introduced; empty if none is, None for any.
+        remark: the name of the remark that chooses; empty if none does.
+    """
+
+    fields: Collection[str]
+    values: Values
+    notes: Mapping[str, object]
+    listed: str | None = ""
+    remark: str = ""
+
+
 def named(value: GoalValue) -> IntroducedValue:
     """Return a value of the goal, to be named."""
     return IntroducedValue(value.slot, value.slot_type, value.value)
@@ -108,7 +130,7 @@ def as_reference(value: GoalValue, other: str | int) -> IntroducedValue:
     return IntroducedValue(REFERENCE, value.slot_type, other)
 
 
-def goal_values(request: InstructionRequest) -> dict[str, tuple[IntroducedValue, ...]]:
+def goal_values(request: InstructionRequest) -> Values:
     """Return the values of the goal by field, and all of a slot with several by its name."""
     found = {one.field: (named(one),) for one in request.goal_values}
     slots = {one.slot for one in request.goal_values} - set(found)
@@ -118,6 +140,6 @@ def goal_values(request: InstructionRequest) -> dict[str, tuple[IntroducedValue,
     return {**found, **together}
 
 
-def several(name: str, values: Sequence[IntroducedValue]) -> dict[str, tuple[IntroducedValue, ...]]:
+def several(name: str, values: Sequence[IntroducedValue]) -> Values:
     """Return the slots of several values: one by one, and all together."""
     return {name: tuple(values), **{f"{name}.{at}": (one,) for at, one in enumerate(values)}}

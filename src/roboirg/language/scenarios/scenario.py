@@ -60,11 +60,8 @@ class Needs(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     list: tuple[int, ...] = ()
 
 
-class People(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Who can be spoken of, by pronoun."""
-
-    he: Texts
-    she: Texts
+People = Mapping[Literal["he", "she"], Texts]
+"""Who can be spoken of, by pronoun."""
 
 
 class ScenarioFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

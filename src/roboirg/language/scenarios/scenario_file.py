@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 import tomllib
 from collections.abc import Collection, Iterator, Mapping
@@ -129,9 +130,7 @@ def _people(
     if {name.partition(".")[0] for name in said}.isdisjoint(PERSON):
         return ()
     people = fields.people or general().people
-    return tuple(
-        (name, *PRONOUNS[gender]) for gender in PRONOUNS for name in getattr(people, gender)
-    )
+    return tuple((name, *PRONOUNS[one]) for one, names in people.items() for name in names)
 
 
 def _check_fields(
@@ -154,6 +153,8 @@ def _check_fields(
         "must have derive if its setting is reasoning, and only then": (
             (fields.derive is not None) != (fields.setting == "reasoning")
         ),
+        "has a single person; another one must be possible": fields.people is not None
+        and len(list(itertools.chain(*fields.people.values()))) == 1,
         f"has a list of {fields.list!r}; the slots are {', '.join(sorted(_slots(stated)))}": (
             fields.list and fields.list not in _slots(stated)
         ),
@@ -204,11 +205,10 @@ def _pointing(pointer: Pointer, said: str, kind: str, where: str) -> Pointer:
 def type_of(name: str, listed: str = "") -> str:
     """Return the type of what a slot stands for, as in ``of`` of the table of pointers."""
     base, _, number = name.partition(".")
-    if base in ("list", "taken"):
-        several = base == "list" and not number
-        return "pair" if several else SLOT_TYPE_NAMES[listed or "color"]
-    if base == "colors":
-        return "color" if number else "colors"
+    several = {"list": "pair", "colors": "colors"}
+    if base in several and not number:
+        return several[base]
+    base = (listed or "color") if base in ("list", "taken") else base
     return SLOT_TYPE_NAMES.get(base, base)
 
 

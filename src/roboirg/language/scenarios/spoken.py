@@ -238,12 +238,7 @@ class Speech:
 
     def _skeleton(self, fields: Mapping[str, Phrase]) -> Phrase:
         wanted = frozenset(one.field for one in self._request.goal_values)
-        possible = self._words.commands.get((self._request.pool, wanted))
-        if possible is None:
-            raise InvalidValueError(
-                f"Language 4 has no command of {self._words.task} with the fields "
-                f"{', '.join(sorted(wanted))}."
-            )
+        possible = self._words.commands[self._request.pool, wanted]
         template = self._request.sampler.pick(f"command-{len(wanted)}", possible)
         words = {one: fields.get(one) or self.phrase(self._words.stated[one]) for one in wanted}
         return swap_particles(fill(template, words)) if fields else fill(template, words)
@@ -260,12 +255,12 @@ class Speech:
         if name in {one.field for one in self._request.values_of("number")}:
             return words  # what stays around it is added to numbers later
         prefix = commands.by_color.removesuffix("{cube}")
-        core = _without_prefix(words, prefix)
         if prefix and commands.thing not in outside.core:
-            if core == words:
+            first, *rest = words
+            if not first.text.startswith(prefix):
                 raise NoCommandError
-            words = core
-        return self._request.around(name, words)
+            words = (first._replace(text=first.text.removeprefix(prefix)), *rest)
+        return self._request.around(name, tuple(piece for piece in words if piece.text))
 
     def neutral(self, scenario: Scenario) -> Iterator[Phrase]:
         """Yield remarks: first the scenario's own, then those about anything, for ever."""
@@ -293,11 +288,3 @@ class Speech:
 def _begun(words: Phrase, case: Callable[[str], str]) -> Phrase:
     first, *rest = words
     return (first._replace(text=case(first.text[:1]) + first.text[1:]), *rest)
-
-
-def _without_prefix(words: Phrase, prefix: str) -> Phrase:
-    first, *rest = words
-    if not prefix or not first.text.startswith(prefix):
-        return words
-    left = first.text.removeprefix(prefix)
-    return (*((first._replace(text=left),) if left else ()), *rest)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from roboirg.core.episode import Goal, Scene
+from roboirg.core.episode import Scene
 from roboirg.language.landmarks import selectors
 from roboirg.language.request import InstructionRequest
 from roboirg.language.scenarios.choice import Chosen
@@ -70,16 +70,3 @@ def _at(request: InstructionRequest, phrase: str) -> Value:
             cube = scene.hidden_in(item.name) if item.color is None else item
             return None if cube is None else cube.color
     return None
-
-
-def open_goals(request: InstructionRequest, fields: Sequence[str]) -> list[Goal]:
-    """Return the goals of the scene that agree with the episode's but in the fields left open."""
-    goal = request.episode.goal.as_mapping()
-    open_slots = {field.partition(".")[0] for field in fields}
-    size = {slot: len(value) for slot, value in goal.items() if isinstance(value, tuple)}
-    return [
-        one
-        for one in request.task.goals(request.episode.scene)
-        if all(value == goal[slot] for slot, value in one.slots if slot not in open_slots)
-        and all(len(one.texts(slot)) == length for slot, length in size.items())
-    ]

@@ -8,22 +8,22 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
 
-from roboirg.apps.language_lab.scenarios.meaning import meant_value, open_goals
+from roboirg.apps.language_lab.scenarios.meaning import meant_value
 from roboirg.apps.language_lab.scenarios.sentence_rules import blanked, broken_sentences
-from roboirg.apps.language_lab.validation.episode_checks import places_of
-from roboirg.apps.language_lab.validation.leaks import find_leaks
+from roboirg.apps.language_lab.validation.episode_checks import leaking, only_candidate, places_of
 from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import DEFAULT_LANGUAGE, InstructionOptions
-from roboirg.language.generator import find_refusal, request_of, spoken_instruction
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language.generator import request_of, spoken_instruction
 from roboirg.language.instruction import Instruction, Mention
 from roboirg.language.request import InstructionRequest
 from roboirg.language.scenarios.choice import Chosen, choose
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.spoken import say_chosen
+from roboirg.language.settings import all_settings
 from roboirg.language.token_counts import ADDED_TOKENS, USUAL_LIMIT, count_tokens
 from roboirg.reader import interpret
-from roboirg.tasks import with_goal
+from roboirg.tasks import goals_of, with_goal
 from roboirg.tasks.splits.splits import get_episode
 
 RANDOM_SCENES = 200
@@ -42,7 +42,7 @@ class ScenarioReport:
         broken: the rules that it breaks, with the number of scenes in which it does.
         examples: for each broken rule one text.
         renderings: texts, from different scenes.
-        scenes: keys of the scenes that it fits.
+        scenes: number of scenes that it fits.
         open: number of these where its command alone leaves several goals.
         longest: the text with most tokens, after their number.
         read: number of texts that the interpreter has read.
@@ -55,7 +55,7 @@ class ScenarioReport:
     broken: Counter[str] = field(default_factory=Counter)
     examples: dict[str, str] = field(default_factory=dict)
     renderings: list[str] = field(default_factory=list)
-    scenes: set[str] = field(default_factory=set)
+    scenes: int = 0
     open: int = 0
     longest: tuple[int, str] = (0, "")
     read: int = 0
@@ -141,15 +141,13 @@ def _checked(
 
 def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episode) -> None:
     """Check what a scenario says of an episode, in every form."""
-    fields, number = report.scenario.fields, len(report.scenes)
+    fields, number = report.scenario.fields, report.scenes
     name = "contextual" if fields.setting == "direct" else fields.setting
     options = InstructionOptions(name, language=4, wordings=fields.pool)
     variants = [options, replace(options, form="resolved")]
     if fields.setting == "direct":
         variants.append(replace(options, distractor="competing"))
-    if find_refusal(episode, replace(options, language=DEFAULT_LANGUAGE)) is not None:
-        return
-    texts: list[str] = []
+    told: list[Instruction] = []
     for variant in variants:
         request = request_of(episode, variant)
         try:
@@ -159,8 +157,8 @@ def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episod
             return
         if said is None:
             return
+        told.append(said[1])
         text = said[1].text
-        texts.append(text)
         for rule in () if request.resolved else _broken(request, *said):
             report.add(rule, text)
         # What is seen is said again in the resolved form, which nobody has to hear.
@@ -168,23 +166,24 @@ def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episod
             report.longest = max(report.longest, (tokens_of(text), text))
         if number % READ_EVERY == 0:
             _read(report, episode, text)
+    implicit = told[0]
     if len(report.renderings) < SHOWN and number % 3 == 0:
-        report.renderings.append(texts[0])
-    report.scenes.add(episode.key)
-    goals = open_goals(request, report.scenario.said)
-    others = [with_goal(episode, goal) for goal in goals if goal != episode.goal]
-    report.open += bool(others)
-    for other in others[number % max(1, len(others)) :][:1]:
-        said = _said(request_of(other, options), words, report.scenario)
-        if said and said[1].text == texts[0]:
-            report.add("says the same of another goal", texts[0])
+        report.renderings.append(implicit.text)
+    report.scenes += 1
+    report.open += not only_candidate(episode, implicit)
+    others = [goal for goal in goals_of(episode) if goal != episode.goal]
+    for goal in others[number % max(1, len(others)) :][:1]:
+        said = _said(request_of(with_goal(episode, goal), options), words, report.scenario)
+        if said and said[1].text == implicit.text:
+            report.add("says the same of another goal", implicit.text)
 
 
 def _said(
     request: InstructionRequest, words: TaskScenarios, scenario: Scenario
 ) -> tuple[Chosen, Instruction] | None:
     """Return what a scenario says, and how it was chosen; None if it does not fit."""
-    chosen = choose(request, scenario.fields.setting, [scenario])
+    refused = all_settings()[request.options.setting].refusal(request) is not None
+    chosen = None if refused else choose(request, scenario.fields.setting, [scenario])
     if chosen is None:
         return None
     spec = say_chosen(request, request.options.setting, words, chosen)
@@ -200,9 +199,8 @@ def _broken(request: InstructionRequest, chosen: Chosen, told: Instruction) -> I
             found = meant_value(request, chosen, name, text)
             if found != goal[name]:
                 yield f"say.{name}: means {found}, but the goal is {goal[name]}"
-    leaks = find_leaks(told, request.episode.goal)
-    if leaks:
-        yield f"the command gives away {' and '.join(sorted(leaks))}"
+    for _, words in leaking(told, request.episode):
+        yield f"the command gives away {words}"
     yield from _broken_pointers(told, listed=bool(scenario.fields.list))
 
 
