@@ -83,7 +83,7 @@ def spoken(task, language=4):
         ("say.color", "say.colour", "has say.colour; the fields are color, repeats"),
         ('pool = "train"', 'pool = "dev"', "Invalid enum value 'dev' - at `$.pool`"),
         ('"{he}', '"\u2019{he}', "must be printable ASCII"),
-        ("[[scenario]]", "[[scenario", "is not valid TOML"),
+        ("[[scenario]]", "[[scenario", "(at line 3, column 11)"),
         ('task = "PickXtimes"', 'task = "Juggle"', "there is no Juggle.toml"),
     ],
 )

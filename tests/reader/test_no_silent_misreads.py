@@ -99,6 +99,8 @@ def test_is_understood(task, text, goal):
         ("StopCube", ("The exam is on the cube's fourth visit to the target, the other exam on its "
          "third. You're taking the latter: use the button to make the cube stop on the target on "
          "that visit."), "it can be 3 or 4"),
+        ("StopCube", ("We can take the cube's fifth visit or its fourth. Hardly anyone liked the "
+         "former, so we picked the other one: stop the cube on the target then."), "4 or 5"),
         ("StopCube", ("We rehearsed the cube's fifth and fourth visit. We dropped the third visit. "
          "Do the latter: stop the cube on the target on that visit."), "more than two values"),
         ("StopCube", ("We want the cube's fifth, second and fourth visit. Let's go with the first "

@@ -21,7 +21,7 @@ _ELEMENT = Phrases({
 _LIST = Phrases({
     "the second, fourth and third visit":
         rf"\b(?:{ORDINAL}(?: (?:,|and|or|, and|, or))?(?: the| its)? )+{_NOUN}s?\b",
-    "his on its third": rf"\b(?:on|at|during|for) (?:its|the) {ORDINAL}(?= ,|$)",
+    "his on its third": rf"\b(?:its|(?:on|at|during|for) the) {ORDINAL}(?= ,|$)",
 })  # fmt: skip
 """The noun goes with all; in the second, it was said before."""
 _ORDINAL = Phrases({"third": rf"\b{ORDINAL}\b"})

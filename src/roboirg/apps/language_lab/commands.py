@@ -235,9 +235,6 @@ def sample_texts(
     texts = draw_sample(known_tasks(tasks), known_settings(settings), anchors, seed)
     if not texts:
         raise InvalidValueError(f"Language 4 has no words for {tasks} in {settings}.")
-    if out.exists() and not out.is_dir():
-        raise InvalidValueError(f"{str(out)!r} is a file; --out must be a folder.")
-    out.mkdir(parents=True, exist_ok=True)
     for rater in RATERS:
         write_atomically(out / f"sheet-{rater}.csv", sheet(texts, rater))
     write_atomically(out / "key.csv", key(texts))

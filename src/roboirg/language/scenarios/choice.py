@@ -21,7 +21,6 @@ from roboirg.language.scenarios.introduced import (
     IntroducedValue,
     Offer,
     Values,
-    as_reference,
     goal_values,
     named,
     several,
@@ -157,7 +156,8 @@ def _list(request: InstructionRequest, scenario: Scenario, others: Others) -> li
     size = request.sampler.pick("list length", _lengths(request, scenario, others))
     left = list(itertools.permutations(others[scenario.fields.list], size - len(own)))
     values = [named(one) for one in own]
-    values += [as_reference(own[0], one) for one in request.sampler.pick("listed others", left)]
+    drawn = request.sampler.pick("listed others", left)
+    values += [IntroducedValue(REFERENCE, own[0].slot_type, one) for one in drawn]
     order = request.sampler.pick("list order", list(itertools.permutations(range(size))))
     return [values[at] for at in order]
 

@@ -17,7 +17,6 @@ from roboirg.language.scenarios.introduced import (
     IntroducedValue,
     Offer,
     Values,
-    as_reference,
     several,
 )
 from roboirg.language.slot_types.ordinal import series_length
@@ -41,7 +40,7 @@ def _deduced(request: InstructionRequest) -> Iterator[Offer]:
     for value in request.values_of("number"):
         choices = request.alternative_numbers(value.slot)
         for relation, (reference,) in deductions([value.number], choices):
-            values = _counted(as_reference(value, reference), relation.offset)
+            values = _counted(value, reference, relation.offset)
             yield _derived(["number deduction"], [value.field], values, relation.name)
 
 
@@ -54,14 +53,14 @@ def _stepped(
     length = series_length(request, value)
     choices = [number for (number,) in request.alternative_numbers(value.slot)]
     for step in open_steps(known, value.number, length, choices):
-        values = _counted(as_reference(value, value.number - step.offset), step.offset)
+        values = _counted(value, value.number - step.offset, step.offset)
         yield _derived([pattern], [value.field], values, step.name)
 
 
-def _counted(reference: IntroducedValue, offset: int) -> Values:
+def _counted(value: GoalValue, reference: int, offset: int) -> Values:
     """Return a reference, and the step from there to the goal, without its direction."""
-    step = IntroducedValue("", "number", abs(offset))
-    return {"reference": (reference,), **({"step": (step,)} if offset else {})}
+    step = {"step": (IntroducedValue("", "number", abs(offset)),)} if offset else {}
+    return {"reference": (IntroducedValue(REFERENCE, value.slot_type, reference),), **step}
 
 
 def _excluded(request: InstructionRequest) -> Iterator[Offer]:

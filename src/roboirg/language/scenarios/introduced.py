@@ -125,19 +125,13 @@ def named(value: GoalValue) -> IntroducedValue:
     return IntroducedValue(value.slot, value.slot_type, value.value)
 
 
-def as_reference(value: GoalValue, other: str | int) -> IntroducedValue:
-    """Return another value of the same kind, which only leads to the goal."""
-    return IntroducedValue(REFERENCE, value.slot_type, other)
-
-
 def goal_values(request: InstructionRequest) -> Values:
     """Return the values of the goal by field, and all of a slot with several by its name."""
-    found = {one.field: (named(one),) for one in request.goal_values}
-    slots = {one.slot for one in request.goal_values} - set(found)
     together = {
-        slot: tuple(named(one) for one in request.goal_values if one.slot == slot) for slot in slots
+        slot: tuple(named(one) for one in request.goal_values if one.slot == slot)
+        for slot in {one.slot for one in request.goal_values}
     }
-    return {**found, **together}
+    return {**together, **{one.field: (named(one),) for one in request.goal_values}}
 
 
 def several(name: str, values: Sequence[IntroducedValue]) -> Values:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import msgspec
@@ -101,10 +101,6 @@ class Scenario(msgspec.Struct, frozen=True):
     def text(self, field: str) -> Text:
         """Return the only sentence of a field; empty if it has none."""
         return self.texts.get(field, ((),))[0]
-
-    def of_kind(self, kind: str) -> Sequence[Text]:
-        """Return the alternatives of a field."""
-        return self.texts.get(kind, ())
 
 
 class General(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

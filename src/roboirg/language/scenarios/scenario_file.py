@@ -5,10 +5,9 @@ from __future__ import annotations
 import functools
 import itertools
 import re
-import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from importlib.resources import files
-from pathlib import Path
+from importlib.resources.abc import Traversable
 from typing import Any, NoReturn, TypeVar
 
 import msgspec
@@ -46,26 +45,24 @@ SENTENCES = frozenset({"introduction", *_CONTEXTUAL, "lead", "say", "resolved", 
 @functools.cache
 def pointer_table() -> tuple[PointerRow, ...]:
     """Return the closed table of pointers."""
-    return _as(tuple[PointerRow, ...], _shared("pointers.toml")["pointer"], "pointers.toml")
+    return _shared(dict[str, tuple[PointerRow, ...]], "pointers.toml")["pointer"]
 
 
 @functools.cache
 def general() -> General:
     """Return what all tasks share."""
-    return _as(General, _shared("general.toml"), "general.toml")
+    return _shared(General, "general.toml")
 
 
-def _shared(name: str) -> dict[str, Any]:
-    return _toml(FOLDER.joinpath(name).read_text(encoding="utf-8"), name)
+def _shared(kind: type[Stored], name: str) -> Stored:
+    return _as(kind, FOLDER.joinpath(name).read_text(encoding="utf-8"), name)
 
 
 @functools.cache
 def task_scenarios(task: str) -> TaskScenarios | None:
     """Return the words of a task; None if none have been written."""
     path = FOLDER.joinpath(f"{task}.toml")
-    if not path.is_file():
-        return None
-    return read_task_scenarios(path.read_text(encoding="utf-8"), f"{task}.toml")
+    return read_scenario_file(path) if path.is_file() else None
 
 
 def read_task_scenarios(text: str, where: str) -> TaskScenarios:
@@ -76,8 +73,7 @@ def read_task_scenarios(text: str, where: str) -> TaskScenarios:
     Raises:
         InvalidValueError: it is not as `docs/add-scenario.md` says.
     """
-    data = _toml(text, where)
-    head = _as(TaskFields, data, where)
+    head = _as(TaskFields, text, where)
     own = None if head.commands else task_scenarios(head.task)
     if own is None and not head.commands:
         _fail(where, f"has no commands, and there is no {head.task}.toml to take them from")
@@ -228,17 +224,13 @@ def _parsed(text: str, where: str) -> Text:
         raise InvalidValueError(f"{where} {error}.") from error
 
 
-def _toml(text: str, where: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(text)
-    except ValueError as error:
-        raise InvalidValueError(f"{where} is not valid TOML: {error}.") from error
-
-
 def _as(kind: type[Stored], data: object, where: str) -> Stored:
+    """Return data of a type, from TOML if it is text."""
     try:
+        if isinstance(data, str):
+            return msgspec.toml.decode(data, type=kind)
         return msgspec.convert(data, kind)
-    except msgspec.ValidationError as error:
+    except (ValueError, msgspec.MsgspecError) as error:
         raise InvalidValueError(f"{where}: {error}.") from error
 
 
@@ -246,7 +238,7 @@ def _fail(where: str, complaint: str) -> NoReturn:
     raise InvalidValueError(f"{where} {complaint}.")
 
 
-def read_scenario_file(path: Path) -> TaskScenarios:
+def read_scenario_file(path: Traversable) -> TaskScenarios:
     """Read a file of scenarios from anywhere."""
     try:
         text = path.read_text(encoding="utf-8")

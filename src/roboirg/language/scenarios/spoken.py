@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple, cast
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.word_pools import PoolName
-from roboirg.language.instruction import REFERENCE, Expression
+from roboirg.language.instruction import REFERENCE, Expression, UtteranceStage
 from roboirg.language.phrases import (
     Phrase,
     TaggedText,
@@ -36,6 +36,13 @@ from roboirg.language.settings import all_settings, contextual
 from roboirg.language.settings.setting import Setting
 
 _EXPLICIT, _CONTEXTUAL, _DIRECT = "explicit", "contextual", "direct"
+_SHARED = {_CONTEXTUAL: _DIRECT}
+"""Settings that say the scenarios of others."""
+_STAGES: Mapping[int, UtteranceStage] = {
+    contextual.REINFORCEMENT: "reinforcement",
+    contextual.DISTRACTOR: "distractor",
+    contextual.CUE: "cue",
+}
 _STATING = ("direct", "direct-rival")
 """Settings whose resolved form states the value; the others keep how it follows."""
 
@@ -73,29 +80,30 @@ def _choose(request: InstructionRequest, name: str) -> _Choice:
     return found
 
 
-@functools.cache
-def in_language_4(name: str) -> Setting:
-    """Return a setting that speaks in scenarios."""
-    of = _DIRECT if name == _CONTEXTUAL else name
-
-    def refusal(request: InstructionRequest) -> str | None:
-        if task_scenarios(request.task.name) is None:
-            return f"language 4 has no scenarios of {request.task.name} yet"
-        return None if name == _EXPLICIT else _choose(request, of).refusal
-
-    say_it = functools.partial(say, setting=name, of=of)
-    return replace(all_settings()[name], say=say_it, refusal=refusal)
+def refusal(request: InstructionRequest) -> str | None:
+    """Return why a setting cannot express an episode; None if it can."""
+    if task_scenarios(request.task.name) is None:
+        return f"language 4 has no scenarios of {request.task.name} yet"
+    setting = request.options.setting
+    return None if setting == _EXPLICIT else _choose(request, _SHARED.get(setting, setting)).refusal
 
 
-def say(request: InstructionRequest, setting: str, of: str) -> InstructionSpec:
-    """Return the words of an episode in a setting, which has scenarios of itself or of direct."""
+def say(request: InstructionRequest) -> InstructionSpec:
+    """Return the words of an episode in a setting that does not refuse it."""
     words = cast("TaskScenarios", task_scenarios(request.task.name))
+    setting = request.options.setting
     if setting == _EXPLICIT:
         speech = Speech(request, words, Introduced(goal_values(request)))
         return InstructionSpec((UtteranceSpec("command", speech.command({}, ())),))
-    choice = _choose(request, of)
+    choice = _choose(request, _SHARED.get(setting, setting))
     request.sampler.log.extend(choice.log)
-    return say_chosen(request, setting, words, cast("Chosen", choice.chosen))
+    return say_chosen(request, words, cast("Chosen", choice.chosen))
+
+
+@functools.cache
+def in_language_4(name: str) -> Setting:
+    """Return a setting that speaks in scenarios."""
+    return replace(all_settings()[name], say=say, refusal=refusal)
 
 
 @functools.cache
@@ -106,14 +114,14 @@ def _known(task: str, setting: str, pool: PoolName) -> tuple[Scenario, ...]:
 
 
 def say_chosen(
-    request: InstructionRequest, setting: str, words: TaskScenarios, chosen: Chosen
+    request: InstructionRequest, words: TaskScenarios, chosen: Chosen
 ) -> InstructionSpec:
     """Return the words of a scenario."""
     scenario, options = chosen.scenario, request.options
     speech = Speech(request, words, chosen.introduced, scenario)
     utterances = [UtteranceSpec("introduction", speech.phrase(scenario.text("introduction")))]
     notes: dict[str, object] = {**chosen.introduced.notes, "scenario": scenario.fields.frame}
-    if setting == _CONTEXTUAL:
+    if options.setting == _CONTEXTUAL:
         utterances += _stages(request, speech, scenario)
         notes["stages"] = list(options.stages)
         if contextual.DISTRACTOR in options.stages:
@@ -141,15 +149,14 @@ def _stages(
     request: InstructionRequest, speech: Speech, scenario: Scenario
 ) -> Iterator[UtteranceSpec]:
     """Yield the stages between introduction and command that are asked for."""
-    stages, options = request.options.stages, request.options
-    if contextual.REINFORCEMENT in stages:
-        yield UtteranceSpec("reinforcement", speech.phrase(scenario.text("reinforcement")))
-    if contextual.DISTRACTOR in stages:
-        remarks = speech.competing if options.distractor == "competing" else speech.neutral
-        for phrase in itertools.islice(remarks(scenario), options.distractors):
-            yield UtteranceSpec("distractor", phrase)
-    if contextual.CUE in stages:
-        yield UtteranceSpec("cue", speech.phrase(scenario.text("cue")))
+    options = request.options
+    remarks = speech.competing if options.distractor == "competing" else speech.neutral
+    for number, stage in _STAGES.items():
+        if number in options.stages:
+            phrases: Iterable[Phrase] = [speech.phrase(scenario.text(stage))]
+            if stage == "distractor":
+                phrases = itertools.islice(remarks(scenario), options.distractors)
+            yield from (UtteranceSpec(stage, phrase) for phrase in phrases)
 
 
 class Speech:
@@ -264,7 +271,7 @@ class Speech:
 
     def neutral(self, scenario: Scenario) -> Iterator[Phrase]:
         """Yield remarks: first the scenario's own, then those about anything, for ever."""
-        yield from map(self.phrase, scenario.of_kind("distractors"))
+        yield from map(self.phrase, scenario.texts.get("distractors", ()))
         known = general().distractors[self._request.pool]
         yield from map(plain, self._request.sampler.cycle("distractor", known))
 
@@ -272,7 +279,7 @@ class Speech:
         """Yield the scenario's remarks about other values, in any order, for ever."""
         found = dict.fromkeys(
             self.phrase(text, values)
-            for text in scenario.of_kind("competing")
+            for text in scenario.texts.get("competing", ())
             for values in rival_values(self._request, self._introduced)
             if set(slots_in(text)) <= set(values.values)
         )

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from roboirg.core.episode import Scene
-from roboirg.language.landmarks import selectors
 from roboirg.language.request import InstructionRequest
 from roboirg.language.scenarios.choice import Chosen
 from roboirg.language.scenarios.introduced import IntroducedValue
@@ -44,9 +42,7 @@ def _operate(
         known = [one.value for one in both] if operation == "other" else request.scene_colors
         left = [one for one in known if one not in gone]
         return left[0] if len(left) == 1 else None
-    if operation == "place":
-        return _at(request, values[pointer.of][0].words)
-    if operation in ("same", "seen", "rank"):
+    if operation in ("same", "seen", "place", "rank"):
         return values[pointer.of][0].value
     return _counted(operation, values)
 
@@ -59,14 +55,3 @@ def _counted(operation: str, values: Mapping[str, Sequence[IntroducedValue]]) ->
         "before": -1, "after": 1, "two before": -2, "two after": 2,
         "double": number, "half": number // 2 - number,
     }[operation]  # fmt: skip
-
-
-def _at(request: InstructionRequest, phrase: str) -> Value:
-    """Return the color of what stands at a place; of a container, that of the cube in it."""
-    scene: Scene = request.episode.scene
-    for one in selectors(scene, request.task.commands.pointed, request.frame):
-        item = one.select() if one.landmark.phrase == phrase else None
-        if item is not None:
-            cube = scene.hidden_in(item.name) if item.color is None else item
-            return None if cube is None else cube.color
-    return None

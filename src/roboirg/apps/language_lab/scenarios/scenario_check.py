@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
@@ -45,10 +45,8 @@ class ScenarioReport:
         scenes: number of scenes that it fits.
         open: number of these where its command alone leaves several goals.
         longest: the text with most tokens, after their number.
-        read: number of texts that the interpreter has read.
-        refused: of these, the ones that it does not understand.
-        misread: of these, the ones from which it gets another goal: a fault of the interpreter,
-            unless a person gets it, too.
+        readings: texts by what the interpreter did with them: ``read``, ``refused``, or
+            ``misread``, a fault of the interpreter, unless a person gets another goal, too.
     """
 
     scenario: Scenario
@@ -58,9 +56,7 @@ class ScenarioReport:
     scenes: int = 0
     open: int = 0
     longest: tuple[int, str] = (0, "")
-    read: int = 0
-    refused: int = 0
-    misread: list[str] = field(default_factory=list)
+    readings: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
 
     def add(self, rule: str, text: str) -> None:
         """Count a broken rule."""
@@ -108,15 +104,11 @@ def check_scenarios(
 
 
 def _in_both_pools(scenario: Scenario, others: Sequence[Scenario]) -> Iterator[str]:
-    """Yield what a scenario shares with one of the other pool."""
-    fields, own = scenario.fields, set(blanked(scenario))
-    for other in others:
-        if other.fields.pool != fields.pool:
-            where = f"the pool {other.fields.pool}"
-            if other.fields.frame == fields.frame:
-                yield f"frame: {where} has the frame {fields.frame!r}, too"
-            for sentence in sorted(own.intersection(blanked(other))):
-                yield f"sentence: {where} has it, too: {sentence!r}"
+    """Yield the frame and the sentences that a scenario shares with one of the other pool."""
+    pool = scenario.fields.pool
+    theirs = {words for one in others if one.fields.pool != pool for words in blanked(one)}
+    for shared in sorted(theirs.intersection(blanked(scenario))):
+        yield f"the other pool has {shared!r}, too"
 
 
 def _checked(
@@ -165,7 +157,9 @@ def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episod
         if variant.distractor == "neutral" and not (request.resolved and name == "grounded"):
             report.longest = max(report.longest, (tokens_of(text), text))
         if number % READ_EVERY == 0:
-            _read(report, episode, text)
+            goals = interpret(text, episode.scene, episode.task).goals
+            wrong = "misread" if len(goals) == 1 else "refused"
+            report.readings["read" if goals == (episode.goal,) else wrong].append(text)
     implicit = told[0]
     if len(report.renderings) < SHOWN and number % 3 == 0:
         report.renderings.append(implicit.text)
@@ -186,7 +180,7 @@ def _said(
     chosen = None if refused else choose(request, scenario.fields.setting, [scenario])
     if chosen is None:
         return None
-    spec = say_chosen(request, request.options.setting, words, chosen)
+    spec = say_chosen(request, words, chosen)
     return chosen, spoken_instruction(request, spec)
 
 
@@ -228,13 +222,3 @@ def _broken_pointers(told: Instruction, *, listed: bool) -> Iterator[str]:
             ranked = True
         elif len(parts) == 1 and len(set(values)) > 1 and not (listed and ranked):
             yield f"{words} can mean {' or '.join(dict.fromkeys(values))}"
-
-
-def _read(report: ScenarioReport, episode: Episode, text: str) -> None:
-    """Have the interpreter read a text."""
-    goals = interpret(text, episode.scene, episode.task).goals
-    report.read += 1
-    if len(goals) != 1:
-        report.refused += 1
-    elif goals[0] != episode.goal:
-        report.misread.append(text)

@@ -12,15 +12,17 @@ from roboirg.language.token_counts import USUAL_LIMIT
 def report_lines(report: ScenarioReport) -> Iterator[str]:
     """Yield what an author wants to know: texts, length, scenes, and every broken rule."""
     fields, fits = report.scenario.fields, report.scenes
+    misread, unread = report.readings["misread"], len(report.readings["refused"])
+    texts = sum(map(len, report.readings.values()))
     yield f"{fields.frame} ({fields.setting}, {fields.pool})"
     yield from (f"  {text}" for text in report.renderings)
     yield (
         f"  {report.longest[0]} of {USUAL_LIMIT} tokens; fits {counted(fits, 'scene')}; "
-        f"the interpreter does not read {report.refused} of {counted(report.read, 'text')}."
+        f"the interpreter does not read {unread} of {counted(texts, 'text')}."
     )
-    if report.misread:
-        yield f"  It gets another goal from {len(report.misread)}; if you do not, tell its authors:"
-        yield f"    {report.misread[0]}"
+    if misread:
+        yield f"  It gets another goal from {len(misread)}; if you do not, tell its authors:"
+        yield f"    {misread[0]}"
     if report.open < fits:
         yield f"  In {counted(fits - report.open, 'scene')} the command alone gives the goal."
     for rule, number in report.broken.items():

@@ -82,13 +82,13 @@ def _wrong(name: str, text: Text) -> Iterator[str]:
 
 
 def blanked(scenario: Scenario) -> Iterator[str]:
-    """Yield the sentences of a scenario with their slots blanked, but those of the command."""
+    """Yield the frame, and the sentences with their slots blanked, but those of the command."""
+    yield f"frame {scenario.fields.frame}"
     for name, texts in scenario.texts.items():
         if not name.startswith(("say", "resolved")):
-            for text in texts:
-                words = literal(text).lower().strip()
-                if len(words.split()) > 2:  # noqa: PLR2004 - "So ..." is no sentence
-                    yield words
+            found = [literal(text).lower().strip() for text in texts]
+            # "So ..." is no sentence.
+            yield from (words for words in found if len(words.split()) > 2)  # noqa: PLR2004
 
 
 def literal(text: Text) -> str:
