@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
+from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.evaluation.plan.option_parsing import (
     parse_episodes,
@@ -138,6 +139,8 @@ def test_language_4_is_another_plan_and_other_jobs_and_the_usual_language_keeps_
     assert usual.fingerprint == "eaf2b54d24f6"
     assert usual.jobs()[0].slug == "random-PickXtimes-test-0-direct-implicit-8c9f1b01fbb5"
     assert other.fingerprint != usual.fingerprint
+    export = ExportPlan(("PickXtimes",), "test", (0,), ("direct",))
+    assert export.fingerprint().startswith("913bf13a2664")
     for one, another in zip(usual.jobs(), other.jobs(), strict=True):
         assert one.slug != another.slug
         assert identity_key(one) != identity_key(another)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -78,6 +79,14 @@ class InstructionOptions:
             "Version of our words: 3; or 4, whole scenarios, for tasks that have them."
         ),
     )
+
+
+def identifying(written: str) -> str:
+    """Return JSON without the usual language, to be hashed.
+
+    Names and fingerprints from before there was another language do not have it.
+    """
+    return re.sub(rf',\s*"language":\s*{DEFAULT_LANGUAGE}\}}', "}", written)
 
 
 class WordKeywords(TypedDict, total=False):

@@ -48,28 +48,13 @@ class TemplateSampler:
         return options[index]
 
 
-class HashSampler(TemplateSampler):
-    """The same with draws from hashes alone, which take a tenth of the time."""
-
-    def pick(self, purpose: str, options: Sequence[Option]) -> Option:
-        """Pick one of the options, all equally likely."""
-        return self._take(purpose, options, _hash(self.key, purpose) % len(options))
-
-    def cycle(self, purpose: str, options: Sequence[Option]) -> Iterator[Option]:
-        """Yield all options in random order, repeating the cycle forever; log what is used."""
-        order = sorted(range(len(options)), key=lambda at: _hash(self.key, f"{purpose}|{at}"))
-        for index in itertools.cycle(order):
-            yield self._take(purpose, options, index)
-
-
 def sampler_of(episode: Episode, variant: int = 0, draws: str = DRAWS) -> TemplateSampler:
     """Return the sampler of an episode; each variant draws its words anew, 0 is the usual one.
 
-    `draws` is the key of the language's draws; all but those of language 3 are hashes.
+    `draws` is the key of the language's draws.
     """
     key = f"{draws}|{episode.task}|{episode.seed}"
-    kind = TemplateSampler if draws == DRAWS else HashSampler
-    return kind(f"{key}|{variant}" if variant else key)
+    return TemplateSampler(f"{key}|{variant}" if variant else key)
 
 
 def _hash(key: str, purpose: str) -> int:
@@ -85,9 +70,13 @@ def _generator(key: str, purpose: str) -> np.random.Generator:
 # Cached: all settings and forms of an episode draw the same.
 @functools.lru_cache(maxsize=1024)
 def _drawn(key: str, purpose: str, count: int) -> int:
+    if not key.startswith(DRAWS):  # hashes alone take a tenth of the time
+        return _hash(key, purpose) % count
     return int(_generator(key, purpose).integers(count))
 
 
 @functools.lru_cache(maxsize=1024)
 def _shuffled(key: str, purpose: str, count: int) -> tuple[int, ...]:
+    if not key.startswith(DRAWS):
+        return tuple(sorted(range(count), key=lambda at: _hash(key, f"{purpose}|{at}")))
     return tuple(_generator(key, purpose).permutation(count).tolist())

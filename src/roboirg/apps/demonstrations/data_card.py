@@ -14,7 +14,7 @@ from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, load_facts
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.version import __version__
 from roboirg.core.word_pools import pool_of
-from roboirg.language import LANGUAGE_VERSION
+from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.util.media import CONTROL_RATE
 
 _STORED = {
@@ -72,13 +72,14 @@ def card_text(
 
 
 def _head_line(plan: ExportPlan) -> str:
+    language = LANGUAGE_VERSIONS[plan.options.language]
     pool = pool_of(plan.split, plan.options.wordings)
     rate = f"{CONTROL_RATE} frames per second, one per control step."
     if plan.actions == "waypoint":
         rate = f"A frame per waypoint; time stamps count frames, {CONTROL_RATE} to the second."
     return (
         f"Split {plan.split}, format {plan.format}, written by roboirg {__version__} (environment "
-        f"{ENVIRONMENT_VERSION}, language {LANGUAGE_VERSION}, wordings of the pool {pool!r}). "
+        f"{ENVIRONMENT_VERSION}, language {language}, wordings of the pool {pool!r}). "
         f"{rate}"
     )
 

@@ -15,10 +15,10 @@ from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
 from roboirg.cli.names import known_name
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions, identifying
 from roboirg.core.observations import CAMERAS, check_cameras
 from roboirg.core.word_pools import pool_of
-from roboirg.language import LANGUAGE_VERSION
+from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.language.generator import instruct_with
 from roboirg.language.instruction_row import row
 from roboirg.language.settings import all_settings
@@ -143,8 +143,12 @@ class ExportPlan:
 
     def fingerprint(self) -> str:
         """Return a hash of everything that determines the dataset."""
-        versions = [LANGUAGE_VERSION, ENVIRONMENT_VERSION, TRAJECTORY_VERSION]
-        text = json.dumps([asdict(self), versions])
+        versions = [
+            LANGUAGE_VERSIONS[self.options.language],
+            ENVIRONMENT_VERSION,
+            TRAJECTORY_VERSION,
+        ]
+        text = identifying(json.dumps([asdict(self), versions]))
         return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -31,7 +31,7 @@ from roboirg.core.delivery import TURNS
 from roboirg.core.environment_options import EnvironmentOptions, check_demonstration_frames
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.field_types import CONTROLS, NAME
-from roboirg.core.instruction_options import DEFAULT_FRAME, DEFAULT_LANGUAGE, InstructionOptions
+from roboirg.core.instruction_options import DEFAULT_FRAME, InstructionOptions, identifying
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.word_pools import POOLS
 from roboirg.evaluation.hosting.policy_opening import open_policy
@@ -274,11 +274,8 @@ class Plan(BaseModel):
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all fields; plans of the usual language keep what they had before the others."""
-        content = self.model_dump(mode="json")
-        if self.instruction.language == DEFAULT_LANGUAGE:
-            del content["instruction"]["language"]
-        return short_hash(msgspec.json.encode(content))
+        """Hash of all fields."""
+        return short_hash(identifying(self.model_dump_json()))
 
     def checked(self) -> Plan:
         """Return this plan if all of it can be played.

@@ -22,11 +22,7 @@ from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.failures import FailureKind
 from roboirg.core.field_types import MOST_CAUSE_LETTERS, Cause, Name, Subgoal, Whole
 from roboirg.core.inference_facts import InferenceFacts
-from roboirg.core.instruction_options import (
-    DEFAULT_LANGUAGE,
-    OPTION_NAMES,
-    InstructionOptions,
-)
+from roboirg.core.instruction_options import InstructionOptions, identifying
 from roboirg.core.observations import DemonstrationSource
 from roboirg.core.plain_text import clip_text
 from roboirg.core.policy_ref import PolicyRef
@@ -127,16 +123,14 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
         """Short unique name that is safe in file names."""
         words = [self.policy, self.task, self.split, self.episode, self.setting, self.form]
         identity = {name: getattr(self, name) for name in IDENTITY}
-        if self.options.language == DEFAULT_LANGUAGE:  # those of the usual language keep theirs
-            said = (name for name in OPTION_NAMES if name != "language")
-            identity["options"] = {name: getattr(self.options, name) for name in said}
         if self.arm == TOLD:
             del identity["arm"]  # files of runs without arms keep their names
         else:
             words.append(self.arm)
         readable = re.sub(r"[^A-Za-z0-9]+", "-", "-".join(map(str, words))).strip("-")[:100]
         # Only from the identity, so that a record (which is a job) has its job's slug.
-        return f"{readable}-{short_hash(msgspec.json.encode(identity))}"
+        written = msgspec.json.encode(identity).decode()
+        return f"{readable}-{short_hash(identifying(written))}"
 
 
 IDENTITY = tuple(name for name in Job.__struct_fields__ if name not in {"ref", "wordings_file"})

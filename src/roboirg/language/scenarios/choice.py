@@ -34,8 +34,6 @@ from roboirg.language.template_sampler import sampler_of
 
 Others = Mapping[str, Sequence[str | int]]
 """Values by slot."""
-LENGTHS = (2, 3)
-"""Of a list that the words introduce."""
 
 
 class Chosen(NamedTuple):
@@ -145,7 +143,7 @@ def _others(request: InstructionRequest) -> Others:
 
 def _lengths(request: InstructionRequest, scenario: Scenario, others: Others) -> list[int]:
     """Return the lengths that the list of a scenario can have."""
-    slot, wanted = scenario.fields.list, scenario.fields.needs.list or LENGTHS
+    slot, wanted = scenario.fields.list, scenario.fields.needs.list or (2, 3)
     meant = len(_of_slot(request, slot))
     return [one for one in wanted if meant <= one <= meant + len(others[slot])]
 

@@ -93,11 +93,6 @@ class Scenario(msgspec.Struct, frozen=True):
     said: Texts
     classes: Mapping[str, tuple[Text, ...]]
 
-    @property
-    def name(self) -> str:
-        """The setting with the frame, unique in a task and pool."""
-        return f"{self.fields.setting}/{self.fields.frame}"
-
     def text(self, field: str) -> Text:
         """Return the only sentence of a field; empty if it has none."""
         return self.texts.get(field, ((),))[0]

@@ -84,10 +84,10 @@ def read_task_scenarios(text: str, where: str) -> TaskScenarios:
         _scenario(one, stated, f"{where}, scenario {one.get('frame', number)!r}")
         for number, one in enumerate(head.scenario, 1)
     )
-    names = [(one.fields.pool, one.name) for one in scenarios]
-    for pool, name in names:
-        if names.count((pool, name)) > 1:
-            _fail(where, f"has the frame {name!r} twice in the pool {pool}")
+    names = [(one.fields.frame, one.fields.setting, one.fields.pool) for one in scenarios]
+    for name in names:
+        if names.count(name) > 1:
+            _fail(where, f"has the frame {name[0]!r} twice in the setting {name[1]}, {name[2]}")
     commands = own.commands if own else _commands(head, where)
     return TaskScenarios(head.task, commands, stated, scenarios)
 

@@ -36,8 +36,6 @@ from roboirg.language.settings import all_settings, contextual
 from roboirg.language.settings.setting import Setting
 
 _EXPLICIT, _CONTEXTUAL, _DIRECT = "explicit", "contextual", "direct"
-_SHARED = {_CONTEXTUAL: _DIRECT}
-"""Settings that say the scenarios of others."""
 _STAGES: Mapping[int, UtteranceStage] = {
     contextual.REINFORCEMENT: "reinforcement",
     contextual.DISTRACTOR: "distractor",
@@ -61,8 +59,10 @@ _CHOICES: dict[tuple[object, ...], _Choice] = {}
 _MOST_CHOICES = 256
 
 
-def _choose(request: InstructionRequest, name: str) -> _Choice:
+def _choose(request: InstructionRequest) -> _Choice:
     """Return what a setting says of an episode; no choice if it refuses."""
+    # Contextual says the scenarios of direct.
+    name = request.options.setting.replace(_CONTEXTUAL, _DIRECT)
     sampler, own = request.sampler, request.wordings is None
     key = (name, sampler.key, request.frame, request.pool, own)
     found = _CHOICES.get(key)
@@ -84,18 +84,16 @@ def refusal(request: InstructionRequest) -> str | None:
     """Return why a setting cannot express an episode; None if it can."""
     if task_scenarios(request.task.name) is None:
         return f"language 4 has no scenarios of {request.task.name} yet"
-    setting = request.options.setting
-    return None if setting == _EXPLICIT else _choose(request, _SHARED.get(setting, setting)).refusal
+    return None if request.options.setting == _EXPLICIT else _choose(request).refusal
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return the words of an episode in a setting that does not refuse it."""
     words = cast("TaskScenarios", task_scenarios(request.task.name))
-    setting = request.options.setting
-    if setting == _EXPLICIT:
+    if request.options.setting == _EXPLICIT:
         speech = Speech(request, words, Introduced(goal_values(request)))
         return InstructionSpec((UtteranceSpec("command", speech.command({}, ())),))
-    choice = _choose(request, _SHARED.get(setting, setting))
+    choice = _choose(request)
     request.sampler.log.extend(choice.log)
     return say_chosen(request, words, cast("Chosen", choice.chosen))
 

@@ -6,8 +6,6 @@ them anchor the ratings. Each rater gets an order of his or her own.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
@@ -16,6 +14,7 @@ from roboirg.core.instruction_options import DEFAULT_LANGUAGE, InstructionOption
 from roboirg.language.settings import EXPLICIT
 from roboirg.language.variants import instructions
 from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.csv_text import csv_text
 
 LANGUAGE = 4
 POOL = "test"
@@ -72,17 +71,9 @@ def sheet(texts: Sequence[SampledText], order: int) -> str:
         {"number": at + 1, "text": texts[at]["text"], "rating": ""}
         for at in rng.permutation(len(texts)).tolist()
     ]
-    return _table(rows)
+    return csv_text(rows)
 
 
 def key(texts: Sequence[SampledText]) -> str:
     """Return what the numbers of the sheets stand for."""
-    return _table([{"number": number, **one} for number, one in enumerate(texts, 1)])
-
-
-def _table(rows: Sequence[SampledText]) -> str:
-    out = io.StringIO()
-    writer = csv.DictWriter(out, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return out.getvalue()
+    return csv_text([{"number": number, **one} for number, one in enumerate(texts, 1)])

@@ -115,7 +115,7 @@ def _checked(
     scenario: Scenario, words: TaskScenarios, episodes: Sequence[Episode]
 ) -> ScenarioReport:
     report = ScenarioReport(scenario)
-    for complaint in broken_sentences(scenario):
+    for complaint in (*broken_sentences(scenario), *_in_both_pools(scenario, words.scenarios)):
         report.add(complaint, "")
     for episode in episodes:
         _check_episode(report, words, episode)
@@ -126,8 +126,6 @@ def _checked(
         report.add("fits none of the scenes", "")
     elif not report.open:
         report.add("its command alone gives the goal in every scene", "")
-    for complaint in _in_both_pools(scenario, words.scenarios):
-        report.add(complaint, "")
     return report
 
 

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable, Mapping
-
 from roboirg.apps.real.study.arrangement_shapes import describe_positions
 from roboirg.apps.real.study.counterbalancing import read_arrangement
 from roboirg.apps.real.study.study_plan import PlannedDemonstration, PlannedTrial, StudyPlan
+from roboirg.util.csv_text import csv_text
 
 TRIALS_FILE, DEMONSTRATIONS_FILE = "trials.csv", "demonstrations.csv"
 
 
 def trials_csv(plan: StudyPlan) -> str:
     """Return a row for each trial, in order. The rows name the policies, unlike the sheet."""
-    return _csv_text(
+    return csv_text(
         {
             "position": number,
             "trial": trial.name,
@@ -33,7 +30,7 @@ def trials_csv(plan: StudyPlan) -> str:
 
 def demonstrations_csv(plan: StudyPlan) -> str:
     """Return a row for each demonstration, in order."""
-    return _csv_text(
+    return csv_text(
         {
             "position": number,
             "demonstration": one.name,
@@ -56,13 +53,3 @@ def _common_columns(planned: PlannedTrial | PlannedDemonstration) -> dict[str, o
         "places": "; ".join(describe_positions(planned.episode.scene)),
         "instruction": " ".join(planned.turns),
     }
-
-
-def _csv_text(rows: Iterable[Mapping[str, object]]) -> str:
-    table = list(rows)
-    out = io.StringIO()
-    if table:
-        writer = csv.DictWriter(out, list(table[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(table)
-    return out.getvalue()

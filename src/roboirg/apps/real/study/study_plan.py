@@ -19,7 +19,7 @@ import numpy as np
 from roboirg.apps.real.study.counterbalancing import counterbalanced_episodes, target_kind
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError, check_names
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions, identifying
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.plan.option_parsing import name_and_spec
 from roboirg.evaluation.plan.plan import Plan
@@ -141,7 +141,7 @@ class StudyPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     @property
     def fingerprint(self) -> str:
         """Digest that identifies the plan."""
-        return short_hash(msgspec.json.encode(self))
+        return short_hash(identifying(msgspec.json.encode(self).decode()))
 
     def trial(self, name: str) -> PlannedTrial:
         """Return the trial of that name.
