@@ -2,6 +2,7 @@
 
 from functools import cache
 
+import layout
 import typer.main
 from made_records import make_record
 from msgspec.structs import replace
@@ -28,6 +29,8 @@ WORDS = {
     "fetch-models": "--help",
     "tasks": "",
     "show": "PickXtimes 0 --out {folder}/sheet.png",
+    "language sample": "--out {folder}/rating --tasks StopCube --settings direct --anchors 1",
+    "language check-scenarios": "{scenarios} --scenario wish --seeds 0",
     "language stats": "--tasks PickXtimes --split val",
     "language validate": "--tasks PickXtimes --split val",
     "language shortcuts": "--tasks StopCube --settings direct --learned",
@@ -89,6 +92,7 @@ def words_of(folder, run):
         "folder": folder,
         "run": run,
         "one_episode": plan_file(episodes=1),
+        "scenarios": layout.PACKAGE / "language" / "scenarios" / "StopCube.toml",
     }
     return {
         name: [word.format_map(paths) for word in words.split()] for name, words in WORDS.items()

@@ -162,12 +162,14 @@ def _list(request: InstructionRequest, scenario: Scenario, others: Others) -> li
 
 def _spatial(request: InstructionRequest) -> Iterator[Offer]:
     colors, marks = request.color_values, draw_landmarks(request)
+    # Of a single cube "at your far left" may be false; it is the one farthest to the left.
+    phrases = [mark.phrase.replace("at your far", "farthest to your") for mark in marks]
     places = [
-        IntroducedValue(color.slot, "place", color.value, mark.phrase)
-        for color, mark in zip(colors, marks, strict=True)
+        IntroducedValue(color.slot, "place", color.value, phrase)
+        for color, phrase in zip(colors, phrases, strict=True)
     ]
     notes: dict[str, object] = {
-        "landmarks": [mark.phrase for mark in marks],
+        "landmarks": phrases,
         "landmark_classes": [mark.level for mark in marks],
         "frame": request.frame,
     }
