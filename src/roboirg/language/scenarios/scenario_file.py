@@ -149,6 +149,10 @@ def _check_fields(
         "must have derive if its setting is reasoning, and only then": (
             (fields.derive is not None) != (fields.setting == "reasoning")
         ),
+        "has a competing remark that names no {rival …}": not all(
+            any(name.startswith("rival ") for name in slots_in(one))
+            for one in texts.get("competing", ())
+        ),
         "has a single person; another one must be possible": fields.people is not None
         and len(list(itertools.chain(*fields.people.values()))) == 1,
         f"has a list of {fields.list!r}; the slots are {', '.join(sorted(_slots(stated)))}": (
