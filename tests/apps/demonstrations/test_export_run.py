@@ -163,8 +163,12 @@ def test_a_trajectory_s_name_has_all_that_it_depends_on(make_plan):
 
 def test_a_stopped_export_of_another_version_is_another_one(make_plan, monkeypatch):
     found = {make_plan().fingerprint()}
-    for name in ("LANGUAGE_VERSION", "ENVIRONMENT_VERSION", "TRAJECTORY_VERSION"):
-        monkeypatch.setattr(export_plan, name, "another")
+    for name, other in (
+        ("LANGUAGE_VERSIONS", {3: "another"}),
+        ("ENVIRONMENT_VERSION", "another"),
+        ("TRAJECTORY_VERSION", "another"),
+    ):
+        monkeypatch.setattr(export_plan, name, other)
         found.add(make_plan().fingerprint())
     assert len(found) == 4
 
