@@ -38,6 +38,10 @@ def finding(
     )
 
 
+UNSEEN = {"StopCube": "undecided", "VideoUnmaskSwap": "execution"}
+"""Nobody sees that a later visit was meant, or that a container in the air was meant alone."""
+
+
 class Mistaken(ScriptedPolicy):
     """The oracle's hands with another goal in mind."""
 
@@ -60,12 +64,14 @@ def test_hands_that_do_another_task_well_fail_by_grounding(task: str) -> None:
         info = play(env, Mistaken(goal))
         found = finding(env, info)
         # A goal that includes more than the right one succeeds on the way.
-        planned = get_task(task).stages(episode.scene, goal)
-        succeeds = planned[: len(episode.stages)] == episode.stages
+        succeeds = (
+            get_task(task).stages(episode.scene, goal)[: len(episode.stages)] == episode.stages
+        )
         assert info["status"] in ({"success"} if succeeds else {"failure", "timeout"}), goal
         assert (info["cause"] is None) == (info["status"] == "success") == info["is_success"]
         assert (found is None) == succeeds
-        assert found is None or found.kind == "grounding", (goal, found)
+        # Of a later visit nobody sees a press; a single container in the air may be the first.
+        assert found is None or found.kind in ("grounding", UNSEEN.get(task)), (goal, found)
 
 
 @pytest.mark.parametrize(

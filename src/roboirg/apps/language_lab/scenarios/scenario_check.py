@@ -152,7 +152,7 @@ def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episod
         for rule in () if request.resolved else _broken(request, *said):
             report.add(rule, text)
         # What is seen is said again in the resolved form, which nobody has to hear.
-        if variant.distractor == "neutral" and not (request.resolved and name == "grounded"):
+        if not (request.resolved and name == "grounded"):
             report.longest = max(report.longest, (tokens_of(text), text))
         if number % READ_EVERY == 0:
             goals = interpret(text, episode.scene, episode.task).goals
