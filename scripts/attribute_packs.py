@@ -18,9 +18,7 @@ import functools
 import sys
 from pathlib import Path
 
-import msgspec
-
-from roboirg.apps.leaderboard.action_replay import ReplayPolicy, replay
+from roboirg.apps.leaderboard.action_replay import ReplayPolicy, job_of, replay
 from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.policy_needs import PolicyNeeds
@@ -69,9 +67,7 @@ def play_again(record: Record, log: ActionLog) -> Record:
     """Return the record that the actions and subgoals of a record lead to."""
     if not record.subgoals:
         return replay(record, log)[0]
-    prepared = PreparedJob(
-        msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)
-    )
+    prepared = PreparedJob(job_of(record))
     again = begin_record(prepared)
     policy = NamingPolicy(log, record, again)
     needs = PolicyNeeds(cameras=("front",), actions=log.space)
@@ -102,7 +98,7 @@ def attributed(line: bytes, folder: Path) -> bytes:
             record.subgoals = again.subgoals
     conclude(
         record,
-        PreparedJob(msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)),
+        PreparedJob(job_of(record)),
         -min(one.step for one in record.events),
         timed_out=(record.cause or "").startswith("not done after"),
         original=goals.original,

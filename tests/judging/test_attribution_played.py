@@ -70,7 +70,6 @@ def test_hands_that_do_another_task_well_fail_by_grounding(task: str) -> None:
         assert info["status"] in ({"success"} if succeeds else {"failure", "timeout"}), goal
         assert (info["cause"] is None) == (info["status"] == "success") == info["is_success"]
         assert (found is None) == succeeds
-        # Of a later visit nobody sees a press; a single container in the air may be the first.
         assert found is None or found.kind in ("grounding", UNSEEN.get(task)), (goal, found)
 
 

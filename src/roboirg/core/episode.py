@@ -49,8 +49,8 @@ Value = TypeVar("Value")
 
 
 def values_in(content: SlotValue) -> tuple[str | int, ...]:
-    """Return the values of a slot, one or several."""
-    return content if isinstance(content, tuple) else (content,)
+    """Return the values of a slot, one or several; what was read from a file has lists."""
+    return tuple(content) if isinstance(content, tuple | list) else (content,)
 
 
 @dataclass(frozen=True, slots=True)

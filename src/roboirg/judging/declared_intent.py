@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from roboirg.core.episode import Episode, SlotValue
+from roboirg.core.episode import Episode, SlotValue, values_in
 from roboirg.core.failures import FailureName
 from roboirg.judging.failure_attribution import FailureAttribution
 
@@ -63,10 +63,7 @@ def _not_followed(found: FailureAttribution) -> FailureAttribution:
 
 
 def _slots(goal: Mapping[str, SlotValue]) -> dict[str, tuple[str | int, ...]]:
-    # A goal that was read from a file has lists.
-    return {
-        slot: tuple(one) if isinstance(one, (list, tuple)) else (one,) for slot, one in goal.items()
-    }
+    return {slot: values_in(content) for slot, content in goal.items()}
 
 
 def _in_words(goal: Mapping[str, SlotValue]) -> str:

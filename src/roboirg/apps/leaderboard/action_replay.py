@@ -55,7 +55,7 @@ class ReplayPolicy:
 
 def unplayed(record: Record) -> Record:
     """Return the record of the same job before anything is played."""
-    return begin_record(PreparedJob(_job(record)))
+    return begin_record(PreparedJob(job_of(record)))
 
 
 def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
@@ -67,7 +67,7 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
     Raises:
         InvalidValueError: the job's wording file is missing or has changed.
     """
-    prepared, policy = PreparedJob(_job(record)), ReplayPolicy(log)
+    prepared, policy = PreparedJob(job_of(record)), ReplayPolicy(log)
     again, played = begin_record(prepared), None
     needs = PolicyNeeds(cameras=(), actions=log.space)
     try:
@@ -84,6 +84,6 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
     return again, played
 
 
-def _job(record: Record) -> Job:
+def job_of(record: Record) -> Job:
     """Return what was played, without the address of the policy."""
     return msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)

@@ -32,9 +32,6 @@ from roboirg.language.settings.reasoning import BLOCK
 from roboirg.language.settings.spatial import draw_landmarks
 from roboirg.language.template_sampler import sampler_of
 
-Others = Mapping[str, Sequence[str | int]]
-"""Values by slot."""
-
 
 class Chosen(NamedTuple):
     """What is said.
@@ -56,8 +53,8 @@ def choose(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
 ) -> Chosen | None:
     """Return what is said in a setting that does not refuse; None if no scenario fits."""
-    sampler, others = request.sampler, _others(request)
-    known = [one for one in scenarios if _fits(one, request, others)]
+    sampler = request.sampler
+    known = [one for one in scenarios if _fits(one, request)]
     said = [
         (offer, saying)
         for offer in _OFFERS[setting](request)
@@ -81,7 +78,7 @@ def choose(
     words = sampler.pick(f"{purpose} words", scenario.classes[kind])
     values = {**goal_values(request), **offer.values}
     if offer.listed is None and scenario.fields.list:
-        values |= several("list", _list(request, scenario, others))
+        values |= several("list", _list(request, scenario))
     values |= _people(request, scenario)
     return Chosen(scenario, Introduced(values, offer.notes), words, offer.remark)
 
@@ -100,13 +97,13 @@ def _people(request: InstructionRequest, scenario: Scenario) -> Values:
     }
 
 
-def _fits(scenario: Scenario, request: InstructionRequest, others: Others) -> bool:
+def _fits(scenario: Scenario, request: InstructionRequest) -> bool:
     """Return whether an episode has what a scenario needs."""
     needs, slot = scenario.fields.needs, scenario.fields.list
     return (
         (not needs.colors or len(request.color_values) in needs.colors)
         and (not needs.shown or len(request.scene_colors) in needs.shown)
-        and (not slot or bool(_lengths(request, scenario, others)))
+        and (not slot or bool(_lengths(request, scenario)))
     )
 
 
@@ -131,28 +128,27 @@ def _of_slot(request: InstructionRequest, slot: str) -> list[GoalValue]:
     return [one for one in request.goal_values if one.slot == slot]
 
 
-def _others(request: InstructionRequest) -> Others:
-    """Return the values that each slot could have in the scene, without those that it has."""
-    found: dict[str, list[str | int]] = {}
-    for slot in dict.fromkeys(one.slot for one in request.goal_values):
-        own = {one.value for one in _of_slot(request, slot)}
-        possible = itertools.chain.from_iterable(request.alternatives(slot))
-        found[slot] = [one for one in dict.fromkeys(possible) if one not in own]
-    return found
+def _others(request: InstructionRequest, slot: str) -> list[str | int]:
+    """Return the values that a slot could have in the scene, without those that it has."""
+    own = {one.value for one in _of_slot(request, slot)}
+    possible = itertools.chain.from_iterable(request.alternatives(slot))
+    return [one for one in dict.fromkeys(possible) if one not in own]
 
 
-def _lengths(request: InstructionRequest, scenario: Scenario, others: Others) -> list[int]:
+def _lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
     """Return the lengths that the list of a scenario can have."""
     slot, wanted = scenario.fields.list, scenario.fields.needs.list or (2, 3)
     meant = len(_of_slot(request, slot))
-    return [one for one in wanted if meant <= one <= meant + len(others[slot])]
+    possible = meant + len(_others(request, slot))
+    return [one for one in wanted if meant <= one <= possible]
 
 
-def _list(request: InstructionRequest, scenario: Scenario, others: Others) -> list[IntroducedValue]:
+def _list(request: InstructionRequest, scenario: Scenario) -> list[IntroducedValue]:
     """Draw the goal's values among others, in any order."""
-    own = _of_slot(request, scenario.fields.list)
-    size = request.sampler.pick("list length", _lengths(request, scenario, others))
-    left = list(itertools.permutations(others[scenario.fields.list], size - len(own)))
+    slot = scenario.fields.list
+    own, others = _of_slot(request, slot), _others(request, slot)
+    size = request.sampler.pick("list length", _lengths(request, scenario))
+    left = list(itertools.permutations(others, size - len(own)))
     values = [named(one) for one in own]
     drawn = request.sampler.pick("listed others", left)
     values += [IntroducedValue(REFERENCE, own[0].slot_type, one) for one in drawn]
@@ -219,7 +215,7 @@ def rival_values(request: InstructionRequest, introduced: Introduced) -> Iterato
     for slot, kind in {one.slot: one.slot_type for one in request.goal_values}.items():
         own = {one.value for one in _of_slot(request, slot)}
         colors: Sequence[str | int] = request.task.commands.colors
-        for other in colors if kind == "color" else _others(request)[slot]:
+        for other in colors if kind == "color" else _others(request, slot):
             if other not in said | own:
                 rival = (IntroducedValue(REFERENCE, kind, other),)
                 yield introduced.with_values(**{f"rival {slot}": rival})

@@ -22,6 +22,8 @@ Operation = Literal[
 ]  # fmt: skip
 PERSON = ("person", "he", "him", "his")
 """The slots of a person; those of another one end in ``.2``."""
+PEOPLE = frozenset(f"{slot}{number}" for number in ("", ".2") for slot in PERSON)
+"""Those of both."""
 REMARKS = ("former", "latter", "not_former", "not_latter")
 """What a remark of direct-rival points at, and whether it sets that aside."""
 

@@ -17,7 +17,7 @@ from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.core.word_pools import PoolName
 from roboirg.language.scenarios.markup import Pointer, Text, parse, pointers_in, slots_in
 from roboirg.language.scenarios.scenario import (
-    PERSON,
+    PEOPLE,
     REMARKS,
     General,
     PointerRow,
@@ -34,7 +34,7 @@ PRONOUNS = {"he": ("he", "him", "his"), "she": ("she", "her", "her")}
 GIVEN = frozenset(
     {"list", "list.0", "list.1", "list.2", "rank", "reference", "step", "excluded", "taken"}
     | {"place", "place.0", "place.1", "clue", "clue.0", "clue.1", "total"}
-    | {f"{word}{number}" for word in PERSON for number in ("", ".2")}
+    | PEOPLE
 )
 """Slots that are no fields of the goal."""
 _CONTEXTUAL = ("reinforcement", "distractors", "competing", "cue")
@@ -123,7 +123,7 @@ def _people(
 ) -> tuple[tuple[str, ...], ...]:
     """Return who can be spoken of, each with his or her pronouns, if the sentences speak of any."""
     said = (name for several in texts.values() for text in several for name in slots_in(text))
-    if {name.partition(".")[0] for name in said}.isdisjoint(PERSON):
+    if PEOPLE.isdisjoint(said):
         return ()
     people = fields.people or general().people
     return tuple((name, *PRONOUNS[one]) for one, names in people.items() for name in names)

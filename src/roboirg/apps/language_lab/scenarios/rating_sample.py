@@ -1,7 +1,7 @@
 """A blind sheet of texts to be rated: shuffled, without task or setting, and a key to it.
 
-One text for each frame, from random scenes, so that nobody has seen it; texts of language 3 among
-them anchor the ratings. Each rater gets an order of his or her own.
+One text for each frame, from random scenes, so that it is new to every rater; texts of language 3
+among them anchor the ratings. Each rater gets an order of his or her own.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from roboirg.core.episode import ALL_COLORS
 from roboirg.language.number_words import CARDINALS, ORDINALS
 from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, pointers_in
-from roboirg.language.scenarios.scenario import PERSON, Scenario
+from roboirg.language.scenarios.scenario import PEOPLE, Scenario
 
 NEVER: Mapping[str, str] = {
     r"you(?:'ve| have)? (?:just )?saw|you(?:'ve| have) (?:just )?seen|as you saw": (
@@ -38,7 +38,7 @@ _SILENT = ("distractors", "cue")
 """Fields that name no value at all."""
 _COMMAND = ("lead", "say", "remarks")
 """Fields of the command, which may point back only."""
-_FREE_SLOTS = {f"{word}{number}" for word in PERSON for number in ("", ".2")} | {"rank", "step"}
+_FREE_SLOTS = PEOPLE | {"rank", "step"}
 _POINTED_AT = {
     "remarks.former": "list.0", "remarks.latter": "list.1",
     "remarks.not_former": "list.0", "remarks.not_latter": "list.1",

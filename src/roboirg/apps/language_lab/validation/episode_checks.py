@@ -16,7 +16,7 @@ from roboirg.apps.language_lab.validation.validation_results import (
     RuleViolation,
     ValidationResults,
 )
-from roboirg.core.episode import SPLITS, Episode, Goal, Split
+from roboirg.core.episode import SPLITS, Episode, Goal, Split, values_in
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import expressible, find_refusal, instruct_with
@@ -202,9 +202,7 @@ def only_candidate(episode: Episode, instruction: Instruction) -> bool:
 def _contents(goal: Goal, slots: Collection[str]) -> Mapping[str, Counter[str]]:
     """Return the values of some slots, in any order."""
     return {
-        slot: Counter(map(str, value if isinstance(value, tuple) else (value,)))
-        for slot, value in goal.slots
-        if slot in slots
+        slot: Counter(map(str, values_in(value))) for slot, value in goal.slots if slot in slots
     }
 
 

@@ -23,7 +23,7 @@ from urllib.parse import quote
 import msgspec
 
 from roboirg.core.conditions import Fact, facts_of
-from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Scene
+from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Scene, values_in
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.fact_traits import fact_traits
 from roboirg.core.plain_text import counted
@@ -270,7 +270,7 @@ def _named(record: Record) -> str | None:
 
 def goal_words(goal: Mapping[str, Any]) -> str:
     """Return the values of a goal, or of what a model named, in words: ``red, three times``."""
-    values = {slot: one if isinstance(one, tuple | list) else (one,) for slot, one in goal.items()}
+    values = {slot: values_in(content) for slot, content in goal.items()}
     if {"colors", "counts"} <= values.keys():
         amounts = itertools.zip_longest(values.pop("counts"), values.pop("colors"), fillvalue="?")
         values["amounts"] = tuple(f"{count} {color}" for count, color in amounts)
