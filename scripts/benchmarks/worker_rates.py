@@ -1,4 +1,4 @@
-"""Episodes an hour of workers that share one policy process."""
+"""Episodes an hour, or steps a second, of workers that share one policy process."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.step_times import CHUNK
-from roboirg.core.observations import FRONT, Demonstration, Observation
+from roboirg.core.observations import CAMERAS, FRONT, Demonstration, Observation
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.play.rollout import EpisodeRunner
 from roboirg.evaluation.run.executor import LocalProcesses
 
 MAX_STEPS = 20 * CHUNK
+FEW_STEPS = 5 * CHUNK
 EPISODES = 12
 """Episodes that each worker plays, about."""
 _HOUR_S = 3600
@@ -33,6 +34,7 @@ class WavingPolicy:
 
     cameras: ClassVar[tuple[str, ...]] = (FRONT,)
     demonstration_frames: ClassVar[str] = "none"
+    chunk: ClassVar[int] = CHUNK
     version = "1"
 
     def __init__(self) -> None:
@@ -45,14 +47,26 @@ class WavingPolicy:
         self._start, self._step = None, 0
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
-        """Return the next sixteen actions."""
+        """Return the next actions."""
         if self._start is None:
             self._start = np.array(observation["joint_positions"], np.float64)
-        steps = np.arange(self._step + 1, self._step + CHUNK + 1)
-        self._step += CHUNK
-        rows = np.tile(np.append(self._start, 1.0), (CHUNK, 1))
+        steps = np.arange(self._step + 1, self._step + self.chunk + 1)
+        self._step += self.chunk
+        rows = np.tile(np.append(self._start, 1.0), (self.chunk, 1))
         rows[:, 0] += _SWING * np.sin(steps / CHUNK)
         return rows
+
+
+class FrontPicture(WavingPolicy):
+    """Swings the arm, and wants the front camera's picture of every step."""
+
+    chunk = 1
+
+
+class BothPictures(FrontPicture):
+    """Wants both pictures of every step."""
+
+    cameras = CAMERAS
 
 
 class SlowPolicy:
@@ -76,7 +90,12 @@ class SlowPolicy:
         return [state.act(one) for state, one in zip(states, observations, strict=True)]
 
 
-def episodes_per_hour(policy: type, workers: int) -> float:
+def steps_per_second(policy: type, workers: int) -> float:
+    """Return the control steps a second of all workers together, without their start."""
+    return episodes_per_hour(policy, workers, FEW_STEPS) * FEW_STEPS / _HOUR_S
+
+
+def episodes_per_hour(policy: type, workers: int, max_steps: int = MAX_STEPS) -> float:
     """Return the pace at which a number of workers plays a policy, without their start."""
     count = EPISODES * workers
     plan = make_plan(
@@ -85,7 +104,7 @@ def episodes_per_hour(policy: type, workers: int) -> float:
         settings="explicit",
         episodes="4",
         policy_seeds=f"0-{count // 4 - 1}",
-        max_steps=MAX_STEPS,
+        max_steps=max_steps,
     )
     # Without the beginning, when some workers still start, and the end, when some have no more.
     first, last = 4 * workers, count - workers

@@ -1,0 +1,126 @@
+"""Pack what a bare machine with a GPU needs into parts that are small enough to send.
+
+That machine has Python, pip and the GPU's driver, and reaches no other. The parts hold wheels, the
+Vulkan loader, the model files, this commit and an earlier one, and pictures and motion of this
+machine to compare with. Packages that the machine has (--there) are left out.
+
+    python scripts/gpu/pack.py build/gpu --there numpy,scipy,opencv-python
+    # there, with all files of build/gpu in one folder
+    bash parts/install parts kit && bash kit/check results.json
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+from pathlib import Path
+
+from packaging.utils import canonicalize_name, parse_wheel_filename
+
+from roboirg.simulation.model_files import find_model_files
+
+ROOT = Path(__file__).parents[2]
+EXTRAS = "sim,remote"
+GLIBC = (17, 24, 27, 28, 31, 34)
+"""Minor versions of glibc 2 for which wheels are named; pip matches each exactly."""
+LOADER = (
+    *("libvulkan1", "libegl1", "libglvnd0"),
+    # NVIDIA's Vulkan driver is linked with these, even without a display.
+    *("libx11-6", "libxext6", "libxcb1", "libxau6", "libxdmcp6", "libbsd0", "libmd0"),
+)
+MIB = 1024**2
+
+
+def main() -> None:
+    """Pack everything, and print the sizes."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("out", type=Path, help="folder for the parts, emptied first")
+    parser.add_argument("--python", default="3.12", help="version of Python there")
+    parser.add_argument("--there", default="", help="packages that the machine has, with commas")
+    parser.add_argument("--before", default="HEAD~1", help="commit to compare with")
+    parser.add_argument("--part-mib", type=int, default=40, help="largest size of a part")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        kit = Path(folder)
+        (kit / "python").write_text(options.python)
+        for name, commit in (("before", options.before), ("after", "HEAD")):
+            _unpack_tree(commit, kit / "trees" / name)
+        _download_wheels(kit / "wheels", options.python, options.there.split(","))
+        _unpack_loader(kit / "loader")
+        shutil.copytree(find_model_files().root, kit / "models")
+        _run(
+            *(sys.executable, str(Path(__file__).with_name("measure.py")), "draw"),
+            str(kit / "expected.npz"),
+        )
+        shutil.copy(Path(__file__).with_name("check"), kit)
+        shutil.rmtree(options.out, ignore_errors=True)
+        parts = write_parts(kit, options.out, options.part_mib * MIB)
+    shutil.copy(Path(__file__).with_name("install"), options.out)
+    for part in parts:
+        print(f"{part}: {part.stat().st_size / MIB:.1f} MiB")
+
+
+def write_parts(kit: Path, out: Path, size: int) -> list[Path]:
+    """Write a folder's archive in parts of at most `size` bytes, with their SHA-256, to `out`."""
+    out.mkdir(parents=True)
+    archive = out / "kit.tar.gz"
+    with tarfile.open(archive, "w:gz", compresslevel=6) as tar:
+        tar.add(kit, arcname=".")
+    parts = []
+    with archive.open("rb") as file:
+        while content := file.read(size):
+            parts.append(out / f"part-{len(parts):02}")
+            parts[-1].write_bytes(content)
+    archive.unlink()
+    sums = [f"{hashlib.sha256(part.read_bytes()).hexdigest()}  {part.name}" for part in parts]
+    (out / "sums").write_text("\n".join(sums) + "\n")
+    return parts
+
+
+def _unpack_tree(commit: str, folder: Path) -> None:
+    folder.mkdir(parents=True)
+    archive = subprocess.run(  # noqa: S603 - our own command
+        ["git", "archive", commit, "src", "scripts"],  # noqa: S607 - the developer's git
+        check=True,
+        capture_output=True,
+        cwd=ROOT,
+    )
+    subprocess.run(["tar", "-x", "-C", str(folder)], input=archive.stdout, check=True)  # noqa: S603, S607
+
+
+def _download_wheels(folder: Path, python: str, there: list[str]) -> None:
+    """Download wheels of the package and all that it needs, for the other machine's Python."""
+    _run(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", str(folder), str(ROOT))
+    (own,) = folder.iterdir()
+    platforms = ["manylinux2014_x86_64", *(f"manylinux_2_{minor}_x86_64" for minor in GLIBC)]
+    _run(
+        *(sys.executable, "-m", "pip", "download", "--quiet", "--only-binary=:all:"),
+        *("--implementation", "cp", "--python-version", python, "-d", str(folder)),
+        *(word for one in platforms for word in ("--platform", one)),
+        f"{own}[{EXTRAS}]",
+    )
+    left_out = {canonicalize_name(name) for name in there}
+    for wheel in folder.iterdir():
+        if parse_wheel_filename(wheel.name)[0] in left_out:
+            wheel.unlink()
+
+
+def _unpack_loader(folder: Path) -> None:
+    with tempfile.TemporaryDirectory() as packages:
+        Path(packages).chmod(0o777)  # apt downloads as a user of its own
+        _run("apt-get", "download", "-qq", *LOADER, cwd=packages)
+        for package in Path(packages).glob("*.deb"):
+            _run("dpkg", "-x", str(package), str(folder))
+
+
+def _run(*words: str, cwd: str | None = None) -> None:
+    subprocess.run(words, check=True, cwd=cwd)  # noqa: S603 - our own commands
+
+
+if __name__ == "__main__":
+    main()
