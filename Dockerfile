@@ -28,11 +28,14 @@ RUN apt-get update \
     && rm -rf /var/lib/apt/lists/*
 
 FROM base AS gpu
-# The driver comes from the host; it needs to be asked for its graphics part, and told to Vulkan.
+# The driver comes from the host, with its graphics part if asked for. Vulkan finds it by one of these
+# files, and without a display it finds its own EGL by the other, which not every host brings.
 ENV NVIDIA_DRIVER_CAPABILITIES=all NVIDIA_VISIBLE_DEVICES=all
-RUN mkdir -p /etc/vulkan/icd.d \
+RUN mkdir -p /etc/vulkan/icd.d /usr/share/glvnd/egl_vendor.d \
     && printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "libGLX_nvidia.so.0", "api_version": "1.3.0"}}\n' \
-        > /etc/vulkan/icd.d/nvidia_icd.json
+        > /etc/vulkan/icd.d/nvidia_icd.json \
+    && printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "libEGL_nvidia.so.0"}}\n' \
+        > /usr/share/glvnd/egl_vendor.d/10_nvidia.json
 
 # hadolint ignore=DL3006
 FROM ${VARIANT}

@@ -332,7 +332,7 @@ def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path: Path) -> None:
     assert "least calls of models" in said.out
     assert said.code == 0
     assert "150 + 150" in said.out
-    assert "13,650 episodes, 0 already stored." in " ".join(said.out.split())
+    assert "13,650 episodes, 0 already stored. Workers: one per core" in " ".join(said.out.split())
     assert not (tmp_path / "out").exists()
 
 

@@ -34,3 +34,18 @@ def test_a_container_has_the_cores_of_its_limit(
     monkeypatch.setattr(processor, "_CPU_QUOTAS", (("max",), ("quota", "period")))
     monkeypatch.setattr("os.sched_getaffinity", lambda _process: set(range(8)))
     assert processor.core_count() == cores
+
+
+@pytest.mark.parametrize(
+    ("cores", "advice"),
+    [
+        (8, "one per core"),
+        (9, "one per core, or about 8 per GPU that renders if the policy wants every picture"),
+    ],
+)
+def test_a_gpu_is_shared_by_no_more_workers_than_it_serves(
+    cores: int, advice: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Sixteen were slower than eight on the GPU that was measured; chunks are bound by cores."""
+    monkeypatch.setattr(processor, "core_count", lambda: cores)
+    assert processor.worker_advice() == advice

@@ -11,7 +11,7 @@ import statistics
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -138,5 +138,7 @@ def workers(count: str, cameras: str, chunk: str) -> dict[str, float]:
 
 if __name__ == "__main__":
     what, *words = sys.argv[1:]
-    measured = {"draw": draw, "compare": compare, "step": step, "workers": workers}[what](*words)
-    sys.stdout.write(json.dumps(measured) + "\n")
+    commands: dict[str, Callable[..., object]] = {
+        one.__name__: one for one in (draw, compare, step, workers)
+    }
+    sys.stdout.write(json.dumps(commands[what](*words)) + "\n")

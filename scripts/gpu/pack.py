@@ -71,7 +71,7 @@ def write_parts(kit: Path, out: Path, size: int) -> list[Path]:
     archive = out / "kit.tar.gz"
     with tarfile.open(archive, "w:gz", compresslevel=6) as tar:
         tar.add(kit, arcname=".")
-    parts = []
+    parts: list[Path] = []
     with archive.open("rb") as file:
         while content := file.read(size):
             parts.append(out / f"part-{len(parts):02}")

@@ -32,7 +32,7 @@ from roboirg.simulation.rendering.render_device import (
     to_unset,
 )
 from roboirg.util.cache import cache_folder
-from roboirg.util.processor import core_count
+from roboirg.util.processor import core_count, worker_advice
 from roboirg.util.proxies import proxy_of
 
 FRAME_TIMEOUT = 120
@@ -81,7 +81,7 @@ def run_checks(render_s: int = 0) -> list[Check]:
         _check_opencv(),
         *_check_files(),
         *_check_rendering(render_s),
-        Check("processors", ok=True, found=f"{core_count()}"),
+        Check("processors", ok=True, found=f"{core_count()}; workers: {worker_advice()}"),
         _check_memory(),
     ]
 

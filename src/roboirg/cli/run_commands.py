@@ -14,6 +14,7 @@ from roboirg.cli.declared_options import EPISODES
 from roboirg.cli.options import Workers, add_working_directory
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.plain_text import counted, printable, verb_for
+from roboirg.util.processor import worker_advice
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -243,6 +244,7 @@ def _print_counts(plan: Plan, folder: Path) -> None:
     todo = [job for job in jobs if identity_key(job) not in played]
     stored = len(jobs) - len(todo)
     console.print(f"{counted(len(jobs), 'episode')}, {stored:,} already stored.", highlight=False)
+    console.print(f"Workers: {worker_advice()}.", highlight=False)
     _print_model_calls(todo, console)
 
 

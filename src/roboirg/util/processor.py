@@ -15,6 +15,9 @@ from roboirg.core.errors import InvalidValueError
 WORKERS_VARIABLE = "ROBOIRG_WORKERS"
 """Environment variable with the number of worker processes of commands."""
 
+WORKERS_OF_A_GPU = 8
+"""Workers that one GPU serves best if their policy wants every picture (docs/performance.md)."""
+
 _CPU_QUOTAS = (
     ("/sys/fs/cgroup/cpu.max",),
     ("/sys/fs/cgroup/cpu/cpu.cfs_quota_us", "/sys/fs/cgroup/cpu/cpu.cfs_period_us"),
@@ -57,6 +60,16 @@ def core_count() -> int:
     if hasattr(os, "sched_getaffinity"):
         return max(1, math.ceil(min([len(os.sched_getaffinity(0)), *_quotas()])))
     return os.cpu_count() or 1
+
+
+def worker_advice() -> str:
+    """Return how many workers suit this machine, as words."""
+    if core_count() <= WORKERS_OF_A_GPU:
+        return "one per core"
+    return (
+        f"one per core, or about {WORKERS_OF_A_GPU} per GPU that renders if the policy wants every "
+        "picture"
+    )
 
 
 def _quotas() -> Iterator[float]:
