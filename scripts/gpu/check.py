@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 TREES = ("before", "after", "unculled")
+TEXTS = ("output", "errors")
 LIMIT_S = 150.0
 ROUNDS = 3
 
@@ -75,10 +76,13 @@ def main() -> None:
     for count in options.workers.split(","):
         for cameras, chunk, trees in ((2, 1, TREES), (1, 1, TREES[1:]), (1, 16, TREES[1:2])):
             for tree in trees:
-                name = f"{count} workers, {cameras} pictures every {chunk} steps, {tree}"
+                name = f"{count} workers, {cameras} of 2 cameras, chunks of {chunk}, {tree}"
                 checks.measure(name, tree, "workers", count, str(cameras), str(chunk))
     for name, found in checks.results.items():
-        print(f"{name}: {json.dumps(found)}")
+        shown = {
+            key: value for key, value in found.items() if found.get("code") or key not in TEXTS
+        }
+        print(f"{name}: {json.dumps(shown)}")
 
 
 def check_pictures(checks: Checks, kit: Path) -> None:
