@@ -17,6 +17,8 @@ from roboirg.reader.phrases import Phrases
 from roboirg.reader.tokens import ORDINAL, Sentence
 
 Value = TypeVar("Value")
+OPEN = -1
+"""Instead of an index: a remark leaves open, or opens again, which of two values is meant."""
 
 _SAID = r"(?: that)? i (?:just )?(?:mentioned|named|said|listed)"
 _POINTER = Phrases({
@@ -32,6 +34,7 @@ _POINTER = Phrases({
         r"\bthe (?P<other>other)(?: (?:ones?|cubes?|box|tape|container|place|number|visit"
         r"|placement|moment))?\b",
 })  # fmt: skip
+_RANKED = r"\bthe (?:former|latter|first|second|1st|2nd)\b"
 _POINTING = frozenset({"it", "that", "other", "then"})
 _FIRST = ("former", "first", "1st", "earlier")
 _ACCEPTED = Phrases(
@@ -71,6 +74,9 @@ _REJECTED = Phrases(
 )  # fmt: skip
 """Ways to set a pointer aside by the words before it, unless they accept it."""
 _REJECTED_AFTER = Phrases({
+    "can wait, so start with the latter":
+        r"^(?:(?:can|could|may|might|will|would|should|just|still|easily) )*"
+        r"(?:waits?|comes? later)\b(?! (?:no|any) longer)",
     ", no, the latter": "^(?:[,;] )?(?:no|sorry) [,;]",
     "or rather": "^(?:[,;] )?or rather$",
     "is out of the question": r"^(?:is|are|was) (?:definitely )?(?:out|not|off)\b",
@@ -89,26 +95,47 @@ _CHANGE = Phrases(
     },
 )  # fmt: skip
 """Remarks that take back or change what was said before."""
+_REOPENED = Phrases({
+    "No, I do not.": "^(?:oh )?no(?: [,;]|$)",
+    "Actually, the other one.": r"^(?:sorry|wait|actually|or rather|i mean)\b.*\bthe other\b",
+    "Let us do both.":
+        r"\b(?:do|want|take|need|choose|pick|use|prefer|keep|for)(?: \w+)?? both\b",
+})  # fmt: skip
+"""Remarks without a rank that take back what was chosen, or choose both of two."""
+_TOGETHER = Phrases({
+    "Forget the former and the latter.": rf"{_RANKED}(?: ones?)? (?:and|or|nor) {_RANKED}",
+    "So can the latter.": r"\bso (?:can|could|may|will|should|does|is) the\b",
+})  # fmt: skip
+"""Remarks that say the same of both."""
+_ADDED = Phrases({
+    "I also want the latter.": r"\b(?:also|too|as well)\b|^(?:and|then|next|after that)\b",
+})  # fmt: skip
+"""Remarks that choose one more."""
 _SKIPPED = Phrases({
     "Skip the third one.": rf"\b(?:skip|leave out|rule out)\b(?: \w+)?? (?:the )?{ORDINAL}\b",
     "Do not begin with the latter.": r"\bnot\b.*\bthe (?:former|latter)\b",
 })  # fmt: skip
 """Ways to set one of two aside; unread, they leave open which one is meant."""
-_ASIDE = Phrases({"I have ruled instead out": r"\b(?:not|no|never|out|aside|without|instead|up)\b"})
+_ASIDE = Phrases(
+    {"I have ruled instead out": r"\b(?:not|no(?! [,;])|never|out|aside|without|instead|up)\b"}
+)
 
 
 @functools.lru_cache(maxsize=8192)
 def read_selection(words: Sentence) -> int | None:
     """Return the index of the chosen value, 0 or 1; None if a sentence chooses none of two.
 
-    A sentence that contradicts itself, or sets something aside in unknown words, chooses none.
+    A sentence that sets something aside in unknown words chooses none; one that contradicts itself,
+    chooses both or takes a choice back gives `OPEN`.
     """
     text = " ".join(words)
+    if _TOGETHER.search(text):
+        return OPEN
     found = list(_POINTER.finditer(text))
     named = [_index(pointer) for pointer in found]
     known = next((index for index in named if index is not None), None)
     if known is None:
-        return None
+        return OPEN if _REOPENED.search(text) else None
     chosen: set[int] = set()
     for number, (pointer, name) in enumerate(zip(found, named, strict=True)):
         index = 1 - known if name is None else name
@@ -120,7 +147,7 @@ def read_selection(words: Sentence) -> int | None:
         if rejected and not number and len(list(_ASIDE.finditer(before))) > 1:
             return None
         chosen.add(1 - index if rejected else index)
-    return chosen.pop() if len(chosen) == 1 else None
+    return chosen.pop() if len(chosen) == 1 else OPEN
 
 
 def unread_change(words: Sentence, command: Iterable[Sentence]) -> str | None:
@@ -152,10 +179,14 @@ def with_selection(context: DiscourseContext, sentences: Iterable[Sentence]) -> 
 
     Colors and places keep both, because a command may go on with *the other one*.
     """
-    chosen = [index for one in sentences if (index := read_selection(one)) is not None]
-    if not chosen:
+    index = None
+    for one in sentences:
+        last = read_selection(one)
+        if last is not None:
+            more = index not in (None, last) and _ADDED.search(" ".join(one))
+            index = OPEN if more else last
+    if index in (None, OPEN):
         return context
-    index = chosen[-1]
     return context._replace(
         selected=True,
         colors=_reordered(context.colors, index),
