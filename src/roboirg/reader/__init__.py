@@ -22,10 +22,9 @@ from roboirg.reader.comprehension import (
 from roboirg.reader.constraints import goal_constraints
 from roboirg.reader.discourse_context import names_camera, read_discourse, read_remark
 from roboirg.reader.leftovers import left_over
-from roboirg.reader.negations import is_negated_command, unread_negations
+from roboirg.reader.negations import NOT_AT, is_negated_command, unread_negations
 from roboirg.reader.observations import observe
 from roboirg.reader.paraphrases import paraphrased
-from roboirg.reader.phrases import Phrases
 from roboirg.reader.pick_order import in_order
 from roboirg.reader.places import place_mentions
 from roboirg.reader.reference_resolution import ReferenceResolver
@@ -43,12 +42,6 @@ from roboirg.tasks import get_task
 
 __all__ = ["Interpretation", "interpret"]
 
-_NOT_AT = Phrases({
-    "It is not the one closest to you.":
-        r"\b(?:not|never|neither|nor|without)(?: (?:take|pick|lift|use|choose|want|need|mean|up|the"
-        r"|an?|one|cube|container|that|it|is|are|was|stands|even|now|at|on|in|to))*$",
-})  # fmt: skip
-"""What comes before a place where the thing is not."""
 _CALLS = {("get", word) for word in ("ready", "set", "going", "started")}
 """How sentences begin that call for attention, with a verb of commands."""
 
@@ -222,7 +215,7 @@ def _command_gaps(sentences: tuple[Sentence, ...], first: int, last: int) -> lis
         ComprehensionGap(f'does not understand where something is not: "{" ".join(words)}"')
         for words in sentences
         for place in place_mentions(words)
-        if _NOT_AT.search(" ".join(words[: place.start]))
+        if NOT_AT.search(" ".join(words[: place.start]))
     ]
     for words in (*negated, *(sentences[first:last] or sentences[-1:]), *following):
         gaps += find_gaps(words)

@@ -65,6 +65,9 @@ _RULES = Rewrites(
     r"buttons:: \b(both(?: the)?|the(?: two)?) buttons (?=MOVE)=>\1 buttons ,",
     r";:: ; (?=VERB|container)=>.",
     # Values taken back
+    r"make:: \bmake (?:it|that) (?=the (?:former|latter|(?:first|second|other) one)\b)=>i want",
+    r"wait:: START(?:no ,? )?wait ,? (?:no ,? )?(?=i (?:want|mean|would)\b|the (?:former|latter"
+    r"|(?:first|second|other) (?:one|number))\b)=>no ,",
     r"or:: \b(VALUE) or (VALUE)((?: \w+){0,3}?)(?: ,)?(?: but)? not (?:the )?\1\b=>\2\3",
     r"or:: \b(VALUE) or (VALUE)((?: \w+){0,3}?)(?: ,)?(?: but)? not (?:the )?\2\b=>\1\3",
     r"no mean sorry actually wait:: (?<!not mean the )\bCOLOR(?: cubes?| ones?| container)*REPAIR"

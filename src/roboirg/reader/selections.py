@@ -44,7 +44,7 @@ _ACCEPTED = Phrases(
         "I would not give up": "not (?:give up|part with|trade|miss|swap|exchange|skip)",
         "I would not mind": "not (?:mind|refuse|pass up)",
         "Not the latter, but": "but",
-        "I would go for": "for",
+        "I would go for": "(?<!need )(?<!use )for",
     },
     before=r"\b",
     after="$",
@@ -54,6 +54,7 @@ _REJECTED = Phrases(
     {
         "I do not want": r"\bnot(?: (?:do|mean|want|choose|pick|like|need|prefer))?",
         "You may leave out": r"\b(?:leave|left|rule|ruled) out",
+        "Save": r"\b(?:save|leave)",
         "Set": r"\bset",
         "Forget about": r"\b(?:forget|never mind|skip|ignore)(?: about)?",
         "I gave up": r"\b(?:gave|give|passed) up",
@@ -66,7 +67,10 @@ _REJECTED = Phrases(
         "I switched from": r"\b(?:switched|changed)\b.* from",
         "I prefer the latter to":
             r"\b(?:prefer(?:red)?|favor|better|more|chose|rather)\b.* (?:to|than|over)",
-        "By no means": r"\bno (?:means|case|longer|way)",
+        "By no means": r"\bno (?:means|case|longer|way|need for|use for)",
+        "Nobody wants":
+            r"\b(?:nobody|no one|hardly any(?:one|body))(?: \w+)?? "
+            r"(?:(?:want|like|need|love|pick|trust|prefer)(?:s|ed)?|took|chose)",
         "I want anything but": r"\banything but",
         "I would be happy without": r"\bwithout",
     },
@@ -76,7 +80,8 @@ _REJECTED = Phrases(
 _REJECTED_AFTER = Phrases({
     "can wait, so start with the latter":
         r"^(?:(?:can|could|may|might|will|would|should|just|still|easily) )*"
-        r"(?:waits?|comes? later)\b(?! (?:no|any) longer)",
+        r"(?:waits?|comes? later)\b(?! (?:no|any) longer)|^later(?=$| [,;])",
+    "I do not want": "^i (?:do|did|would|will) not",
     ", no, the latter": "^(?:[,;] )?(?:no|sorry) [,;]",
     "or rather": "^(?:[,;] )?or rather$",
     "is out of the question": r"^(?:is|are|was) (?:definitely )?(?:out|not|off)\b",
@@ -99,18 +104,21 @@ _REOPENED = Phrases({
     "No, I do not.": "^(?:oh )?no(?: [,;]|$)",
     "Actually, the other one.": r"^(?:sorry|wait|actually|or rather|i mean)\b.*\bthe other\b",
     "Let us do both.":
-        r"\b(?:do|want|take|need|choose|pick|use|prefer|keep|for)(?: \w+)?? both\b",
+        r"\b(?:do|want|take|need|choose|pick|use|prefer|keep|for)(?: \w+)?? both\b"
+        r"|^(?:and|or|yes|no)? ?both$|\bboth (?:can|could|may|will)\b",
 })  # fmt: skip
 """Remarks without a rank that take back what was chosen, or choose both of two."""
 _TOGETHER = Phrases({
     "Forget the former and the latter.": rf"{_RANKED}(?: ones?)? (?:and|or|nor) {_RANKED}",
-    "So can the latter.": r"\bso (?:can|could|may|will|should|does|is) the\b",
+    "So can the latter.": r"\bso (?:can|could|may|will|should|does|is) the\b|\bboth can\b",
 })  # fmt: skip
 """Remarks that say the same of both."""
-_ADDED = Phrases({
-    "I also want the latter.": r"\b(?:also|too|as well)\b|^(?:and|then|next|after that)\b",
+_ANEW = Phrases({
+    "No, let us do the latter.":
+        r"^(?!.*\b(?:also|too|as well)\b)(?:.*\b(?:instead|rather|second thoughts?)\b|(?:oh |and )?"
+        r"(?:no|nope|sorry|wait|actually|change|so|let's|i (?:mean|chose|picked|decided))\b)",
 })  # fmt: skip
-"""Remarks that choose one more."""
+"""Remarks that choose again; without such words, two choices that differ are none."""
 _SKIPPED = Phrases({
     "Skip the third one.": rf"\b(?:skip|leave out|rule out)\b(?: \w+)?? (?:the )?{ORDINAL}\b",
     "Do not begin with the latter.": r"\bnot\b.*\bthe (?:former|latter)\b",
@@ -142,7 +150,8 @@ def read_selection(words: Sentence) -> int | None:
         end = found[number + 1].start() if number + 1 < len(found) else len(text)
         before, after = text[: pointer.start()].strip(), text[pointer.end() : end].strip()
         rejected = _is_rejected(before, after)
-        if not (rejected or number or _ACCEPTED.search(before)) and _ASIDE.search(before):
+        since = text[found[number - 1].end() if number else 0 : pointer.start()]
+        if not (rejected or _ACCEPTED.search(before)) and _ASIDE.search(since):
             return None
         if rejected and not number and len(list(_ASIDE.finditer(before))) > 1:
             return None
@@ -183,8 +192,8 @@ def with_selection(context: DiscourseContext, sentences: Iterable[Sentence]) -> 
     for one in sentences:
         last = read_selection(one)
         if last is not None:
-            more = index not in (None, last) and _ADDED.search(" ".join(one))
-            index = OPEN if more else last
+            again = index in (None, OPEN, last) or _ANEW.search(" ".join(one))
+            index = last if again else OPEN
     if index in (None, OPEN):
         return context
     return context._replace(
