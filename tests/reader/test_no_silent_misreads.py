@@ -62,6 +62,10 @@ def read(task, text, index=2):
          ("red", 3)),
         ("PickXtimes", ("Pick up the cube that is neither closest to you or farthest to your left "
          "and put it on the target twice."), ("red", 2)),
+        ("PickXtimes", ("It isn't the cube farthest to your left. It isn't the one closest to you, "
+         "either. Put it on the target twice."), ("red", 2)),
+        ("PickXtimes", ("It's not the cube closest to you, and it's not the one farthest to your "
+         "left either. Put it on the target twice."), ("red", 2)),
         ("PickXtimes", "Put the red cube on the target, then do it again.", ("red", 2)),
         ("PickXtimes", "Put the red cube on the target, and again, and again.", ("red", 3)),
         ("PickXtimes", "Put the red cube on the target. Repeat it two more times.", ("red", 3)),
@@ -295,6 +299,7 @@ def test_a_remark_that_chooses_both_or_takes_back_its_choice_chooses_none(remark
         "Not the cube closest to you: I want the other one. Put it on the target twice.",
         "Anything but the cube closest to you. Put it on the target twice.",
         "Every cube but the one closest to you is fine. Put it on the target twice.",
+        "It isn't the cube closest to you. It isn't the one closest to you, either. Put it there.",
         "Forget about the cube closest to you. Put it on the target twice.",
         "My cube stands neither at the far left nor at the far right. Put it on the target twice.",
     ],

@@ -120,6 +120,8 @@ _RULES = Rewrites(
     r"\bthe other (?:cube|one)\b=>\3the cube that is neither \1 nor \2",
     r"neither:: START(?:not|neither) HUE(?: ,)?(?: and)? (?:not|nor) HUE(?: [.:,])?(.*) the "
     r"(?:other|last|one with the last) (?:cube|one|color)\b=>\3 the cube that is neither \1 nor \2",
+    r"either:: \bit is not the (cube|container) ([a-z ]+?) ?[.,] (?:and )?it is not the "
+    r"(?:cube|container|one) ([a-z ]+?) ,? ?eitherSTOP=>it is the \1 that is neither \2 nor \3",
     parts=_PARTS,
 )  # fmt: skip
 _WITHOUT_VERB = Rewrites(
