@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
+from roboirg.apps.language_lab.scenarios.scenario_report import report_lines
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS
@@ -72,16 +73,37 @@ def spoken(task, language=4):
     ("before", "after", "complaint"),
     [
         ("{repeats} today", "{repeat} today", "introduction has the slot 'repeat'"),
-        ("<it color: it>.", "<it color: that thing>.", "is not in pointers.toml"),
+        (
+            "<it color: it>.",
+            "<it color: that thing>.",
+            "toml; for a color there are: <it color: it>; <o",
+        ),
+        (
+            "<it color: it>.",
+            "<them color: it>.",
+            "<them color: it> of the class 'them'; in pointers.toml the words 'it' have the class",
+        ),
+        (
+            "<that repeats: that many times>",
+            "<it reference: that many times> minus {step}",
+            "of the class 'it'; in pointers.toml the words 'that many times' have the class 'that'",
+        ),
         ("<it color: it>.", "<it color it>.", "has a bracket that is no mark"),
-        ("\ncue = ", "\nclue = ", "Object contains unknown field `clue`"),
+        ("\ncue = ", "\nclue = ", "has the field 'clue'; the fields are competing, cue,"),
         (
             '\ncue = "Let\'s surprise {him}."',
             "",
             "'birthday' has no cue; direct needs introduction, reinf",
         ),
         ("say.color", "say.colour", "has say.colour; the fields are color, repeats"),
-        ('pool = "train"', 'pool = "dev"', "Invalid enum value 'dev' - at `$.pool`"),
+        ('pool = "train"', 'pool = "dev"', "'birthday', pool: Invalid enum value 'dev'."),
+        ('pool = "train"\n', "", "'birthday' has no pool."),
+        ('pool = "train"\n', 'pool = "train"\npeople.he = [5]\n', "people: Expected `str`, got"),
+        (
+            'introduction = "',
+            'introduction = 5\nlead = "',
+            "introduction has the words 5; they must",
+        ),
         ('"{he}', '"\u2019{he}', "must be printable ASCII"),
         ("[[scenario]]", "[[scenario", "(at line 3, column 11)"),
         ('task = "PickXtimes"', 'task = "Juggle"', "there is no Juggle.toml"),
@@ -92,6 +114,27 @@ def test_a_file_with_a_mistake_is_refused_by_file_scenario_and_field(before, aft
     with pytest.raises(InvalidValueError, match=r"^mine\.toml") as found:
         read_task_scenarios(DIRECT.replace(before, after), "mine.toml")
     assert complaint in str(found.value)
+
+
+def test_every_mistake_of_a_file_is_named_by_scenario_and_field():
+    wrong = DIRECT.replace('"train"', '"dev"').replace("\ncue", "\nclue")
+    wrong = wrong.replace("{repeats} today", "{repeat} today").replace("{color} c", "{colr} c")
+    wrong = wrong.replace("<it color: it>.", "<them color: it>")
+    again = RIVAL.replace("not_latter", "latest").partition("\n[")[2]
+    with pytest.raises(InvalidValueError) as found:
+        read_task_scenarios(f"{wrong}\n[{again}\n[{again}", "mine.toml")
+    named = [line.removeprefix("mine.toml, scenario ") for line in str(found.value).splitlines()]
+    begun = [
+        "'birthday', pool: Invalid enum value",
+        "'birthday' has the field 'clue'",
+        "'birthday', introduction has the slot 'repeat'",
+        "'birthday', introduction has the slot 'colr'",
+        "'birthday', reinforcement has the pointer <them color: it>",
+        "'two' has no remarks.not_latter",
+        "'two' has no remarks.not_latter",
+        "mine.toml has the frame 'two' twice in the setting direct-rival, test.",
+    ]
+    assert [line[: len(one)] for line, one in zip(named, begun, strict=True)] == begun
 
 
 @pytest.mark.parametrize(
@@ -105,7 +148,7 @@ def test_a_file_with_a_mistake_is_refused_by_file_scenario_and_field(before, aft
         (DIRECT, 'say.color = ["', 'lead = "Twice: "\nsay.color = ["', "names twice"),
         (DIRECT, "The cake", "The cake " + "is so very good " * 9, "at most 64 are heard"),
         (DIRECT, "{rival color} one", "{rival color} one {list}", "no competing remark"),
-        (RIVAL, "Not <former list.0: the", "Not <latter list.1: the", "is not in pointers"),
+        (RIVAL, "Not <former list.0: the", "Not <latter list.1: the", "the class 'former' for a"),
         (RIVAL, "Do <former list.0: the former>", "Do <latter list.1: the latter>", "first point"),
         (FEWER, "minus {step}", "plus {step}", "say.repeats: means"),
         (FEWER, " {reference:times}", "", "says the same of another goal"),
@@ -124,6 +167,16 @@ def test_the_checker_names_the_rule_that_a_scenario_breaks(text, before, after, 
     except InvalidValueError as error:  # said no expression of the table
         broken = [str(error)]
     assert any(rule in one for one in broken), broken
+
+
+def test_authors_see_a_competing_remark_where_a_setting_has_one():
+    scenes = scenes_of("PickXtimes", 0)[::20]
+    for text, number in ((DIRECT, 1), (RIVAL, 0)):
+        (report,) = check_scenarios(read_task_scenarios(text, "mine.toml"), None, scenes)
+        (*texts, _, _) = report_lines(report)
+        shown = [one for one in texts if one.startswith("  With a competing remark: ")]
+        assert len(shown) == number
+        assert all(" one, but that party is over. Let's surprise" in one for one in shown)
 
 
 def test_words_that_only_look_like_a_value_may_be_said_and_people_only_in_passing():

@@ -60,6 +60,12 @@ def read(task, text, index=2):
          "exercise with one lap. Do the other one: swing the red cube between the targets the "
          "other number of times."),
          ("red", 3)),
+        ("PickXtimes", ("Pick up the cube that is neither closest to you or farthest to your left "
+         "and put it on the target twice."), ("red", 2)),
+        ("PickXtimes", ("It isn't the cube farthest to your left. It isn't the one closest to you, "
+         "either. Put it on the target twice."), ("red", 2)),
+        ("PickXtimes", ("It's not the cube closest to you, and it's not the one farthest to your "
+         "left either. Put it on the target twice."), ("red", 2)),
         ("PickXtimes", "Put the red cube on the target, then do it again.", ("red", 2)),
         ("PickXtimes", "Put the red cube on the target, and again, and again.", ("red", 3)),
         ("PickXtimes", "Put the red cube on the target. Repeat it two more times.", ("red", 3)),
@@ -176,6 +182,132 @@ def test_is_named(task, text, named):
     goals, complaints = read(task, text)
     assert len(goals) != 1
     assert named in complaints
+
+
+PAIRS = [
+    ("PickXtimes",
+     ("Leo says twice, Mia says three times. {} put the red cube on the target that many times."),
+     [("red", 2), ("red", 3)]),
+    ("PickXtimes",
+     ("We have the red and the green cube. {} put the one I chose on the target once."),
+     [("red", 1), ("green", 1)]),
+    ("PickXtimes",
+     ("Do you see the cube farthest to your left and the cube farthest to your right? {} put the "
+      "one I chose on the target once."),
+     [("blue", 1), ("red", 1)]),
+    ("StopCube",
+     ("Leo got its second visit, Mia its third visit. {} stop the cube on the target on that "
+      "visit."),
+     [(2,), (3,)]),
+    ("VideoUnmask",
+     ("Mia lost the red cube and Leo the green one. {} lift the container over the one I chose, "
+      "put it down, then lift the container over the other one."),
+     [(("red", "green"),), (("green", "red"),)]),
+]  # fmt: skip
+"""Two values, a place for a remark that chooses, a command that points, and what each would be."""
+
+
+@pytest.mark.parametrize(
+    ("remark", "chosen"),
+    [
+        ("I want the former. No, I want the latter:", 1),
+        ("I want the latter. No, I want the former:", 0),
+        ("I want the former. No, the latter:", 1),
+        ("I want the former. No, I'd rather have the second one:", 1),
+        ("I want the former. No, not the former:", 1),
+        ("I want the former. Oh no, let's do the latter:", 1),
+        ("I want the former. No. I want the latter:", 1),
+        ("I want the former. Sorry, I want the latter:", 1),
+        ("I want the former, no, I want the latter:", 1),
+        ("The former can wait, so start with the latter:", 1),
+        ("The latter can wait, so start with the former:", 0),
+        ("The first one can wait, so begin with the other one:", 1),
+        ("The second one can come later, so begin with the first one:", 0),
+        ("The second one can wait a bit, so let's find the other one:", 0),
+        ("The former can wait until tomorrow. Let's start with the latter:", 1),
+        ("The former can't wait:", 0),
+        ("The latter can't wait any longer, so start with it:", 1),
+        ("The former comes later, so let's start with the latter:", 1),
+        ("The former can wait, the latter can't:", 1),
+        ("Let's leave the former for later and start with the latter:", 1),
+        ("Save the latter for later:", 0),
+        ("We'll do the former later, now the latter:", 1),
+        ("We like both. I want the latter:", 1),
+        ("I want the former. Nobody wants the latter:", 0),
+        ("I want the former. No need for the latter:", 0),
+        ("I want the former. The latter can wait:", 0),
+        ("I want the former. Wait, the latter:", 1),
+        ("I want the former. No, wait, make it the latter:", 1),
+        ("Leo likes the former. So let's do the latter:", 1),
+    ],
+)  # fmt: skip
+def test_a_remark_that_takes_back_or_defers_chooses_one(remark, chosen):
+    for task, text, goals in PAIRS:
+        assert read(task, text.format(remark)) == ([goals[chosen]], ""), text
+
+
+@pytest.mark.parametrize(
+    "remark",
+    [
+        "I want both the former and the latter:",
+        "I want the former as well as the latter:",
+        "Let's do the former, then the latter:",
+        "I want the former. I also want the latter:",
+        "I want the former. I want the latter, too:",
+        "I want the latter. And the former:",
+        "I want the former. Then the latter:",
+        "I want the former. Or the latter:",
+        "I want the former. Mia wants the latter:",
+        "I want the former. The latter is nice:",
+        "I like the former, not so much the latter:",
+        "The former can wait, so let's not start with the latter:",
+        "I want the former. I want the former and the latter:",
+        "I want the former. Let's do both:",
+        "I want the former. No, we need both of them:",
+        "I want the former. No.",
+        "I want the former. No, I don't.",
+        "I want the former. Actually, the other one:",
+        "I want the former. No, the other one:",
+        "The former can wait. So can the latter:",
+        "The former can wait. Both can:",
+        "The former and the latter can wait:",
+        "Let's forget the first one and the second one:",
+        "I'd rather have both the first one and the second one:",
+    ],
+)
+def test_a_remark_that_chooses_both_or_takes_back_its_choice_chooses_none(remark):
+    for task, text, _ in PAIRS:
+        goals, complaints = read(task, text.format(remark))
+        assert len(goals) != 1, text
+        assert complaints
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Pick up the cube that is neither closest to you and put it on the target twice.",
+        "Pick up the cube that is neither closest to you, then put it on the target twice.",
+        "Put the cube that is neither closest to you and farthest to your left on the target.",
+        "I need the cube that is neither closest to you. Put it on the target twice.",
+        "I need the only cube that is not closest to you. Put it on the target twice.",
+        "It is neither closest to you nor farthest to your left. Put it on the target twice.",
+        "I need the one neither closest to you nor farthest to your left. Put it on the target.",
+        "It isn't the one closest to you. Put it on the target twice.",
+        "It isn't the one at the far left. It isn't the one closest to you, either. Put it there.",
+        "Let's not take the cube closest to you. Put that one on the target twice.",
+        "Do you see the cube that isn't closest to you? Put that one on the target twice.",
+        "Not the cube closest to you: I want the other one. Put it on the target twice.",
+        "Anything but the cube closest to you. Put it on the target twice.",
+        "Every cube but the one closest to you is fine. Put it on the target twice.",
+        "It isn't the cube closest to you. It isn't the one closest to you, either. Put it there.",
+        "Forget about the cube closest to you. Put it on the target twice.",
+        "My cube stands neither at the far left nor at the far right. Put it on the target twice.",
+    ],
+)
+def test_a_place_where_something_is_not_is_none_where_it_is(text):
+    goals, complaints = read("PickXtimes", text)
+    assert len(goals) != 1
+    assert complaints
 
 
 COMMANDS = [

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -81,12 +80,13 @@ class InstructionOptions:
     )
 
 
-def identifying(written: str) -> str:
-    """Return JSON without the usual language, to be hashed.
+def identifying(options: InstructionOptions) -> dict[str, Any]:
+    """Return the fields of options that names and fingerprints hash: the usual language is none.
 
-    Names and fingerprints from before there was another language do not have it.
+    Those from before there was another language do not have it.
     """
-    return re.sub(rf',\s*"language":\s*{DEFAULT_LANGUAGE}\}}', "}", written)
+    usual = ("language", DEFAULT_LANGUAGE)
+    return {name: value for name, value in asdict(options).items() if (name, value) != usual}
 
 
 class WordKeywords(TypedDict, total=False):

@@ -32,8 +32,8 @@ from roboirg.language.request import (
 from roboirg.language.scenarios import in_language_4
 from roboirg.language.settings import all_settings, get_setting, settings_of
 from roboirg.language.settings.setting import Setting
-from roboirg.language.template_sampler import TemplateSampler, sampler_of
-from roboirg.language.templates import DRAWS, LANGUAGE_VERSIONS
+from roboirg.language.template_sampler import sampler_of
+from roboirg.language.templates import LANGUAGE_VERSIONS
 from roboirg.language.worded_command import TaskWordings, describe_goal
 from roboirg.language.wordings.wording_store import find_wordings
 from roboirg.tasks import get_task
@@ -110,7 +110,7 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
             # Both forms have a command from outside, or none of them.
             forms = {str(form): _say_outside(request, setting, form) for form in FORMS}
             return spoken_instruction(*forms[options.form])
-    own = replace(request, wordings=None, sampler=_sampler(episode, options, variant))
+    own = replace(request, wordings=None, sampler=sampler_of(episode, variant, options.language))
     return spoken_instruction(own, setting.say(own))
 
 
@@ -167,13 +167,8 @@ def request_of(
         wordings = find_wordings(options.wordings).tasks.get(task.name, TaskWordings(()))
         if wordings.own & {options.setting, all_settings()[options.setting].plain}:
             wordings = None
-    sampler = _sampler(episode, options, variant)
+    sampler = sampler_of(episode, variant, options.language)
     return InstructionRequest(episode, task, options, sampler, wordings)
-
-
-def _sampler(episode: Episode, options: InstructionOptions, variant: int) -> TemplateSampler:
-    draws = DRAWS if options.language == DEFAULT_LANGUAGE else LANGUAGE_VERSIONS[options.language]
-    return sampler_of(episode, variant, draws)
 
 
 def _setting_of(episode: Episode, options: InstructionOptions) -> Setting:

@@ -12,7 +12,8 @@ from typing import TypeVar
 import numpy as np
 
 from roboirg.core.episode import Episode
-from roboirg.language.templates import DRAWS
+from roboirg.core.instruction_options import DEFAULT_LANGUAGE
+from roboirg.language.templates import DRAWS, LANGUAGE_VERSIONS
 
 Option = TypeVar("Option")
 
@@ -26,21 +27,25 @@ class TemplateSampler:
     spelling draws other words.
 
     Attributes:
-        key: `DRAWS`, task and seed.
+        key: of the language's draws, with task and seed.
+        hashed: whether hashes alone draw, as in language 4, which takes a tenth of the time.
         log: ``purpose/index`` of every choice, in order.
     """
 
     key: str
+    hashed: bool = False
     log: list[str] = field(default_factory=list)
 
     def pick(self, purpose: str, options: Sequence[Option]) -> Option:
         """Pick one of the options, all equally likely."""
         count = len(options)
-        return self._take(purpose, options, _drawn(self.key, purpose, count) if count > 1 else 0)
+        index = _drawn(self.key, purpose, count, hashed=self.hashed) if count > 1 else 0
+        return self._take(purpose, options, index)
 
     def cycle(self, purpose: str, options: Sequence[Option]) -> Iterator[Option]:
         """Yield all options in random order, repeating the cycle forever; log what is used."""
-        for index in itertools.cycle(_shuffled(self.key, purpose, len(options))):
+        order = _shuffled(self.key, purpose, len(options), hashed=self.hashed)
+        for index in itertools.cycle(order):
             yield self._take(purpose, options, index)
 
     def _take(self, purpose: str, options: Sequence[Option], index: int) -> Option:
@@ -48,13 +53,14 @@ class TemplateSampler:
         return options[index]
 
 
-def sampler_of(episode: Episode, variant: int = 0, draws: str = DRAWS) -> TemplateSampler:
-    """Return the sampler of an episode; each variant draws its words anew, 0 is the usual one.
-
-    `draws` is the key of the language's draws.
-    """
+def sampler_of(
+    episode: Episode, variant: int = 0, language: int = DEFAULT_LANGUAGE
+) -> TemplateSampler:
+    """Return the sampler of an episode; each variant draws its words anew, 0 is the usual one."""
+    usual = language == DEFAULT_LANGUAGE
+    draws = DRAWS if usual else LANGUAGE_VERSIONS[language]
     key = f"{draws}|{episode.task}|{episode.seed}"
-    return TemplateSampler(f"{key}|{variant}" if variant else key)
+    return TemplateSampler(f"{key}|{variant}" if variant else key, hashed=not usual)
 
 
 def _hash(key: str, purpose: str) -> int:
@@ -69,14 +75,14 @@ def _generator(key: str, purpose: str) -> np.random.Generator:
 
 # Cached: all settings and forms of an episode draw the same.
 @functools.lru_cache(maxsize=1024)
-def _drawn(key: str, purpose: str, count: int) -> int:
-    if not key.startswith(DRAWS):  # hashes alone take a tenth of the time
+def _drawn(key: str, purpose: str, count: int, *, hashed: bool) -> int:
+    if hashed:
         return _hash(key, purpose) % count
     return int(_generator(key, purpose).integers(count))
 
 
 @functools.lru_cache(maxsize=1024)
-def _shuffled(key: str, purpose: str, count: int) -> tuple[int, ...]:
-    if not key.startswith(DRAWS):
+def _shuffled(key: str, purpose: str, count: int, *, hashed: bool) -> tuple[int, ...]:
+    if hashed:
         return tuple(sorted(range(count), key=lambda at: _hash(key, f"{purpose}|{at}")))
     return tuple(_generator(key, purpose).permutation(count).tolist())

@@ -22,10 +22,11 @@ from roboirg.reader.comprehension import (
 from roboirg.reader.constraints import goal_constraints
 from roboirg.reader.discourse_context import names_camera, read_discourse, read_remark
 from roboirg.reader.leftovers import left_over
-from roboirg.reader.negations import is_negated_command, unread_negations
+from roboirg.reader.negations import NOT_AT, is_negated_command, unread_negations
 from roboirg.reader.observations import observe
 from roboirg.reader.paraphrases import paraphrased
 from roboirg.reader.pick_order import in_order
+from roboirg.reader.places import place_mentions
 from roboirg.reader.reference_resolution import ReferenceResolver
 from roboirg.reader.repetitions import added_up
 from roboirg.reader.selections import (
@@ -209,6 +210,12 @@ def _command_gaps(sentences: tuple[Sentence, ...], first: int, last: int) -> lis
         ComprehensionGap(f'does not understand what "{change}" changes')
         for words in sentences
         if (change := unread_change(words, sentences[first:last]))
+    ]
+    gaps += [
+        ComprehensionGap(f'does not understand where something is not: "{" ".join(words)}"')
+        for words in sentences
+        for place in place_mentions(words)
+        if NOT_AT.search(" ".join(words[: place.start]))
     ]
     for words in (*negated, *(sentences[first:last] or sentences[-1:]), *following):
         gaps += find_gaps(words)

@@ -81,6 +81,14 @@ _READ_ELSEWHERE = Phrases({
 """Ways that other modules read; they may overlap."""
 
 
+NOT_AT = Phrases({
+    "It is not the one":
+        r"\b(?:not|never|neither|nor|without|unlike|except|forget"
+        r"|(?:any|every|all)\w*(?: \w+)? but)"
+        r"(?: (?:take|pick|lift|use|choose|want|need|mean|up|about|the|an?|one|cube|container|that"
+        r"|it|is|are|was|stands|even|now|at|on|in|to))*$",
+})  # fmt: skip
+"""What stands before the words for a place, such as *closest to you*, if the thing is not there."""
 _FORBIDDING = word_set("not dont never avoid refrain")
 """Every phrase of `_PROHIBITION` has one of these words."""
 

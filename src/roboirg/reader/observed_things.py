@@ -51,7 +51,7 @@ _NEITHER = Phrases({
     "the cube that is neither closest to you nor closest to the button":
         rf"the {_NOUN} {_WHEN}neither ",
 })  # fmt: skip
-_NOR = Phrases({"nor closest to the button": "nor "})
+_NOR = Phrases({"nor closest to the button": "n?or "})
 _ONLY_NOT = Phrases({
     "the only cube that is not closest to you or closest to the button":
         rf"the only {_NOUN} {_WHEN}not ",

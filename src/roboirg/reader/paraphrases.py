@@ -65,6 +65,9 @@ _RULES = Rewrites(
     r"buttons:: \b(both(?: the)?|the(?: two)?) buttons (?=MOVE)=>\1 buttons ,",
     r";:: ; (?=VERB|container)=>.",
     # Values taken back
+    r"make:: \bmake (?:it|that) (?=the (?:former|latter|(?:first|second|other) one)\b)=>i want",
+    r"wait:: START(?:no ,? )?wait ,? (?:no ,? )?(?=i (?:want|mean|would)\b|the (?:former|latter"
+    r"|(?:first|second|other) (?:one|number))\b)=>no ,",
     r"or:: \b(VALUE) or (VALUE)((?: \w+){0,3}?)(?: ,)?(?: but)? not (?:the )?\1\b=>\2\3",
     r"or:: \b(VALUE) or (VALUE)((?: \w+){0,3}?)(?: ,)?(?: but)? not (?:the )?\2\b=>\1\3",
     r"no mean sorry actually wait:: (?<!not mean the )\bCOLOR(?: cubes?| ones?| container)*REPAIR"
@@ -117,6 +120,8 @@ _RULES = Rewrites(
     r"\bthe other (?:cube|one)\b=>\3the cube that is neither \1 nor \2",
     r"neither:: START(?:not|neither) HUE(?: ,)?(?: and)? (?:not|nor) HUE(?: [.:,])?(.*) the "
     r"(?:other|last|one with the last) (?:cube|one|color)\b=>\3 the cube that is neither \1 nor \2",
+    r"either:: \bit is not the (cube|container) ([a-z ]+?) ?[.,] (?:and )?it is not the "
+    r"(?:cube|container|one) ([a-z ]+?) ,? ?eitherSTOP=>it is the \1 that is neither \2 nor \3",
     parts=_PARTS,
 )  # fmt: skip
 _WITHOUT_VERB = Rewrites(

@@ -17,6 +17,8 @@ from roboirg.reader.phrases import Phrases
 from roboirg.reader.tokens import ORDINAL, Sentence
 
 Value = TypeVar("Value")
+OPEN = -1
+"""Instead of an index: a remark leaves open, or opens again, which of two values is meant."""
 
 _SAID = r"(?: that)? i (?:just )?(?:mentioned|named|said|listed)"
 _POINTER = Phrases({
@@ -32,6 +34,7 @@ _POINTER = Phrases({
         r"\bthe (?P<other>other)(?: (?:ones?|cubes?|box|tape|container|place|number|visit"
         r"|placement|moment))?\b",
 })  # fmt: skip
+_RANKED = r"\bthe (?:former|latter|first|second|1st|2nd)\b"
 _POINTING = frozenset({"it", "that", "other", "then"})
 _FIRST = ("former", "first", "1st", "earlier")
 _ACCEPTED = Phrases(
@@ -41,7 +44,7 @@ _ACCEPTED = Phrases(
         "I would not give up": "not (?:give up|part with|trade|miss|swap|exchange|skip)",
         "I would not mind": "not (?:mind|refuse|pass up)",
         "Not the latter, but": "but",
-        "I would go for": "for",
+        "I would go for": "(?<!need )(?<!use )for",
     },
     before=r"\b",
     after="$",
@@ -51,6 +54,7 @@ _REJECTED = Phrases(
     {
         "I do not want": r"\bnot(?: (?:do|mean|want|choose|pick|like|need|prefer))?",
         "You may leave out": r"\b(?:leave|left|rule|ruled) out",
+        "Save": r"\b(?:save|leave)",
         "Set": r"\bset",
         "Forget about": r"\b(?:forget|never mind|skip|ignore)(?: about)?",
         "I gave up": r"\b(?:gave|give|passed) up",
@@ -63,7 +67,10 @@ _REJECTED = Phrases(
         "I switched from": r"\b(?:switched|changed)\b.* from",
         "I prefer the latter to":
             r"\b(?:prefer(?:red)?|favor|better|more|chose|rather)\b.* (?:to|than|over)",
-        "By no means": r"\bno (?:means|case|longer|way)",
+        "By no means": r"\bno (?:means|case|longer|way|need for|use for)",
+        "Nobody wants":
+            r"\b(?:nobody|no one|hardly any(?:one|body))(?: \w+)?? "
+            r"(?:(?:want|like|need|love|pick|trust|prefer)(?:s|ed)?|took|chose)",
         "I want anything but": r"\banything but",
         "I would be happy without": r"\bwithout",
     },
@@ -71,6 +78,10 @@ _REJECTED = Phrases(
 )  # fmt: skip
 """Ways to set a pointer aside by the words before it, unless they accept it."""
 _REJECTED_AFTER = Phrases({
+    "can wait, so start with the latter":
+        r"^(?:(?:can|could|may|might|will|would|should|just|still|easily) )*"
+        r"(?:waits?|comes? later)\b(?! (?:no|any) longer)|^later(?=$| [,;])",
+    "I do not want": "^i (?:do|did|would|will) not",
     ", no, the latter": "^(?:[,;] )?(?:no|sorry) [,;]",
     "or rather": "^(?:[,;] )?or rather$",
     "is out of the question": r"^(?:is|are|was) (?:definitely )?(?:out|not|off)\b",
@@ -89,38 +100,63 @@ _CHANGE = Phrases(
     },
 )  # fmt: skip
 """Remarks that take back or change what was said before."""
+_REOPENED = Phrases({
+    "No, I do not.": "^(?:oh )?no(?: [,;]|$)",
+    "Actually, the other one.": r"^(?:sorry|wait|actually|or rather|i mean)\b.*\bthe other\b",
+    "Let us do both.":
+        r"\b(?:do|want|take|need|choose|pick|use|prefer|keep|for)(?: \w+)?? both\b"
+        r"|^(?:and|or|yes|no)? ?both$|\bboth (?:can|could|may|will)\b",
+})  # fmt: skip
+"""Remarks without a rank that take back what was chosen, or choose both of two."""
+_TOGETHER = Phrases({
+    "Forget the former and the latter.": rf"{_RANKED}(?: ones?)? (?:and|or|nor) {_RANKED}",
+    "So can the latter.": r"\bso (?:can|could|may|will|should|does|is) the\b|\bboth can\b",
+})  # fmt: skip
+"""Remarks that say the same of both."""
+_ANEW = Phrases({
+    "No, let us do the latter.":
+        r"^(?!.*\b(?:also|too|as well)\b)(?:.*\b(?:instead|rather|second thoughts?)\b|(?:oh |and )?"
+        r"(?:no|nope|sorry|wait|actually|change|so|let's|i (?:mean|chose|picked|decided))\b)",
+})  # fmt: skip
+"""Remarks that choose again; without such words, two choices that differ are none."""
 _SKIPPED = Phrases({
     "Skip the third one.": rf"\b(?:skip|leave out|rule out)\b(?: \w+)?? (?:the )?{ORDINAL}\b",
     "Do not begin with the latter.": r"\bnot\b.*\bthe (?:former|latter)\b",
 })  # fmt: skip
 """Ways to set one of two aside; unread, they leave open which one is meant."""
-_ASIDE = Phrases({"I have ruled instead out": r"\b(?:not|no|never|out|aside|without|instead|up)\b"})
+_ASIDE = Phrases(
+    {"I have ruled instead out": r"\b(?:not|no(?! [,;])|never|out|aside|without|instead|up)\b"}
+)
 
 
 @functools.lru_cache(maxsize=8192)
 def read_selection(words: Sentence) -> int | None:
     """Return the index of the chosen value, 0 or 1; None if a sentence chooses none of two.
 
-    A sentence that contradicts itself, or sets something aside in unknown words, chooses none.
+    A sentence that sets something aside in unknown words chooses none; one that contradicts itself,
+    chooses both or takes a choice back gives `OPEN`.
     """
     text = " ".join(words)
+    if _TOGETHER.search(text):
+        return OPEN
     found = list(_POINTER.finditer(text))
     named = [_index(pointer) for pointer in found]
     known = next((index for index in named if index is not None), None)
     if known is None:
-        return None
+        return OPEN if _REOPENED.search(text) else None
     chosen: set[int] = set()
     for number, (pointer, name) in enumerate(zip(found, named, strict=True)):
         index = 1 - known if name is None else name
         end = found[number + 1].start() if number + 1 < len(found) else len(text)
         before, after = text[: pointer.start()].strip(), text[pointer.end() : end].strip()
         rejected = _is_rejected(before, after)
-        if not (rejected or number or _ACCEPTED.search(before)) and _ASIDE.search(before):
+        since = text[found[number - 1].end() if number else 0 : pointer.start()]
+        if not (rejected or _ACCEPTED.search(before)) and _ASIDE.search(since):
             return None
         if rejected and not number and len(list(_ASIDE.finditer(before))) > 1:
             return None
         chosen.add(1 - index if rejected else index)
-    return chosen.pop() if len(chosen) == 1 else None
+    return chosen.pop() if len(chosen) == 1 else OPEN
 
 
 def unread_change(words: Sentence, command: Iterable[Sentence]) -> str | None:
@@ -152,10 +188,14 @@ def with_selection(context: DiscourseContext, sentences: Iterable[Sentence]) -> 
 
     Colors and places keep both, because a command may go on with *the other one*.
     """
-    chosen = [index for one in sentences if (index := read_selection(one)) is not None]
-    if not chosen:
+    index = None
+    for one in sentences:
+        last = read_selection(one)
+        if last is not None:
+            again = index in (None, OPEN, last) or _ANEW.search(" ".join(one))
+            index = last if again else OPEN
+    if index in (None, OPEN):
         return context
-    index = chosen[-1]
     return context._replace(
         selected=True,
         colors=_reordered(context.colors, index),

@@ -159,6 +159,9 @@ def test_what_cannot_be_is_said(policies, options, words):
 
 def test_a_plan_is_read_as_it_was_written_and_not_overwritten(tmp_path):
     plan = make_study(("a",), tasks=TASKS, trials=1, demonstrations=1)
+    assert (
+        plan.fingerprint == "6a124351ef12"
+    )  # logs of trials have it, from before there was language 4
     write_study(plan, tmp_path)
     write_study(plan, tmp_path)
     assert (

@@ -148,8 +148,8 @@ class ExportPlan:
             ENVIRONMENT_VERSION,
             TRAJECTORY_VERSION,
         ]
-        text = identifying(json.dumps([asdict(self), versions]))
-        return hashlib.sha256(text.encode()).hexdigest()
+        written = {**asdict(self), "options": identifying(self.options)}
+        return hashlib.sha256(json.dumps([written, versions]).encode()).hexdigest()
 
 
 class TaskText(NamedTuple):

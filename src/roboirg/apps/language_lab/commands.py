@@ -200,7 +200,7 @@ def check_scenario_file(
         int, typer.Option(min=0, help="Random scenes for each scenario, beyond the splits.")
     ] = 200,
 ) -> None:
-    """Check scenarios of language 4, and print three texts of each; exit code 2 if a rule breaks.
+    """Check scenarios of language 4, and print texts of each; exit code 2 if a rule breaks.
 
     Example: roboirg language check-scenarios mine.toml --scenario "school trip"
     """

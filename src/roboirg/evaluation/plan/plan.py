@@ -19,6 +19,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    SerializationInfo,
     ValidationInfo,
     field_serializer,
     field_validator,
@@ -66,6 +67,8 @@ from roboirg.tasks.splits.private_splits import MissingSaltError, is_private
 from roboirg.util.short_hash import short_hash
 
 MOST_JOBS = 1_000_000
+_HASHED = "hashed"
+"""The context in which a plan is written for its fingerprint."""
 REQUIRED = "required"
 """Instead of a wording file in a plan: one must be given when the plan is run."""
 
@@ -237,8 +240,11 @@ class Plan(BaseModel):
         return given if frames is None or check_demonstration_frames(frames) else None
 
     @field_serializer("instruction")
-    def _write_instruction(self, options: InstructionOptions) -> dict[str, Any]:
-        return {name: one for name, one in asdict(options).items() if name in FLAT}
+    def _write_instruction(
+        self, options: InstructionOptions, info: SerializationInfo[Any]
+    ) -> dict[str, Any]:
+        written = identifying(options) if info.context == _HASHED else asdict(options)
+        return {name: one for name, one in written.items() if name in FLAT}
 
     @model_validator(mode="after")
     def _check_text(self) -> Plan:
@@ -275,7 +281,7 @@ class Plan(BaseModel):
     @property
     def fingerprint(self) -> str:
         """Hash of all fields."""
-        return short_hash(identifying(self.model_dump_json()))
+        return short_hash(self.model_dump_json(context=_HASHED))
 
     def checked(self) -> Plan:
         """Return this plan if all of it can be played.

@@ -123,14 +123,14 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
         """Short unique name that is safe in file names."""
         words = [self.policy, self.task, self.split, self.episode, self.setting, self.form]
         identity = {name: getattr(self, name) for name in IDENTITY}
+        identity["options"] = identifying(self.options)
         if self.arm == TOLD:
             del identity["arm"]  # files of runs without arms keep their names
         else:
             words.append(self.arm)
         readable = re.sub(r"[^A-Za-z0-9]+", "-", "-".join(map(str, words))).strip("-")[:100]
         # Only from the identity, so that a record (which is a job) has its job's slug.
-        written = msgspec.json.encode(identity).decode()
-        return f"{readable}-{short_hash(identifying(written))}"
+        return f"{readable}-{short_hash(msgspec.json.encode(identity))}"
 
 
 IDENTITY = tuple(name for name in Job.__struct_fields__ if name not in {"ref", "wordings_file"})

@@ -1,4 +1,4 @@
-"""Read the data files of language 4; complaints name file, scenario and field."""
+"""Read the data files of language 4; every mistake of a file is named by scenario and field."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import re
 from collections.abc import Collection, Iterator, Mapping
 from importlib.resources import files
 from importlib.resources.abc import Traversable
-from typing import Any, NoReturn, TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.core.word_pools import PoolName
+from roboirg.language.phrases import TaggedText
 from roboirg.language.scenarios.markup import Pointer, Text, parse, pointers_in, slots_in
 from roboirg.language.scenarios.scenario import (
     PEOPLE,
@@ -71,46 +72,65 @@ def read_task_scenarios(text: str, where: str) -> TaskScenarios:
     A file of scenarios alone takes the commands of the task's own file.
 
     Raises:
-        InvalidValueError: it is not as `docs/add-scenario.md` says.
+        InvalidValueError: it is not as `docs/add-scenario.md` says; a line for each mistake.
     """
     head = _as(TaskFields, text, where)
     own = None if head.commands else task_scenarios(head.task)
     if own is None and not head.commands:
-        _fail(where, f"has no commands, and there is no {head.task}.toml to take them from")
+        raise InvalidValueError(
+            f"{where} has no commands, and there is no {head.task}.toml to take them from."
+        )
+    mistakes: list[str] = []
     stated = own.stated if own else {
-        name: _parsed(one, f"{where}, stated") for name, one in head.stated.items()
+        name: _parsed(one, f"{where}, stated", mistakes) for name, one in head.stated.items()
     }  # fmt: skip
-    scenarios = tuple(
-        _scenario(one, stated, f"{where}, scenario {one.get('frame', number)!r}")
+    scenarios = [
+        _scenario(one, stated, f"{where}, scenario {one.get('frame', number)!r}", mistakes)
         for number, one in enumerate(head.scenario, 1)
-    )
-    names = [(one.fields.frame, one.fields.setting, one.fields.pool) for one in scenarios]
-    for name in names:
-        if names.count(name) > 1:
-            _fail(where, f"has the frame {name[0]!r} twice in the setting {name[1]}, {name[2]}")
-    commands = own.commands if own else _commands(head, where)
-    return TaskScenarios(head.task, commands, stated, scenarios)
+    ]
+    names = [[one.get(part) for part in ("frame", "setting", "pool")] for one in head.scenario]
+    mistakes += [
+        f"{where} has the frame {name[0]!r} twice in the setting {name[1]}, {name[2]}."
+        for at, name in enumerate(names)
+        if name in names[:at] and None not in name
+    ]
+    commands = own.commands if own else _commands(head, where, mistakes)
+    if mistakes:
+        raise InvalidValueError("\n".join(mistakes))
+    return TaskScenarios(head.task, commands, stated, tuple(filter(None, scenarios)))
 
 
-def _commands(head: TaskFields, where: str) -> dict[tuple[PoolName, frozenset[str]], Texts]:
+def _commands(
+    head: TaskFields, where: str, mistakes: list[str]
+) -> dict[tuple[PoolName, frozenset[str]], Texts]:
     found: dict[tuple[PoolName, frozenset[str]], Texts] = {}
     for pool, texts in head.commands.items():
         for command in texts:
-            of = (pool, frozenset(slots_in(_parsed(command, f"{where}, commands"))))
+            of = (pool, frozenset(slots_in(_parsed(command, f"{where}, commands", mistakes))))
             found[of] = (*found.get(of, ()), command)
     return found
 
 
-def _scenario(written: Mapping[str, Any], stated: Collection[str], where: str) -> Scenario:
-    others = {name: value for name, value in written.items() if name not in SENTENCES}
-    fields = _as(ScenarioFields, others, where)
+def _scenario(
+    written: Mapping[str, Any], stated: Collection[str], where: str, mistakes: list[str]
+) -> Scenario | None:
+    """Return a scenario; None if the file has mistakes, to which those of the scenario are added.
+
+    What its fields need of each other is checked once each of them is right.
+    """
+    fields = _fields(written, where, mistakes)
+    listed = str(written.get("list", ""))
+    sentences = {name: written[name] for name in written if name in SENTENCES}
     texts: dict[str, tuple[Text, ...]] = {}
-    for name, value in _flat({name: written[name] for name in written if name in SENTENCES}):
+    for name, value in _flat(sentences):
+        several = value if isinstance(value, list) else [value]
         at = f"{where}, {name}"
-        several = _as(Texts, [value] if isinstance(value, str) else value, at)
-        texts[name] = tuple(_sentence(one, fields.list, stated, at) for one in several)
+        texts[name] = tuple(_sentence(one, listed, stated, at, mistakes) for one in several)
     said = tuple(name.removeprefix("say.") for name in texts if name.startswith("say."))
-    _check_fields(fields, texts, said, stated, where)
+    if fields is not None:
+        mistakes += [f"{where} {one}." for one in _unmet(fields, texts, said, stated)]
+    if fields is None or mistakes:
+        return None
     classes: dict[str, tuple[Text, ...]] = {}
     for one in texts[f"say.{said[0]}"]:
         kind = next((pointer.expression for pointer in pointers_in(one)), "")
@@ -129,14 +149,33 @@ def _people(
     return tuple((name, *PRONOUNS[one]) for one, names in people.items() for name in names)
 
 
-def _check_fields(
+def _fields(written: Mapping[str, Any], where: str, mistakes: list[str]) -> ScenarioFields | None:
+    """Return what a scenario has besides sentences; None if it has mistakes."""
+    before, found = len(mistakes), dict[str, Any]()
+    for one in msgspec.structs.fields(ScenarioFields):
+        if one.required and one.name not in written:
+            mistakes.append(f"{where} has no {one.name}.")
+        elif one.name in written:
+            try:
+                found[one.name] = msgspec.convert(written[one.name], one.type)
+            except msgspec.ValidationError as error:
+                mistakes.append(f"{where}, {one.name}: {error}.")
+    known = SENTENCES.union(ScenarioFields.__struct_fields__)
+    mistakes += [
+        f"{where} has the field {name!r}; the fields are {', '.join(sorted(known))}."
+        for name in written
+        if name not in known
+    ]
+    return ScenarioFields(**found) if len(mistakes) == before else None
+
+
+def _unmet(
     fields: ScenarioFields,
     texts: Mapping[str, tuple[Text, ...]],
     said: Texts,
     stated: Collection[str],
-    where: str,
-) -> None:
-    """Check what a setting needs."""
+) -> list[str]:
+    """Return what the fields of a scenario need of each other and do not have."""
     needed = ["introduction", *(_CONTEXTUAL if fields.setting == "direct" else ())]
     if fields.setting == "direct-rival":
         needed += [f"remarks.{name}" for name in REMARKS]
@@ -159,9 +198,7 @@ def _check_fields(
             fields.list and fields.list not in _slots(stated)
         ),
     }
-    for complaint, holds in wrong.items():
-        if holds:
-            _fail(where, complaint)
+    return [complaint for complaint, holds in wrong.items() if holds]
 
 
 def _slots(stated: Collection[str]) -> set[str]:
@@ -169,22 +206,28 @@ def _slots(stated: Collection[str]) -> set[str]:
     return {*stated, *(name.partition(".")[0] for name in stated)}
 
 
-def _sentence(text: str, listed: str, stated: Collection[str], where: str) -> Text:
+def _sentence(
+    text: object, listed: str, stated: Collection[str], where: str, mistakes: list[str]
+) -> Text:
     """Return a sentence, with the rows of the closed table for what points back."""
-    parts = _parsed(text, where)
+    parts = _parsed(text, where, mistakes)
     known = GIVEN | _slots(stated)
-    for name in slots_in(parts):
-        if name.removeprefix("rival ") not in known:
-            _fail(where, f"has the slot {name!r}; known: {', '.join(sorted(known))}")
+    mistakes += [
+        f"{where} has the slot {name!r}; known: {', '.join(sorted(known))}."
+        for name in slots_in(parts)
+        if name.removeprefix("rival ") not in known
+    ]
     # As the table has it: without class and slot, and with any noun for a step.
-    said = re.sub(r"\{step:[^}]+\}", "{step:*}", re.sub(r"<[^:<>]+: ", "<", text))
+    said = re.sub(r"\{step:[^}]+\}", "{step:*}", re.sub(r"<[^:<>]+: ", "<", str(text)))
     return tuple(
-        _pointing(one, said, type_of(one.of, listed), where) if isinstance(one, Pointer) else one
+        _pointing(one, said, type_of(one.of, listed), where, mistakes)
+        if isinstance(one, Pointer)
+        else one
         for one in parts
     )
 
 
-def _pointing(pointer: Pointer, said: str, kind: str, where: str) -> Pointer:
+def _pointing(pointer: Pointer, said: str, kind: str, where: str, mistakes: list[str]) -> Pointer:
     """Return a pointer with what its row says."""
     words = pointer.words
     of_kind = [row for row in pointer_table() if kind in row.of]
@@ -193,13 +236,23 @@ def _pointing(pointer: Pointer, said: str, kind: str, where: str) -> Pointer:
     rows += [one for one in of_kind if words == one.words]
     row = next((one for one in rows if one.kind == pointer.expression), None)
     if row is None:
-        _fail(
-            where,
-            f"has the pointer <{pointer.expression} {pointer.of}: {words}>, which is not in "
-            f"pointers.toml; for a {kind} there are: "
-            f"{'; '.join(one.words for one in of_kind) or 'none'}",
+        found = f"{where} has the pointer <{pointer.expression} {pointer.of}: {words}>"
+        classes = " or ".join(dict.fromkeys(repr(one.kind) for one in rows))
+        known = "; ".join(_written(one, pointer.of) for one in of_kind) or "none"
+        mistakes.append(
+            f"{found} of the class {pointer.expression!r}; in pointers.toml the words {words!r} "
+            f"have the class {classes} for a {kind}."
+            if rows
+            else f"{found}, which is not in pointers.toml; for a {kind} there are: {known}."
         )
+        return pointer
     return pointer._replace(resolved=parse(row.resolved), operation=row.operation)
+
+
+def _written(row: PointerRow, of: str) -> str:
+    """Return a row of the table as authors write it, with class and slot."""
+    begun = f"<{row.kind} {of}: "
+    return row.words.replace("<", begun) if "<" in row.words else f"{begun}{row.words}>"
 
 
 def type_of(name: str, listed: str = "") -> str:
@@ -221,25 +274,21 @@ def _flat(table: object, prefix: str = "") -> Iterator[tuple[str, object]]:
         yield from _flat(value, f"{prefix}.{name}" if prefix else name)
 
 
-def _parsed(text: str, where: str) -> Text:
+def _parsed(text: object, where: str, mistakes: list[str]) -> Text:
+    """Return the parts of a sentence; of one with a mistake, which is added, the words."""
     try:
         return parse(text)
     except ValueError as error:
-        raise InvalidValueError(f"{where} {error}.") from error
+        mistakes.append(f"{where} {error}.")
+        return (TaggedText(str(text)),)
 
 
-def _as(kind: type[Stored], data: object, where: str) -> Stored:
-    """Return data of a type, from TOML if it is text."""
+def _as(kind: type[Stored], text: str, where: str) -> Stored:
+    """Return data of a type from TOML."""
     try:
-        if isinstance(data, str):
-            return msgspec.toml.decode(data, type=kind)
-        return msgspec.convert(data, kind)
+        return msgspec.toml.decode(text, type=kind)
     except (ValueError, msgspec.MsgspecError) as error:
         raise InvalidValueError(f"{where}: {error}.") from error
-
-
-def _fail(where: str, complaint: str) -> NoReturn:
-    raise InvalidValueError(f"{where} {complaint}.")
 
 
 def read_scenario_file(path: Traversable) -> TaskScenarios:

@@ -42,6 +42,7 @@ class ScenarioReport:
         broken: the rules that it breaks, with the number of scenes in which it does.
         examples: for each broken rule one text.
         renderings: texts, from different scenes.
+        competing: a text with a competing remark; empty if the setting has none.
         scenes: number of scenes that it fits.
         open: number of these where its command alone leaves several goals.
         longest: the text with most tokens, after their number.
@@ -53,6 +54,7 @@ class ScenarioReport:
     broken: Counter[str] = field(default_factory=Counter)
     examples: dict[str, str] = field(default_factory=dict)
     renderings: list[str] = field(default_factory=list)
+    competing: str = ""
     scenes: int = 0
     open: int = 0
     longest: tuple[int, str] = (0, "")
@@ -158,7 +160,8 @@ def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episod
             goals = interpret(text, episode.scene, episode.task).goals
             wrong = "misread" if len(goals) == 1 else "refused"
             report.readings["read" if goals == (episode.goal,) else wrong].append(text)
-    implicit = told[0]
+    implicit, _, *competing = told
+    report.competing = report.competing or "".join(one.text for one in competing)
     if len(report.renderings) < SHOWN and number % 3 == 0:
         report.renderings.append(implicit.text)
     report.scenes += 1

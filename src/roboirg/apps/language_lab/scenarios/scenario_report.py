@@ -16,6 +16,8 @@ def report_lines(report: ScenarioReport) -> Iterator[str]:
     texts = sum(map(len, report.readings.values()))
     yield f"{fields.frame} ({fields.setting}, {fields.pool})"
     yield from (f"  {text}" for text in report.renderings)
+    if report.competing:
+        yield f"  With a competing remark: {report.competing}"
     yield (
         f"  {report.longest[0]} of {USUAL_LIMIT} tokens; fits {counted(fits, 'scene')}; "
         f"the interpreter does not read {unread} of {counted(texts, 'text')}."

@@ -141,7 +141,10 @@ class StudyPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     @property
     def fingerprint(self) -> str:
         """Digest that identifies the plan."""
-        return short_hash(identifying(msgspec.json.encode(self).decode()))
+        written = msgspec.to_builtins(self)
+        for one, trial in zip(written["trials"], self.trials, strict=True):
+            one["job"]["options"] = identifying(trial.job.options)
+        return short_hash(msgspec.json.encode(written))
 
     def trial(self, name: str) -> PlannedTrial:
         """Return the trial of that name.
