@@ -234,6 +234,8 @@ LEAST = {
         "blue", "red",
     ),
     ("clue", "seen"): (f"We need the red cube. {PUT}", "red"),
+    ("rest", "seen"): (f"We need the red cube. {PUT}", "red"),
+    ("clue", "place"): (f"Do you see the cube farthest to your left? {PUT}", "blue"),
     ("clue", "rank"): (COLORS + PUT, "red", "green"),
 }  # fmt: skip
 """The least that is said around a pointer, by type and operation, and its values by rank."""
