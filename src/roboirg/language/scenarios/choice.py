@@ -183,7 +183,7 @@ def _spatial(request: InstructionRequest) -> Iterator[Offer]:
 
 
 def _grounded(request: InstructionRequest) -> Iterator[Offer]:
-    clues = clues_of(request)
+    clues = clues_of(request, ("second", "third"))
     at = _plainest([clue.words for clue in clues.values()])
     thing, clue = list(clues.items())[at]
     notes: dict[str, object] = {
