@@ -36,6 +36,9 @@ from roboirg.language.template_sampler import sampler_of
 _DESCRIBED = ("place", "clue", "aside", "rest")
 """Slots for a thing that is described; a scenario fits the things that have those that it names."""
 
+_HEAVY = ("second", "third", "corner")
+"""Words of clues that are hard to follow: *right next to the one second from your left*."""
+
 
 class Chosen(NamedTuple):
     """What is said.
@@ -183,7 +186,7 @@ def _spatial(request: InstructionRequest) -> Iterator[Offer]:
 
 
 def _grounded(request: InstructionRequest) -> Iterator[Offer]:
-    clues = clues_of(request, ("second", "third"))
+    clues = clues_of(request, _HEAVY)
     at = _plainest([clue.words for clue in clues.values()])
     thing, clue = list(clues.items())[at]
     notes: dict[str, object] = {
