@@ -213,7 +213,7 @@ def test_every_published_scene_has_words_in_both_pools(task):
 def test_instructions_of_language_4_keep_the_rules_of_every_language(task):
     commands = {}
     for episode, options, told in spoken(task):
-        assert told.metadata["language_version"] == "4.0.0"
+        assert told.metadata["language_version"] == "4.1.0"
         assert told == instruct_with(episode, options)
         assert not re.search(r"[{}<>|\[\]]|  | [.,]|[.]{2}", told.text), told.text
         for one in told.mentions:
@@ -226,6 +226,37 @@ def test_instructions_of_language_4_keep_the_rules_of_every_language(task):
         if (options.setting, options.form) == ("direct", "resolved"):
             own = commands[episode.key]
             assert told.command.lower().endswith(own.lower())
+
+
+@pytest.mark.parametrize("name", ["spatial", "grounded", "reasoning"])
+def test_of_two_containers_only_one_has_to_be_found_out(name):
+    """The other one's color is named once more than the first one's, or alone."""
+    found = 0
+    for index, pool in itertools.product(range(60), POOLS):
+        episode = get_episode("VideoUnmask", "random", index)
+        options = InstructionOptions(name, language=4, wordings=pool)
+        if len(episode.goal["colors"]) < 2 or find_refusal(episode, options) is not None:
+            continue
+        found += 1
+        said = instruct_with(episode, options)
+        named = re.findall("red|green|blue", said.turns[0])
+        counts = sorted(named.count(color) for color in episode.goal["colors"])
+        assert counts == ([1, 2] if name == "reasoning" else [0, 1]), said.text
+        assert len(named) == sum(counts)
+        assert not re.search("red|green|blue", said.turns[-1])
+    assert found
+
+
+def test_a_clue_that_sets_two_things_aside_has_a_sentence_for_them():
+    for index in range(60):
+        episode = get_episode("PickXtimes", "random", index)
+        options = InstructionOptions("grounded", language=4)
+        if find_refusal(episode, options) is None:
+            said = instruct_with(episode, options)
+            named = replace(options, form="resolved")
+            aside = said.metadata["pattern"] == "sets"
+            assert (said.turns[0].count(".") == 2) == aside, said.text
+            assert ("neither" in instruct_with(episode, named).command) == aside
 
 
 @pytest.mark.parametrize("kind", ["neutral", "competing"])
@@ -287,6 +318,8 @@ LEAST = {
         "blue", "red",
     ),
     ("clue", "seen"): (f"We need the red cube. {PUT}", "red"),
+    ("rest", "seen"): (f"We need the red cube. {PUT}", "red"),
+    ("clue", "place"): (f"Do you see the cube farthest to your left? {PUT}", "blue"),
     ("clue", "rank"): (COLORS + PUT, "red", "green"),
 }  # fmt: skip
 """The least that is said around a pointer, by type and operation, and its values by rank."""

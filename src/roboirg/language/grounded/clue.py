@@ -20,6 +20,7 @@ class Clue(NamedTuple):
         said: the sentence or sentences of the introduction with ``{which}``; empty for any.
         short: the words for ``{which}`` there.
         of_handled: whether the words stand for the thing to handle, not for its cube.
+        aside: the places of the other two of three things, if these are what the words say.
     """
 
     kind: ClueKind
@@ -28,6 +29,7 @@ class Clue(NamedTuple):
     said: str = ""
     short: str = ""
     of_handled: bool = False
+    aside: tuple[str, ...] = ()
 
 
 def draw_clue(request: InstructionRequest, purpose: str, clues: Sequence[Clue]) -> Clue | None:

@@ -128,8 +128,9 @@ def _left_over(
         left = [item for item in things if item not in (one, other)]
         if len(things) == FEW and len(left) == 1 and left[0] in targets and _differ(first, second):
             places = {**fields, "first": first, "second": second, "started_or_is": started_or_is}
+            clue = Clue("sets", words.format(**places), short=short, aside=(first, second))
             found += [
-                Clue("sets", words.format(**places), said=said.format(**places), short=short)
+                clue._replace(said=said.format(**places))
                 for said in templates.LEFT_OVER_SAID.of(pool)
             ]
     return found

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from roboirg.language.grounded import Clue
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.rivals.balanced_rivals import balanced_rival
@@ -25,12 +26,18 @@ from roboirg.language.scenarios.introduced import (
     named,
     several,
 )
-from roboirg.language.scenarios.markup import Text
+from roboirg.language.scenarios.markup import Text, slots_in
 from roboirg.language.scenarios.scenario import PERSON, Scenario
 from roboirg.language.settings.grounded import clues_of
 from roboirg.language.settings.reasoning import BLOCK
 from roboirg.language.settings.spatial import draw_landmarks
 from roboirg.language.template_sampler import sampler_of
+
+_DESCRIBED = ("place", "clue", "aside", "rest")
+"""Slots for a thing that is described; a scenario fits the things that have those that it names."""
+
+_HEAVY = ("second", "third", "corner")
+"""Words of clues that are hard to follow: *right next to the one second from your left*."""
 
 
 class Chosen(NamedTuple):
@@ -114,6 +121,12 @@ def _says(scenario: Scenario, offer: Offer) -> bool:
     return (
         set(scenario.said) == set(offer.fields)
         and offer.listed in (None, fields.list)
+        and offer.values.keys()
+        >= {
+            name
+            for name in slots_in(scenario.text("introduction"))
+            if name.partition(".")[0] in _DESCRIBED
+        }
         and (
             derive is None
             or (
@@ -157,28 +170,49 @@ def _list(request: InstructionRequest, scenario: Scenario) -> list[IntroducedVal
 
 
 def _spatial(request: InstructionRequest) -> Iterator[Offer]:
-    colors, marks = request.color_values, draw_landmarks(request)
+    marks = draw_landmarks(request)
     # Of a single cube "at your far left" may be false; it is the one farthest to the left.
     phrases = [mark.phrase.replace("at your far", "farthest to your") for mark in marks]
-    places = [
-        IntroducedValue(color.slot, "place", color.value, phrase)
-        for color, phrase in zip(colors, phrases, strict=True)
-    ]
+    at = _plainest(phrases)
+    color = request.color_values[at]
+    place = (IntroducedValue(color.slot, "place", color.value, phrases[at]),)
     notes: dict[str, object] = {
-        "landmarks": phrases,
-        "landmark_classes": [mark.level for mark in marks],
+        "landmarks": [phrases[at]],
+        "landmark_classes": [marks[at].level],
         "frame": request.frame,
     }
-    yield Offer([one.field for one in colors], several("place", places), notes)
+    fields = [one.field for one in request.color_values]
+    yield Offer(fields, {"place": place, f"place.{at}": place}, notes)
 
 
 def _grounded(request: InstructionRequest) -> Iterator[Offer]:
-    clues = clues_of(request)
-    kinds = list(dict.fromkeys(clue.kind for clue in clues.values()))
-    seen = [IntroducedValue(one.slot, "clue", one.value, clue.words) for one, clue in clues.items()]
-    touched = list(dict.fromkeys(one.slot for one in clues))
-    notes: dict[str, object] = {"touched": touched, "pattern": kinds[0], "patterns": kinds}
-    yield Offer([one.field for one in clues], several("clue", seen), notes)
+    clues = clues_of(request, _HEAVY)
+    at = _plainest([clue.words for clue in clues.values()])
+    thing, clue = list(clues.items())[at]
+    notes: dict[str, object] = {
+        "touched": [thing.slot],
+        "pattern": clue.kind,
+        "patterns": [clue.kind],
+    }
+    yield Offer([one.field for one in clues], _seen(thing, clue, at), notes)
+
+
+def _seen(thing: GoalValue, clue: Clue, at: int) -> Values:
+    """Return the slots for a clue; for one that sets two things aside, those of what is left."""
+    if not clue.aside:
+        words = clue.words.replace("that comes ", "").replace("that is ", "")
+        seen = (IntroducedValue(thing.slot, "clue", thing.value, words),)
+        return {"clue": seen, f"clue.{at}": seen}
+    aside = [IntroducedValue("", "place", place, place) for place in clue.aside]
+    return {
+        "rest": (IntroducedValue(thing.slot, "clue", thing.value, "one"),),
+        **several("aside", aside),
+    }
+
+
+def _plainest(words: Sequence[str]) -> int:
+    """Return which of several things is described, the shortest way; the others are named."""
+    return min(range(len(words)), key=lambda at: len(words[at]))
 
 
 def _rival(request: InstructionRequest) -> Iterator[Offer]:

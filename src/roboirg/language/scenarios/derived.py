@@ -17,13 +17,14 @@ from roboirg.language.scenarios.introduced import (
     IntroducedValue,
     Offer,
     Values,
+    named,
     several,
 )
 from roboirg.language.slot_types.ordinal import series_length
 from roboirg.language.templates import derivations
 
-ALL_COLORS = 3
-"""Shown colors, of which two can be excluded and then one of those be taken."""
+PAIR = 2
+"""Colors of which the second one is the other one."""
 
 
 def derivations_of(request: InstructionRequest) -> Iterator[Offer]:
@@ -33,6 +34,7 @@ def derivations_of(request: InstructionRequest) -> Iterator[Offer]:
         yield from _stepped(request, value, "number deduction", derivations.COUNTED_STEPS)
         yield from _stepped(request, value, "sequential relation", derivations.STEPS)
     yield from _excluded(request)
+    yield from _second(request)
     yield from _other(request)
 
 
@@ -41,7 +43,7 @@ def _deduced(request: InstructionRequest) -> Iterator[Offer]:
         choices = request.alternative_numbers(value.slot)
         for relation, (reference,) in deductions([value.number], choices):
             values = _counted(value, reference, relation.offset)
-            yield _derived(["number deduction"], [value.field], values, relation.name)
+            yield _derived("number deduction", [value.field], values, relation.name)
 
 
 def _stepped(
@@ -54,7 +56,7 @@ def _stepped(
     choices = [number for (number,) in request.alternative_numbers(value.slot)]
     for step in open_steps(known, value.number, length, choices):
         values = _counted(value, value.number - step.offset, step.offset)
-        yield _derived([pattern], [value.field], values, step.name)
+        yield _derived(pattern, [value.field], values, step.name)
 
 
 def _counted(value: GoalValue, reference: int, offset: int) -> Values:
@@ -64,19 +66,24 @@ def _counted(value: GoalValue, reference: int, offset: int) -> Values:
 
 
 def _excluded(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield the color that is left without others, and a second one: of these, the other one."""
+    """Yield the color that is left without others."""
     colors = request.color_values
-    fits = len(colors) == 1 or (len(colors), len(request.scene_colors)) == (2, ALL_COLORS)
-    if request.values_of("amount") or not fits:
+    if request.values_of("amount") or len(colors) != 1:
         return
-    excluded = excluded_colors(request)
-    values = {"excluded": tuple(IntroducedValue(REFERENCE, "color", one) for one in excluded)}
-    patterns = ["color exclusion"]
-    for second in colors[1:]:
-        (taken,) = (one for one in excluded if one != second.value)
-        values["taken"] = (IntroducedValue(REFERENCE, "color", taken),)
-        patterns.append("contextual logic")
-    yield _derived(patterns, [one.field for one in colors], values)
+    excluded = tuple(IntroducedValue(REFERENCE, "color", one) for one in excluded_colors(request))
+    yield _derived("color exclusion", [colors[0].field], {"excluded": excluded})
+
+
+def _second(request: InstructionRequest) -> Iterator[Offer]:
+    """Yield two colors in an order that is drawn, and the first one again: then the other one."""
+    colors = request.color_values
+    if request.values_of("amount") or len(colors) != PAIR:
+        return
+    first, second = request.sampler.pick("complement order", ((0, 1), (1, 0)))
+    both = [named(colors[first]), named(colors[second])]
+    values = {**several("list", both), "taken": (named(colors[0]),)}
+    fields = [one.field for one in colors]
+    yield _derived("contextual logic", fields, values, listed=colors[0].slot)
 
 
 def _other(request: InstructionRequest) -> Iterator[Offer]:
@@ -88,21 +95,21 @@ def _other(request: InstructionRequest) -> Iterator[Offer]:
         both = [IntroducedValue(REFERENCE, one.slot_type, one.value) for one in pair]
         first, second = request.sampler.pick("complement order", ((0, 1), (1, 0)))
         values = {**several("list", (both[first], both[second])), "taken": (both[1],)}
-        yield _derived(["contextual logic"], [pair.meant.field], values, listed=slot)
+        yield _derived("contextual logic", [pair.meant.field], values, listed=slot)
 
 
 def _derived(
-    patterns: list[str],
+    pattern: str,
     fields: list[str],
     values: Values,
     relation: str | None = None,
     listed: str = "",
 ) -> Offer:
-    """Return the offer of a derivation; the first pattern is its own, the others take part."""
+    """Return the offer of a derivation."""
     reference = values.get("reference", values.get("taken"))
     notes: dict[str, object] = {
-        "pattern": patterns[0],
-        "patterns": patterns,
+        "pattern": pattern,
+        "patterns": [pattern],
         "relation": relation,
         "reference": reference[0].value if reference else None,
     }

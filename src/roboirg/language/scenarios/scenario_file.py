@@ -34,7 +34,8 @@ Stored = TypeVar("Stored")
 PRONOUNS = {"he": ("he", "him", "his"), "she": ("she", "her", "her")}
 GIVEN = frozenset(
     {"list", "list.0", "list.1", "list.2", "rank", "reference", "step", "excluded", "taken"}
-    | {"place", "place.0", "place.1", "clue", "clue.0", "clue.1", "total"}
+    | {"place", "place.0", "place.1", "clue", "clue.0", "clue.1", "aside.0", "aside.1", "rest"}
+    | {"total"}
     | PEOPLE
 )
 """Slots that are no fields of the goal."""

@@ -76,12 +76,17 @@ def say(request: InstructionRequest) -> InstructionSpec:
     return InstructionSpec(utterances, notes)
 
 
-def clues_of(request: InstructionRequest) -> Clues:
-    """Return a clue for each value that the words leave to what is seen, in order of speaking."""
+def clues_of(request: InstructionRequest, avoided: Sequence[str] = ()) -> Clues:
+    """Return a clue for each value that the words leave to what is seen, in order of speaking.
+
+    Clues with one of the words to be avoided are only drawn where there is no other one.
+    """
     found: dict[GoalValue, Clue] = {}
     for value in request.goal_values:
         sought = _SOUGHT.get(value.slot) if _is_open(request, value.slot) else None
-        clue = draw_clue(request, f"{value.field} seen", sought(request, value)) if sought else None
+        clues = sought(request, value) if sought else []
+        plain = [one for one in clues if not any(word in one.words for word in avoided)]
+        clue = draw_clue(request, f"{value.field} seen", plain or clues)
         if clue is not None:
             found[value] = clue
     colors = request.color_values

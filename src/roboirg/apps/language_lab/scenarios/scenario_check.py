@@ -18,6 +18,7 @@ from roboirg.language.generator import request_of, spoken_instruction
 from roboirg.language.instruction import Instruction, Mention
 from roboirg.language.request import InstructionRequest
 from roboirg.language.scenarios.choice import Chosen, choose
+from roboirg.language.scenarios.markup import slots_in
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.spoken import say_chosen
 from roboirg.language.settings import all_settings
@@ -196,13 +197,16 @@ def _broken(request: InstructionRequest, chosen: Chosen, told: Instruction) -> I
                 yield f"say.{name}: means {found}, but the goal is {goal[name]}"
     for _, words in leaking(told, request.episode):
         yield f"the command gives away {words}"
-    yield from _broken_pointers(told, listed=bool(scenario.fields.list))
+    yield from _broken_pointers(told, scenario)
 
 
-def _broken_pointers(told: Instruction, *, listed: bool) -> Iterator[str]:
+def _broken_pointers(told: Instruction, scenario: Scenario) -> Iterator[str]:
     """Yield the pointers that have no antecedent of their value, or several."""
+    listed = bool(scenario.fields.list)
+    # Of two, one is named again: it is the one that is meant next.
+    again = "taken" in slots_in(scenario.text("introduction"))
     before: list[Mention] = []
-    ranked = False
+    ranked = again
     for mention in told.mentions:
         if mention.role == "antecedent":
             if told.utterances[mention.utterance].stage != "distractor":
@@ -210,9 +214,14 @@ def _broken_pointers(told: Instruction, *, listed: bool) -> Iterator[str]:
             continue
         words, parts = f"{told.span(mention)!r}", str(mention.value).split(" and ")
         of_kind = [one for one in before if isinstance(one.value, int) != parts[0].isalpha()]
+        own = [one for one in of_kind if str(one.value) in parts]
+        if mention.expression in ("there", "that") and own:
+            # "That cube" was named by its color, "the one there" by its place.
+            named = told.span(own[0]) == own[0].value
+            of_kind = [one for one in of_kind if (told.span(one) == one.value) == named]
         values = [str(one.value) for one in of_kind]
         # Of several, and of a pair, one may be named again to say that it is gone.
-        once = len(parts) == 1 and mention.expression != "other"
+        once = len(parts) == 1 and mention.expression != "other" and not again
         for part in parts:
             number = values.count(part)
             if not number:
