@@ -15,6 +15,7 @@ from roboirg.evaluation.analysis.stats.chance import CHANCE, FLOORS, floor_level
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job
 from roboirg.language.settings import settings_of
+from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.language.variants import all_variants
 from roboirg.policies import make_policy
 from roboirg.policies.builtin.listeners import ForgetfulPolicy
@@ -97,7 +98,7 @@ def test_floors_are_what_the_shortcut_listeners_come_to(rule: str, task: str, se
 @pytest.mark.parametrize("variant", all_variants(), ids="-".join)
 def test_floors_are_shares_and_only_implicit_commands_leave_something_open(variant) -> None:
     jobs = [job(*variant, episode) for episode in range(6)]
-    levels = {floor: floor_level(floor, jobs) for floor in FLOORS}
+    levels = {floor: floor_level(floor, jobs, LANGUAGE_VERSION) for floor in FLOORS}
     assert all(0 <= level <= 1 for level in levels.values())
     assert 0 < levels[CHANCE] < 1
     assert variant[1] not in ("direct", "contextual") or levels["surface"] == 1
@@ -117,5 +118,8 @@ def test_who_plays_and_how_often_makes_no_difference() -> None:
     again = [msgspec.structs.replace(one, policy="else", policy_seed=3) for one in jobs[:1]]
     assert floor_level(CHANCE, jobs + again * 5) == floor_level(CHANCE, jobs)
     assert floor_level(CHANCE, []) is None
-    # Learned floors are those of the usual options.
-    assert floor_level("text-only", [job("PickXtimes", "contextual", stages=(1, 5))]) is None
+    # Learned floors are those of the usual options, in the version that was played.
+    usual, short = job("PickXtimes", "contextual"), job("PickXtimes", "contextual", stages=(1, 5))
+    assert floor_level("text-only", [short], LANGUAGE_VERSION) is None
+    assert floor_level("text-only", [usual], LANGUAGE_VERSION) is not None
+    assert floor_level("text-only", [usual], "0.9") is None, "never those of another version"

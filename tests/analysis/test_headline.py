@@ -44,8 +44,8 @@ def two_settings(monkeypatch):
     monkeypatch.setattr(headline, "measured_floors", stored.get)
 
 
-def played(result, task, setting, *won, wordings=None, **fields):
-    options = InstructionOptions(setting, wordings=wordings)
+def played(result, task, setting, *won, wordings=None, language=3, **fields):
+    options = InstructionOptions(setting, wordings=wordings, language=language)
     return [
         result(OUTCOMES[bool(one)], episode, task=task, options=options, **fields)
         for episode, one in enumerate(won)
@@ -114,6 +114,7 @@ def test_it_stands_next_to_every_table_or_why_there_is_none(result, two_settings
     (note,) = notes_of(enough(result))
     assert note.startswith("Headline of listener: −50.0 points to explicit (95 % interval ")
     assert note.endswith("reasoning, spatial; 20 episodes.")
+    assert notes_of(enough(result, language=4)) == [note], "to explicit of the same language"
     frame = make_frame([("run", enough(result))])
     (run_table,) = make_run_tables(frame)
     assert note in make_table("main", RunData(frame)).notes

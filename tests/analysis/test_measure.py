@@ -16,7 +16,7 @@ import roboirg
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import make_frame
-from roboirg.evaluation.analysis.results.option_labels import REFERENCE
+from roboirg.evaluation.analysis.results.option_labels import reference_of
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, summarize
@@ -137,7 +137,7 @@ def test_averages_are_unweighted_and_suites_stand_by_themselves(result) -> None:
 def test_gaps_are_paired_and_corrected_and_forms_compared(result) -> None:
     """All of 20 are won in explicit, none in direct, 15 in its resolved form, 19 in reasoning."""
     won = {
-        REFERENCE: 20,
+        reference_of(InstructionOptions()): 20,
         InstructionOptions("direct"): 0,
         InstructionOptions("direct", "resolved"): 15,
         InstructionOptions("reasoning"): 19,

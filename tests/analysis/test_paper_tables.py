@@ -25,6 +25,7 @@ from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.analysis.tables.rendering.terminal import renderable
 from roboirg.evaluation.analysis.tables.table import Table
 from roboirg.language.settings import settings_of
+from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.tasks import all_tasks
 
 
@@ -104,6 +105,26 @@ def test_what_is_incomplete_is_marked_and_compared_with_nothing(result) -> None:
     ]
     table = table_of("main", good, poor, planned=planned, floors=(CHANCE,))
     assert get_format("markdown").draw(table) == PRINTED.read_text("utf-8")
+
+
+def test_results_in_another_language_stand_next_to_its_own_explicit_and_floors(result) -> None:
+    """A gap to another language's explicit, or its learned floors, would be of other words."""
+    three, four = (
+        [
+            result(outcome, setting=setting, language=language, language_version=version)
+            for setting, outcome in (("explicit", "success"), ("direct", "failure"))
+        ]
+        for language, version in ((3, LANGUAGE_VERSION), (4, "4.none"))
+    )
+    table = table_of("main", three, four, floors=(CHANCE, "text-only"))
+    rows = {(row.group, row.name): row.entries[1] for row in table.rows}
+    for version in (LANGUAGE_VERSION, "4.none"):
+        assert rows["direct", f"listener, language {version}"].change == -100
+        assert rows["direct", f"{CHANCE}, language {version}"].percent is not None
+    assert ("direct", f"text-only, language {LANGUAGE_VERSION}") in rows
+    assert ("direct", "text-only, language 4.none") not in rows
+    assert "No learned floors (text-only) were measured for language version 4.none." in table.notes
+    assert table_of("main", four, floors=(CHANCE,)).rows[1].name == CHANCE
 
 
 def test_only_informative_tables_are_wanted(result) -> None:

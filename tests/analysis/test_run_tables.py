@@ -64,6 +64,7 @@ listener
 Played on the test split, in our own words, with at most 1300 steps. n = 1 to 4 episodes per cell, 1 to 6 episodes for 
 all tasks
 ≠ not comparable with the published rate: our own words; 4 of 50 episodes (PickXtimes); 2 of 50 episodes (VideoUnmask).
+listener has no headline number: no floors were measured for its language version 1.
 success rate in %, in brackets the gap to explicit on the same episodes in points; (–) explicit has no success either, 
 so the gap says nothing; ! episodes ended in an error and are left out of the rates; … episodes are still to be played
 listener: 8 episodes without success

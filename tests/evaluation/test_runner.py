@@ -257,9 +257,10 @@ def test_machines_of_other_versions_are_named() -> None:
     random = read_policy("random")
     here = MachineVersions.expected((unknown_policy("x"), random))
     assert here.difference(MachineVersions.expected((read_policy("oracle"), random))) is None
-    there = here._replace(language="2.0.1")
-    assert here.difference(there) == (
-        f"its language has version 2.0.1 there and {here.language} here"
-    )
+    for language, version in here.languages.items():
+        there = here._replace(languages={**here.languages, language: "2.0.1"})
+        assert here.difference(there) == (
+            f"its language {language} has version 2.0.1 there and {version} here"
+        )
     other = here._replace(policies=(here.policies[0], dataclasses.replace(random, version="old")))
     assert str(here.difference(other)).startswith("random has version old there")

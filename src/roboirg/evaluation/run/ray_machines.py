@@ -32,7 +32,7 @@ from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.play.rollout import PlayJob
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.run.workers import POLL_S, Worker
-from roboirg.language import LANGUAGE_VERSION
+from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.tasks.splits.private_splits import use_salt
 
 KEY_S = 1.0
@@ -47,26 +47,29 @@ class MachineVersions(NamedTuple):
 
     Attributes:
         roboirg: version of the package.
-        language: version of the instructions.
+        languages: version of the instructions of each language.
         environment: version of the environment.
         policies: of the run, with their versions.
     """
 
     roboirg: str
-    language: str
+    languages: Mapping[int, str]
     environment: int
     policies: tuple[PolicyRef, ...] = ()
 
     @classmethod
     def expected(cls, policies: tuple[PolicyRef, ...]) -> MachineVersions:
         """Return those of this machine, with policies as they were opened where the run began."""
-        return cls(__version__, LANGUAGE_VERSION, ENVIRONMENT_VERSION, policies)
+        return cls(__version__, LANGUAGE_VERSIONS, ENVIRONMENT_VERSION, policies)
 
     def difference(self, there: MachineVersions) -> str | None:
         """Return how another machine differs, in words; None if it does not."""
         pairs = [
             ("roboirg", self.roboirg, there.roboirg),
-            ("its language", self.language, there.language),
+            *(
+                (f"its language {one}", version, there.languages.get(one, "none"))
+                for one, version in self.languages.items()
+            ),
             ("its environment", self.environment, there.environment),
             *(
                 (mine.spec, mine.version, theirs.version)

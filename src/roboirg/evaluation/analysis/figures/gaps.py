@@ -20,6 +20,7 @@ from roboirg.evaluation.analysis.comparability import (
 )
 from roboirg.evaluation.analysis.figures.rates import Rate, RateRow, draw_rates
 from roboirg.evaluation.analysis.published import TRIALS, RateTable, published_rows
+from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import NOTHING, Cell, Cells
 from roboirg.evaluation.analysis.stats.measure import measure_groups
@@ -52,11 +53,11 @@ def draw_next_to_reference(which: RateTable, content: RunData, published: bool) 
     """
     table, played = PAPER_TABLES[which], _played(which, content.cells)
     tasks = _shared_tasks(which, played) if content.cells else _published_tasks(which)
-    if len(tasks) > 1:
-        tasks.pop(table.reference, None)
-    elif which == "context":
+    if which == "context" and len(tasks) <= 1:
         return None
-    every = {table.reference: {task for names in tasks.values() for task in names}, **tasks}
+    tasks = {one: names for one, names in tasks.items() if one != table.reference(one)} or tasks
+    shown = {task for names in tasks.values() for task in names}
+    every = {**{table.reference(one): shown for one in tasks}, **tasks}
     cells = {
         key: cell
         for key, cell in content.cells.items()
@@ -87,7 +88,7 @@ def draw_next_to_reference(which: RateTable, content: RunData, published: bool) 
 
 
 def _title(which: RateTable, options: InstructionOptions) -> str:
-    return options.setting if which == "main" else f"stages {stages_text(options)}"
+    return options_label(options) if which == "main" else f"stages {stages_text(options)}"
 
 
 def _played(which: RateTable, cells: Cells) -> Played:
@@ -106,7 +107,9 @@ def _shared_tasks(which: RateTable, played: Played) -> dict[InstructionOptions, 
     shared = {}
     for options in sorted({options for options, _ in played}, key=row_order):
         runs = [policy_run for one, policy_run in played if one == options]
-        places = [(one, run) for one in (options, PAPER_TABLES[which].reference) for run in runs]
+        places = [
+            (one, run) for one in (options, PAPER_TABLES[which].reference(options)) for run in runs
+        ]
         needed = [played[place] for place in places if place in played]
         if tasks := [task for task in needed[0] if all(task in own for own in needed)]:
             shared[options] = tasks
@@ -132,7 +135,13 @@ def _own_rates(
             for options, names in tasks.items()
             if (own := played.get((options, policy_run)))
         },
-        [lambda key: NOTHING if key[0] == reference else played.get((reference, policy_run), {})],
+        [
+            lambda key: (
+                NOTHING
+                if key[0] == reference(key[0])
+                else played.get((reference(key[0]), policy_run), {})
+            )
+        ],
         is_mean=lambda _key: True,
     )
     rates = {}
@@ -161,7 +170,7 @@ def _published_rates(which: RateTable, tasks: Tasks) -> Iterator[RateRow]:
     """Yield a row for each published policy, that with the best reference first."""
     reference = PAPER_TABLES[which].reference
     published = {(row.model, row.options): row for row in published_rows(which)}
-    references = [row for row in published.values() if row.options == reference]
+    references = [row for row in published.values() if row.options == reference(row.options)]
     for first in sorted(references, key=lambda row: -row.average):
         rates = {}
         for options, names in tasks.items():

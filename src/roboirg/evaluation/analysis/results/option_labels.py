@@ -6,13 +6,10 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import DEFAULT_LANGUAGE, InstructionOptions
 from roboirg.core.plain_text import counted
 from roboirg.language import STAGE_SETS
 from roboirg.language.settings import EXPLICIT, all_settings, setting_names
-
-REFERENCE = InstructionOptions(EXPLICIT)
-"""The options that every gap refers to."""
 
 _DEFAULTS = InstructionOptions()
 _PHRASES: dict[str, Callable[[Any], str]] = {
@@ -24,6 +21,11 @@ _PHRASES: dict[str, Callable[[Any], str]] = {
     "delivery": "in {}".format,
 }
 """How labels name the value of an option; of any other option, by its name."""
+
+
+def reference_of(options: InstructionOptions) -> InstructionOptions:
+    """Return the options that a gap refers to: explicit, in the same language."""
+    return InstructionOptions(EXPLICIT, language=options.language)
 
 
 def options_label(options: InstructionOptions) -> str:
@@ -49,17 +51,19 @@ def setting_sort_key(setting: str) -> tuple[int, str]:
 
 
 def is_usual(options: InstructionOptions) -> bool:
-    """Whether all options but the setting are the defaults."""
-    return options == InstructionOptions(options.setting)
+    """Whether all options but setting and language are the defaults."""
+    return options == InstructionOptions(options.setting, language=options.language)
 
 
 def has_default_options(options: InstructionOptions) -> bool:
-    """Whether the setting is none of the harder ones, and all other options are the defaults."""
+    """Whether the setting is none of the harder ones, and the options are the usual ones."""
     setting = all_settings().get(options.setting)
     return (setting is None or setting.plain is None) and is_usual(options)
 
 
-def staged_options() -> tuple[InstructionOptions, ...]:
+def staged_options(language: int = DEFAULT_LANGUAGE) -> tuple[InstructionOptions, ...]:
     """Return the options of the setting with stages, one for each set of stages, shortest first."""
     setting = next(name for name, one in all_settings().items() if "stages" in one.reads)
-    return tuple(InstructionOptions(setting, stages=stages) for stages in STAGE_SETS)
+    return tuple(
+        InstructionOptions(setting, stages=stages, language=language) for stages in STAGE_SETS
+    )

@@ -93,6 +93,11 @@ class PolicyRun(NamedTuple):
         )
 
     @property
+    def language(self) -> str:
+        """The version of the language that it heard; empty before it has played."""
+        return "" if self.versions is None else self.versions.language
+
+    @property
     def marked_policy(self) -> str:
         """The policy's name, marked if it is privileged."""
         return self.policy + self.mark

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import Frame
-from roboirg.evaluation.analysis.results.option_labels import REFERENCE, options_sort_key
+from roboirg.evaluation.analysis.results.option_labels import options_sort_key, reference_of
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import NOTHING, ByTask, gather
 from roboirg.evaluation.analysis.stats.measure import Measured, measure_groups
@@ -75,7 +75,7 @@ def labeled(frame: Frame, breakdown: Breakdown) -> Frame:
     found = []
     for value, options in zip(frame[breakdown.name], frame["options"], strict=True):
         own = value if isinstance(value, tuple) else (value,)
-        is_asked = breakdown.in_explicit or options != REFERENCE
+        is_asked = breakdown.in_explicit or options != reference_of(options)
         found.append([str(one) for one in own if is_asked and one is not None])
     return frame.spread("label", found)
 
@@ -98,11 +98,12 @@ def break_down(frame: Frame, breakdown: Breakdown) -> tuple[Measured[LabelKey], 
     }
 
     def reference(key: LabelKey) -> ByTask:
-        if key.options == REFERENCE:
+        options = reference_of(key.options)
+        if key.options == options:
             return NOTHING
         if breakdown.in_explicit:
-            return groups.get(key._replace(options=REFERENCE), NOTHING)
-        return explicit.get((key.run, REFERENCE), NOTHING)
+            return groups.get(key._replace(options=options), NOTHING)
+        return explicit.get((key.run, options), NOTHING)
 
     return measure_groups(groups, [reference], lambda key: key.run)
 

@@ -6,7 +6,7 @@ playing, assuming flawless execution: the share of these goals that have the sta
 one. Where the words leave two values, as with a rival, it is a guess among these. A shortcut
 listener draws its goal by a surface rule; its expected success is the probability that this goal is
 right. Nothing of this is estimated. Learned floors have the level that was measured for the task
-and setting, on the test split or random scenes.
+and setting, on the test split or random scenes, in the version of the language that was played.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.evaluation.analysis.results.option_labels import is_usual
 from roboirg.evaluation.analysis.stats.measured_floors import (
     LEARNED,
     RANDOM,
@@ -25,7 +26,6 @@ from roboirg.evaluation.analysis.stats.measured_floors import (
 )
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job
-from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
 from roboirg.shortcuts.command_chance import blind_goals, right_share
 from roboirg.tasks import get_task
@@ -37,15 +37,33 @@ FLOORS = (CHANCE, *SURFACE_RULES, *LEARNED)
 """The forgetful listener, the shortcut listeners by the names of their rules, and learners."""
 
 
-def floor_level(floor: str, jobs: Iterable[Job]) -> Fraction | None:
+def floor_level(floor: str, jobs: Iterable[Job], language: str = "") -> Fraction | None:
     """Return the mean level of one of `FLOORS` over the distinct instructions of some jobs.
 
     Policies and their seeds do not matter. None without jobs, or if no level is known.
+
+    Args:
+        floor: its name.
+        jobs: the jobs.
+        language: version of the language in which they were played, of which learned floors are.
     """
     instructions = dict.fromkeys((job.task, job.split, job.episode, job.column) for job in jobs)
-    found = [_level(floor, *each) for each in instructions]
+    found = [_level(floor, language, *each) for each in instructions]
     levels = [level for level in found if level is not None]
     return sum(levels, Fraction(0)) / len(levels) if levels else None
+
+
+def unmeasured_note(floors: Iterable[str], languages: Iterable[str]) -> str:
+    """Return which learned floors are missing, because a version's were not measured; or nothing.
+
+    Args:
+        floors: the names of those that are asked for.
+        languages: the versions of the language that were played.
+    """
+    learned = ", ".join(one for one in floors if one in LEARNED)
+    missing = ", ".join(sorted({one for one in languages if measured_floors(one) is None}))
+    text = f"No learned floors ({learned}) were measured for language version {missing}."
+    return text if learned and missing else ""
 
 
 @functools.lru_cache(maxsize=65_536)
@@ -61,13 +79,12 @@ def silent_chance(task: str, split: str, number: int) -> float:
 
 @functools.lru_cache(maxsize=65_536)
 def _level(
-    floor: str, task: str, split: str, number: int, options: InstructionOptions
+    floor: str, language: str, task: str, split: str, number: int, options: InstructionOptions
 ) -> Fraction | None:
     if floor in LEARNED:
         key = FloorKey(TEST if split == TEST else RANDOM, options.setting, task)
-        measured = (measured_floors(LANGUAGE_VERSION) or {}).get(key)
-        is_usual = options == InstructionOptions(options.setting)
-        return Fraction(str(measured.shares[floor].goals)) if measured and is_usual else None
+        found = (measured_floors(language) or {}).get(key)
+        return Fraction(str(found.shares[floor].goals)) if found and is_usual(options) else None
     job = Job(policy="", task=task, split=split, episode=number, options=options)
     episode, instruction = get_episode(task, split, number), instruct_job(job)
     if floor == CHANCE:

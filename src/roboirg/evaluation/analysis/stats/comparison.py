@@ -8,7 +8,7 @@ from typing import NamedTuple
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import MISSING, Frame
-from roboirg.evaluation.analysis.results.option_labels import REFERENCE, options_sort_key
+from roboirg.evaluation.analysis.results.option_labels import options_sort_key, reference_of
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, labeled, natural
 from roboirg.evaluation.analysis.stats.cells import ByTask, gather
@@ -110,7 +110,7 @@ def _groups(
         for label, options in sorted(
             groups, key=lambda key: (natural(key[0]), options_sort_key(key[1]))
         ):
-            if options != REFERENCE:
+            if options != reference_of(options):
                 key = ComparisonKey(options, None, breakdown.title, label)
                 yield key, groups[label, options]
 

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.results.option_labels import REFERENCE
+from roboirg.evaluation.analysis.results.option_labels import reference_of
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
-from roboirg.evaluation.analysis.stats.cells import Cell, CellKey, Cells
+from roboirg.evaluation.analysis.stats.cells import Cell, Cells
 from roboirg.evaluation.analysis.stats.intervals import (
     SEED,
     Interval,
@@ -23,7 +22,7 @@ from roboirg.evaluation.analysis.stats.intervals import (
 from roboirg.evaluation.analysis.stats.measured_floors import measured_floors, settings_at_chance
 from roboirg.evaluation.analysis.stats.paired_tests import Pairs
 from roboirg.evaluation.analysis.stats.rates import interval_note, points
-from roboirg.language.templates import LANGUAGE_VERSION
+from roboirg.language.settings import EXPLICIT
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,20 +60,22 @@ def headline_notes(cells: Cells, names: Mapping[PolicyRun, str]) -> Iterator[str
     For a run in words whose floors were not measured, the sentence gives the reason.
     """
     for policy_run, name in names.items():
-        floors = policy_run.versions and measured_floors(policy_run.versions.language)
-        wanted = settings_at_chance(floors or measured_floors(LANGUAGE_VERSION) or {})
+        floors = measured_floors(policy_run.language)
+        # Without floors, any setting next to explicit is reason enough to say why there is none.
+        played = {key.options.setting for key in cells if key.policy_run == policy_run}
+        wanted = settings_at_chance(floors) if floors else tuple(played - {EXPLICIT})
         found = measure_headline(cells, policy_run, wanted)
-        if found is None or policy_run.versions is None:
+        if found is None:
             continue
-        if policy_run.conditions.wordings is not None:
+        if not floors:
+            yield (
+                f"{name} has no headline number: no floors were measured for its language version "
+                f"{policy_run.language}."
+            )
+        elif policy_run.conditions.wordings is not None:
             yield (
                 f"{name} has no headline number: the floors are those of our own words of each "
                 f"split, and it was played in {policy_run.conditions.text('wordings')}."
-            )
-        elif not floors:
-            yield (
-                f"{name} has no headline number: no floors were measured for its language version "
-                f"{policy_run.versions.language}."
             )
         elif found.interval is None or not np.isfinite(found.interval).all():
             yield (
@@ -89,17 +90,19 @@ def measure_headline(
     cells: Cells, policy_run: PolicyRun, settings: Sequence[str]
 ) -> Headline | None:
     """Return the headline number; None unless all settings were played next to explicit."""
-    options = [InstructionOptions(name) for name in settings]
     explicit = {
-        key.task: cell
+        key: cell
         for key, cell in cells.items()
-        if key.policy_run == policy_run and key.options == REFERENCE
+        if key.policy_run == policy_run and key.options == reference_of(key.options)
     }
     own = {
-        task: [cells.get(CellKey(policy_run, task, one), Cell()) for one in options]
-        for task in explicit
+        key: [
+            cells.get(key._replace(options=replace(key.options, setting=one)), Cell())
+            for one in settings
+        ]
+        for key in explicit
     }
-    rows = [_paired_rows(own[task], explicit[task]) for task in explicit]
+    rows = [_paired_rows(own[key], cell) for key, cell in explicit.items()]
     rows = [one for one in rows if len(one)]
     if not settings or not rows or not np.concatenate(rows)[:, 1::4].any(axis=0).all():
         return None
@@ -109,7 +112,7 @@ def measure_headline(
     value = _mean_gap([resampled_rates([one.sum(axis=0)[None]], rng, 1) for one in rows])
     drawn = _mean_gap([resampled_rates([one], rng) for one in rows])
     interval = resampled_interval(drawn, sizes, least=-1.0)
-    played = [cell for task in own for cell in (explicit[task], *own[task])]
+    played = [cell for key in own for cell in (explicit[key], *own[key])]
     is_complete = not any(cell.errors or cell.missing for cell in played)
     return Headline(tuple(settings), float(value[0]), interval, sum(sizes), is_complete)
 

@@ -13,7 +13,7 @@ import numpy as np
 from roboirg.core.errors import InvalidValueError, UnknownNameError, check_names
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.frame import suite
-from roboirg.evaluation.analysis.results.option_labels import REFERENCE
+from roboirg.evaluation.analysis.results.option_labels import reference_of
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import (
     NOTHING,
@@ -244,7 +244,7 @@ def summarize(
     found = measure_groups(
         {key: own for key, own in scopes.items() if wanted is None or key.scope in wanted},
         (
-            lambda key: other(key, REFERENCE),
+            lambda key: other(key, reference_of(key.options)),
             lambda key: other(key, replace(key.options, form="resolved")),
         ),
         # What is read together: a policy run's tasks, suites, averages.

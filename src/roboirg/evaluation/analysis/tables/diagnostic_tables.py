@@ -12,10 +12,10 @@ from roboirg.core import failures
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.results.frame import Frame, suite
 from roboirg.evaluation.analysis.results.option_labels import (
-    REFERENCE,
     has_default_options,
     options_label,
     options_sort_key,
+    reference_of,
     setting_sort_key,
 )
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
@@ -309,7 +309,7 @@ def make_breakdown_table(
     names, found = names or frame.names, break_down(frame, breakdown)
     left_out = sum(one not in ("success", "failure") for one in frame["outcome"])
     notes = [f"{_BREAKDOWN_NOTE} {breakdown.note}"]
-    if any(one.gap is None and one.key.options != REFERENCE for one in found):
+    if any(one.gap is None and one.key.options != reference_of(one.key.options) for one in found):
         notes.append(f"{NOT_APPLICABLE} without explicit on the same episodes.")
     if left_out:
         notes.append(incomplete_note(left_out))

@@ -16,8 +16,9 @@ from roboirg.evaluation.analysis.published import (
     published_rows,
 )
 from roboirg.evaluation.analysis.results.option_labels import (
-    REFERENCE,
+    reference_of,
     setting_sort_key,
+    staged_options,
 )
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cell, CellKey, Cells, cell_interval
@@ -97,7 +98,7 @@ def make_table(
         heads=table.heads,
         columns=columns,
         rows=tuple(_by_policy(rows) if table.heads == (POLICY, "setting") else rows),
-        notes=notes_of(table, columns, rows, cells, names, differences),
+        notes=notes_of(table, columns, rows, cells, names, differences, floors),
     )
 
 
@@ -112,7 +113,7 @@ def is_informative(which: str, data: RunData) -> bool:
     if which == "context":
         return len({options for _, options, _ in rows}) > 1
     # Explicit alone is a reference, but nothing to read.
-    return any(which != "harder" or options != REFERENCE for _, options, _ in rows)
+    return any(which != "harder" or options != reference_of(options) for _, options, _ in rows)
 
 
 def _entry(
@@ -140,22 +141,27 @@ def _floor_rows(
 ) -> Iterator[Row]:
     """Yield a floor of each setting on the episodes that any policy played in it."""
     tasks = table.tasks(cells)
-    played = {key.options for key in cells if key.task in tasks and table.shows(key.options)}
-    for options in sorted(played, key=row_order):
+    played = {
+        (row_order(key.options), key.policy_run.language, key.options)
+        for key, cell in cells.items()
+        if key.task in tasks and table.shows(key.options) and cell.verdicts
+    }
+    for _, language, options in sorted(played, key=lambda one: one[:2]):
         entries = {}
         for task in tasks:
-            level = floor_level(floor, _jobs(task, options, cells))
+            level = floor_level(floor, _jobs(task, options, language, cells), language)
             applies = _applies(task, options)
             entries[task] = Entry(None if level is None else percent(level), applies=applies)
         if any(entry.percent is not None for entry in entries.values()):
-            yield Row(options.setting, floor, with_averages(columns, entries), "chance")
+            name = floor + f", language {language}" * (len({one for _, one, _ in played}) > 1)
+            yield Row(options.setting, name, with_averages(columns, entries), "chance")
 
 
-def _jobs(task: str, options: InstructionOptions, cells: Cells) -> Iterator[Job]:
+def _jobs(task: str, options: InstructionOptions, language: str, cells: Cells) -> Iterator[Job]:
     """Yield the episodes with a verdict of a task in a setting, if both are installed."""
     if task in every_task() and options.setting in all_settings():
         for key, cell in cells.items():
-            if (key.task, key.options) == (task, options):
+            if (key.task, key.options, key.policy_run.language) == (task, options, language):
                 split = key.policy_run.conditions.split
                 for trial in cell.verdicts:
                     yield Job(
@@ -192,7 +198,7 @@ def _by_policy(rows: Sequence[Row]) -> list[Row]:
 def _references(table: PaperTable, rows: Sequence[Row]) -> Iterator[Row | None]:
     """Yield each row's reference: explicit, or the shortest context."""
     by_position = {(row.group, row.name, row.source): row for row in rows}
-    shortest = stages_text(table.reference)
+    shortest = stages_text(staged_options()[0])
     for row in rows:
         place = (row.group, shortest) if table.is_by_stages else (EXPLICIT, row.name)
         is_itself = place == (row.group, row.name) or row.source == "chance"

@@ -18,9 +18,9 @@ from roboirg.evaluation.analysis.comparability import (
 )
 from roboirg.evaluation.analysis.results.frame import Frame
 from roboirg.evaluation.analysis.results.option_labels import (
-    REFERENCE,
     options_label,
     options_sort_key,
+    reference_of,
 )
 from roboirg.evaluation.analysis.stats.cells import NOTHING, ByTask, CellKey, cells_of
 from roboirg.evaluation.analysis.stats.headline import headline_notes
@@ -71,7 +71,7 @@ def make_run_tables(frame: Frame) -> list[Table]:
         differences = {
             key: differences_of(key, cell)
             for key, cell in cells.items()
-            if key.policy_run == policy_run and key.options == REFERENCE
+            if key.policy_run == policy_run and key.options == reference_of(key.options)
         }
         own = {key: one for key, one in found.items() if key.policy_run == policy_run}
         notes = (
@@ -122,9 +122,10 @@ def gap_text(key: ScopeKey, scopes: Mapping[ScopeKey, ByTask]) -> str:
 
     A dash if neither has a success, which says nothing; empty without pairs.
     """
-    if key.options == REFERENCE:
+    reference = key._replace(options=reference_of(key.options))
+    if key == reference:
         return ""
-    found = pooled_overlap(pair(scopes[key], scopes.get(key._replace(options=REFERENCE), NOTHING)))
+    found = pooled_overlap(pair(scopes[key], scopes.get(reference, NOTHING)))
     if not found.trials:
         return ""
     if found.neither == found.trials:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from roboirg.core.instruction_options import ALL_STAGES, InstructionOptions
 from roboirg.evaluation.analysis.published import AVERAGE, RateTable, published_tasks
 from roboirg.evaluation.analysis.results.option_labels import (
-    REFERENCE,
     has_default_options,
     is_usual,
+    reference_of,
     setting_sort_key,
     staged_options,
 )
@@ -42,7 +42,7 @@ class PaperTable:
         title: above it.
         of_paper: the table of the paper with its tasks; None for all other tasks.
         shows: whether it has rows for instruction options.
-        reference: the options that changes are from.
+        reference: returns the options that changes are from.
         heads: of the groups of rows and of their names.
         by_suite: whether its columns are grouped by suite, each with an average.
     """
@@ -51,7 +51,7 @@ class PaperTable:
     title: str
     of_paper: RateTable | None
     shows: Shows = has_default_options
-    reference: InstructionOptions = REFERENCE
+    reference: Callable[[InstructionOptions], InstructionOptions] = reference_of
     heads: tuple[str, ...] = ("setting", POLICY)
     by_suite: bool = False
 
@@ -113,8 +113,8 @@ PAPER_TABLES: Mapping[str, PaperTable] = {
             "context",
             "Stages of the contextual setting",
             "context",
-            shows=lambda options: options in staged_options(),
-            reference=staged_options()[0],
+            shows=lambda options: options in staged_options(options.language),
+            reference=lambda options: staged_options(options.language)[0],
             heads=(POLICY, *map(str, ALL_STAGES)),
         ),
         PaperTable("real", "Real world", "real"),
@@ -123,7 +123,8 @@ PAPER_TABLES: Mapping[str, PaperTable] = {
             "Harder settings",
             "main",
             shows=lambda options: (
-                options == REFERENCE or (is_usual(options) and not has_default_options(options))
+                options == reference_of(options)
+                or (is_usual(options) and not has_default_options(options))
             ),
             by_suite=True,
         ),

@@ -16,6 +16,7 @@ from roboirg.evaluation.analysis.results.option_labels import (
 )
 from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cells, Counts
+from roboirg.evaluation.analysis.stats.chance import unmeasured_note
 from roboirg.evaluation.analysis.stats.headline import headline_notes
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE
 from roboirg.evaluation.analysis.tables.table import (
@@ -50,8 +51,9 @@ def notes_of(
     cells: Cells,
     names: Mapping[PolicyRun, str],
     differences: AllDifferences,
+    floors: Sequence[str] = (),
 ) -> tuple[str, ...]:
-    """Return the notes of a table of rates."""
+    """Return the notes of a table of rates, for which some floors are asked for."""
     tasks = columns[-1].averages
     shown = {
         key: cell for key, cell in cells.items() if key.task in tasks and table.shows(key.options)
@@ -73,6 +75,7 @@ def notes_of(
         _absent_tasks({key.task for key in shown}),
         _TWIN_NOTE * any(row.name.endswith(TWIN_MARK) for row in rows),
         _FLOORS_NOTE * ("chance" in sources),
+        unmeasured_note(floors, [one.language for one in policy_runs if one.versions]),
         *(NOTES[table.of_paper] if table.of_paper and "published" in sources else ()),
         *comparison_notes(compared, names),
         *_average_notes(columns, rows),
