@@ -87,6 +87,7 @@ def _listener_plan(words: PlanWords, without: str) -> TrainingPlan:
         words.tasks(),
         words.settings(),
         words=known_name("pool of words", words.fields.get("wordings", "train"), WORD_POOLS),
+        language=words.options().language,
         without=known_name("variant", without, WITHOUTS),
         **words.choices(TrainingPlan),
     )
@@ -168,7 +169,8 @@ def learn_policy(
     typer.echo(f"{path}, {path.stat().st_size / 2**20:.1f} MiB")
     heard = ",".join(training.settings) or "explicit"
     options = f"--tasks {quote(','.join(training.tasks))} --split val --settings {quote(heard)}"
-    command = f"roboirg run --policy {quote(f'trained:{path}')} {options} --wordings test"
+    spoken = f"--language {training.language} --wordings test"
+    command = f"roboirg run --policy {quote(f'trained:{path}')} {options} {spoken}"
     typer.echo(f"Play it with: {command} --out {quote(f'runs/{path.stem}')}")
 
 
@@ -181,6 +183,7 @@ def _policy_plan(words: PlanWords, tasks: str, settings: str, memory: str) -> Po
         words.tasks(tasks),
         () if hears_none else words.settings(settings),
         words=known_name("pool of words", words.fields.get("wordings", "train"), WORD_POOLS),
+        language=words.options().language,
         memory=known_name("memory", memory, MEMORY_NAMES),
         **words.choices(PolicyPlan),
     )
@@ -203,7 +206,7 @@ def _play_paper(plan: PolicyPlan, words: PlanWords, out: Path, workers: int) -> 
     experiment = ExperimentPlan(**words.choices(ExperimentPlan))
     check_experiment(experiment)
     files = train_rows(experiment, plan, out, workers, _print_tenths())
-    changes: dict[str, Any] = {"tasks": plan.tasks}
+    changes: dict[str, Any] = {"tasks": plan.tasks, "language": plan.language}
     changes |= {name: words.fields[name] for name in ("episodes", "split") if name in words.fields}
     played = {}
     for part in experiment.parts:

@@ -198,6 +198,19 @@ def test_by_place_other_goals_of_a_scene_are_told_too(torch):
     assert len({text for _, text in told}) == 4
 
 
+def test_another_language_is_taught_where_it_is_spoken(torch):
+    from roboirg_learn.listener.reader_training import check_reader, said
+    from roboirg_learn.listener.vocabulary import USUAL_ENCODERS
+
+    episode = get_episode("VideoUnmask", "train", 3)
+    three, four = (list(said([episode], ("direct",), "train", 3, 0, one)) for one in (3, 4))
+    assert [one.goal for one, _ in three] == [one.goal for one, _ in four]
+    assert not {text for _, text in three} & {text for _, text in four}
+    check_reader(("VideoUnmask",), ("direct",), USUAL_ENCODERS, 4)
+    with pytest.raises(InvalidValueError, match=r"^Language 4 has no words for BinFill; name"):
+        check_reader(("VideoUnmask", "BinFill"), ("direct",), USUAL_ENCODERS, 4)
+
+
 @pytest.mark.sim
 def test_it_plays_with_the_hands_of_the_oracle(trained):
     import roboirg

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Goal, Split
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import DEFAULT_LANGUAGE, InstructionOptions
 from roboirg.core.subgoal_words import read_subgoal
-from roboirg.language import FORMS, LANGUAGE_VERSION
+from roboirg.language import FORMS, LANGUAGE_VERSIONS
 from roboirg.language.settings import all_settings, plain_settings
 from roboirg.language.variants import instructions
 from roboirg.policies.planners.model_planners import merge_keyframes
@@ -16,8 +16,9 @@ from roboirg.tasks import goals_of, with_goal
 from roboirg.tasks.splits.splits import SIZES, get_episode
 
 __all__ = [
+    "DEFAULT_LANGUAGE",
     "ENVIRONMENT_VERSION",
-    "LANGUAGE_VERSION",
+    "LANGUAGE_VERSIONS",
     "Episode",
     "Goal",
     "all_settings",
@@ -51,7 +52,10 @@ def episodes_of(
 
 
 def spoken(
-    episodes: Sequence[Episode], settings: Sequence[str], pool: str
+    episodes: Sequence[Episode],
+    settings: Sequence[str],
+    pool: str,
+    language: int = DEFAULT_LANGUAGE,
 ) -> Iterator[tuple[Episode, str]]:
     """Yield the implicit instructions of episodes, each with its episode.
 
@@ -59,7 +63,8 @@ def spoken(
         episodes: the episodes.
         settings: names; one that a task lacks, or that cannot express an episode, is left out.
         pool: of wordings: train or test.
+        language: version of our words.
     """
-    options = InstructionOptions(wordings=pool)
+    options = InstructionOptions(wordings=pool, language=language)
     for episode, instruction in instructions(episodes, settings, FORMS[:1], options):
         yield episode, instruction.text

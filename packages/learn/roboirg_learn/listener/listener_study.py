@@ -96,7 +96,7 @@ def run_study(
     from roboirg_learn.listener.reader_training import check_reader
     from roboirg_learn.trainer import part_of
 
-    check_reader(plan.tasks, plan.settings, plan.encoders)
+    check_reader(plan.tasks, plan.settings, plan.encoders, plan.language)
     work = folder / WORK
     shown: list[tuple[Episode, list[Pixels]]] = []
     for seed in range(plan.seed, plan.seed + plan.seeds):
@@ -112,7 +112,7 @@ def run_study(
                 save_model(model, path)
             if not answers.exists():
                 shown = shown or _show_all(plan.tasks, work, workers, progress)
-                found = _answers(model, variant.name, seed, shown)
+                found = _answers(model, variant.name, own, shown)
                 text = "".join(json.dumps(one._asdict()) + "\n" for one in found)
                 write_atomically(answers, text)
             for line in answers.read_text("utf-8").splitlines():
@@ -131,16 +131,19 @@ def _show_all(
 
 
 def _answers(
-    model: LearnedModel, name: str, seed: int, shown: Sequence[tuple[Episode, list[Pixels]]]
+    model: LearnedModel,
+    name: str,
+    plan: TrainingPlan,
+    shown: Sequence[tuple[Episode, list[Pixels]]],
 ) -> Iterator[StudyAnswer]:
     # Every scene has many instructions, and is looked at once.
     seen = {episode.key: model.see(pictures) for episode, pictures in shown}
     episodes = [episode for episode, _ in shown]
     asked = [(setting, pool) for setting in plain_settings() for pool in WORD_POOLS]
     for setting, pool in (*asked, (RIVAL, HELD_OUT)):
-        for episode, text in spoken(episodes, [setting], pool):
+        for episode, text in spoken(episodes, [setting], pool, plan.language):
             task, given = episode.task, seen[episode.key]
             goal = model.understand_seen(given._replace(task=task, text=text))
             slots = json.loads(goal_schema(task).answers[goal])
             is_right = goal == episode.goal
-            yield StudyAnswer(name, seed, task, episode.index, setting, pool, slots, is_right)
+            yield StudyAnswer(name, plan.seed, task, episode.index, setting, pool, slots, is_right)

@@ -13,8 +13,9 @@ import torch
 from pydantic import NonNegativeInt, PositiveInt
 
 from roboirg.extension.episodes import (
+    DEFAULT_LANGUAGE,
     ENVIRONMENT_VERSION,
-    LANGUAGE_VERSION,
+    LANGUAGE_VERSIONS,
     Episode,
     episodes_of,
 )
@@ -46,7 +47,6 @@ from roboirg_learn.trainer import KeptTraining, Progress, Trainer, batch_count, 
 RANDOM = "random"
 """The split of which labels stand for what a detector would find."""
 DETECTOR_RATE = 1e-2
-_VERSIONS = LANGUAGE_VERSION, ENVIRONMENT_VERSION
 VALIDATED = 10
 """Episodes of each task's val split that show how training goes."""
 
@@ -59,6 +59,7 @@ class TrainingPlan(NamedTuple):
         settings: names of settings whose instructions it hears, harder ones where they can
             express the episode.
         words: the pool of words.
+        language: version of the words.
         scenes: random scenes of each task beyond the train split.
         goals: goals of each scene with an implicit instruction.
             In other settings only the episode's own is.
@@ -73,6 +74,7 @@ class TrainingPlan(NamedTuple):
     tasks: tuple[str, ...]
     settings: tuple[str, ...]
     words: WordPool = "train"
+    language: int = DEFAULT_LANGUAGE
     scenes: NonNegativeInt = 300
     goals: PositiveInt = 4
     detector_epochs: PositiveInt = 6
@@ -86,8 +88,9 @@ class TrainingPlan(NamedTuple):
     def about(self) -> dict[str, Any]:
         """All that a listener depends on, as plain data."""
         about = self._asdict() | {"tasks": list(self.tasks), "settings": list(self.settings)}
-        del about["seeds"]
-        about["language_version"], about["environment_version"] = _VERSIONS
+        del about["seeds"], about["language"]
+        about["language_version"] = LANGUAGE_VERSIONS[self.language]
+        about["environment_version"] = ENVIRONMENT_VERSION
         return about
 
 
@@ -116,7 +119,7 @@ def train_listener(
     Pictures, the detector and the reader on the way stay in the folder, and are used again as far
     as they fit. The name is the listener's among those of the folder.
     """
-    check_reader(plan.tasks, plan.settings, plan.encoders)
+    check_reader(plan.tasks, plan.settings, plan.encoders, plan.language)
     scenes = see_episodes(plan, folder, workers, progress)
     return teach(scenes, plan, folder / f"reader-{name}-{plan.seed}.pt", progress)
 
@@ -165,7 +168,9 @@ def teach(scenes: SeenEpisodes, plan: TrainingPlan, kept: Path, progress: Progre
     told, asked = (
         [
             (episode, scenes.seen[episode.key]._replace(task=episode.task, text=text))
-            for episode, text in said(own, plan.settings, plan.words, goals, plan.seed)
+            for episode, text in said(
+                own, plan.settings, plan.words, goals, plan.seed, plan.language
+            )
         ]
         for own, goals in ((scenes.episodes, plan.goals), (scenes.held_back, 1))
     )

@@ -12,6 +12,7 @@ from torch.nn import functional
 
 from roboirg.extension.commands import InvalidValueError
 from roboirg.extension.episodes import (
+    DEFAULT_LANGUAGE,
     Episode,
     all_settings,
     episodes_of,
@@ -37,7 +38,12 @@ FORGOTTEN_WORDS = 0.05
 
 
 def said(
-    episodes: Sequence[Episode], settings: Sequence[str], words: str, goals: int, seed: int
+    episodes: Sequence[Episode],
+    settings: Sequence[str],
+    words: str,
+    goals: int,
+    seed: int,
+    language: int = DEFAULT_LANGUAGE,
 ) -> Iterator[tuple[Episode, str]]:
     """Yield the instructions of episodes, and of more goals of each scene.
 
@@ -48,12 +54,13 @@ def said(
         goals: of each scene with an implicit instruction, which hangs on what is there and on what
             was said before; explicit and harder settings have the scene's own only.
         seed: draws the goals.
+        language: version of the words.
     """
     known = all_settings()
     of_one = [name for name in settings if name == "explicit" or known[name].plain is not None]
     of_more = [name for name in settings if name not in of_one]
-    yield from spoken(episodes, of_one, words)
-    yield from spoken(list(with_more_goals(episodes, goals, seed)), of_more, words)
+    yield from spoken(episodes, of_one, words, language)
+    yield from spoken(list(with_more_goals(episodes, goals, seed)), of_more, words, language)
 
 
 def with_more_goals(episodes: Iterable[Episode], goals: int, seed: int) -> Iterator[Episode]:
@@ -68,10 +75,18 @@ def with_more_goals(episodes: Iterable[Episode], goals: int, seed: int) -> Itera
 
 
 def check_reader(
-    tasks: Sequence[str], settings: Sequence[str], encoders: Mapping[str, Mapping[str, Any]]
+    tasks: Sequence[str],
+    settings: Sequence[str],
+    encoders: Mapping[str, Mapping[str, Any]],
+    language: int,
 ) -> None:
-    """Raise early what would else be raised after pictures are drawn."""
-    if settings and not any(spoken(episodes_of(tasks, "train", 10), settings, "train")):
+    """Raise early what would else be raised after pictures are drawn, or never."""
+    plain = spoken(episodes_of(tasks, "train", 1), ["explicit"], "train", language)
+    if silent := {*tasks} - {episode.task for episode, _ in plain}:
+        raise InvalidValueError(
+            f"Language {language} has no words for {', '.join(sorted(silent))}; name other tasks."
+        )
+    if settings and not any(spoken(episodes_of(tasks, "train", 10), settings, "train", language)):
         raise InvalidValueError(f"None of these tasks has the setting {', '.join(settings)}.")
     make_encoders(make_vocabulary(["a"], ["cube"], tasks), encoders)
 

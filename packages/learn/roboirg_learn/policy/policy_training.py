@@ -21,7 +21,7 @@ from roboirg.extension.commands import (
     short_hash,
     write_atomically,
 )
-from roboirg.extension.episodes import ENVIRONMENT_VERSION, LANGUAGE_VERSION, Episode, episodes_of
+from roboirg.extension.episodes import ENVIRONMENT_VERSION, LANGUAGE_VERSIONS, Episode, episodes_of
 from roboirg.extension.sight import ExpertRecording, decode_png, points_of, record_expert
 from roboirg_learn.listener.encoders import ENCODERS
 from roboirg_learn.listener.listener_net import ListenerNet
@@ -96,7 +96,7 @@ def train_policy(plan: PolicyPlan, folder: Path, workers: int, progress: Progres
         InvalidValueError: no episode of a task could be recorded, the plan cannot be followed, or
             the folder holds what another plan recorded.
     """
-    check_reader(plan.tasks, plan.settings, plan.encoders)
+    check_reader(plan.tasks, plan.settings, plan.encoders, plan.language)
     if pixels := [name for name in plan.encoders if ENCODERS[name].reads_pixels]:
         raise InvalidValueError(f"Encoder {pixels[0]!r} reads pixels; a policy's reader has none.")
     _check_folder(plan, folder)
@@ -146,11 +146,11 @@ def trained_file(plan: PolicyPlan, folder: Path, workers: int, progress: Progres
 def about_policy(plan: PolicyPlan) -> dict[str, Any]:
     """Return what a policy's file says about its plan."""
     return {
-        **plan._asdict(),
+        **{name: value for name, value in plan._asdict().items() if name != "language"},
         "tasks": list(plan.tasks),
         "settings": list(plan.settings),
         "words": plan.words if plan.settings else WORDLESS,
-        "language_version": LANGUAGE_VERSION,
+        "language_version": LANGUAGE_VERSIONS[plan.language],
     }
 
 
@@ -269,7 +269,9 @@ def _lessons(
     episodes = [one.episode for one in recorded]
     told = [
         (episode, text)
-        for episode, text in said(episodes, plan.settings, plan.words, plan.goals, plan.seed)
+        for episode, text in said(
+            episodes, plan.settings, plan.words, plan.goals, plan.seed, plan.language
+        )
     ]
     if not plan.settings:
         told = [(episode, "") for episode in episodes]
