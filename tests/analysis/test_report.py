@@ -159,7 +159,7 @@ def test_cells_choices_and_details_are_as_stored(snapshot: SnapshotAssertion) ->
     ("understood", "goal"),
     [
         ({"color": "red", "repeats": 1}, "red, once"),
-        ({"color": "green", "repeats": 3}, "green, three times"),
+        ({"color": "green", "repeats": 3}, "green, 3 times"),
         ({"colors": ["red", "blue"], "counts": [2, 1]}, "2 red, 1 blue"),
         ({"color": "red", "relation": "before"}, "red, on the target before the press"),
         ({"color": "red", "placement": 2}, "red, on target 2 of the video"),
@@ -185,7 +185,7 @@ def test_a_failed_episode_shows_what_was_named_next_to_what_was_meant(
         page = EpisodeDetails(Path(), embeds=False)
         details = page.details_of(replace(first, **fields))
         texts = list(page.strings)
-        assert texts[details["goal"]] == "green, three times"
+        assert texts[details["goal"]] == "green, 3 times"
         assert ("named" in details and texts[details["named"]]) == (expected or False)
 
 

@@ -506,9 +506,9 @@ def test_a_goal_without_a_command_is_a_refusal_with_a_reason():
     options = InstructionOptions("direct", wordings=identity)
     assert find_refusal(missing, options) == (
         f"wordings {identity} have no command of PickXtimes for the goal of episode "
-        f"{missing.key}: color {missing.goal['color']}, repeats 3"
+        f"{missing.key}: {missing.goal['color']}, 3 times"
     )
-    with pytest.raises(InvalidValueError, match=r"^The wordings hand@.* repeats 3\.$"):
+    with pytest.raises(InvalidValueError, match=r"^The wordings hand@.* 3 times\.$"):
         instruct_with(missing, options)
     told = episode_with("PickXtimes", repeats=1)
     said = list(instructions([missing, told], ["explicit"], ["implicit"], options))

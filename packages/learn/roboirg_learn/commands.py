@@ -86,8 +86,8 @@ def _listener_plan(words: PlanWords, without: str) -> TrainingPlan:
     return TrainingPlan(
         words.tasks(),
         words.settings(),
+        words.options().language,
         words=known_name("pool of words", words.fields.get("wordings", "train"), WORD_POOLS),
-        language=words.options().language,
         without=known_name("variant", without, WITHOUTS),
         **words.choices(TrainingPlan),
     )
@@ -181,9 +181,9 @@ def _policy_plan(words: PlanWords, tasks: str, settings: str, memory: str) -> Po
     hears_none = words.given("settings", settings) in ("none", ["none"])
     return PolicyPlan(
         words.tasks(tasks),
+        words.options().language,
         () if hears_none else words.settings(settings),
         words=known_name("pool of words", words.fields.get("wordings", "train"), WORD_POOLS),
-        language=words.options().language,
         memory=known_name("memory", memory, MEMORY_NAMES),
         **words.choices(PolicyPlan),
     )

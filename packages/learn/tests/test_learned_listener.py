@@ -128,7 +128,7 @@ def plan_of(**changes):
     from roboirg_learn.listener.listener_training import TrainingPlan
 
     few = TrainingPlan(
-        ("StopCube",), ("explicit", "direct"), scenes=3, detector_epochs=1, reader_epochs=24
+        ("StopCube",), ("explicit", "direct"), 3, scenes=3, detector_epochs=1, reader_epochs=24
     )
     return few._replace(**changes)
 
@@ -188,7 +188,7 @@ def test_by_place_other_goals_of_a_scene_are_told_too(torch):
     from roboirg_learn.listener.reader_training import said
 
     episode = get_episode("ButtonUnmask", "train", 3)
-    told = list(said([episode], ("explicit", "spatial"), "train", 3, 0))
+    told = list(said([episode], ("explicit", "spatial"), "train", 3, 0, 3))
     explicit, *others = [one.goal for one, _ in told]
     assert explicit == episode.goal
     by_place = others

@@ -101,7 +101,7 @@ def test_an_interrupted_training_goes_on_where_it_was(recorded, tmp_path):
     from roboirg_learn.listener.vocabulary import make_vocabulary
     from roboirg_learn.policy.body_training import train_body
 
-    plan = PolicyPlan(("ButtonUnmask",), body_epochs=4)
+    plan = PolicyPlan(("ButtonUnmask",), 3, body_epochs=4)
     episode = get_episode("ButtonUnmask", "random", 0)
     sight, decisions = sight_of([recorded]), decisions_of(recorded)
     vocabulary = make_vocabulary([""], sight.classes, plan.tasks)

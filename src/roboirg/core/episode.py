@@ -11,9 +11,10 @@ steps (20 per second). Quaternions are (w, x, y, z).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, TypeVar, get_args
+from typing import Any, Literal, NamedTuple, TypeVar, get_args
 
 from roboirg.core.conditions import Condition, Fact, Rule
 from roboirg.core.motions import Motion, Point
@@ -48,9 +49,27 @@ SlotValue = str | int | tuple[str, ...] | tuple[int, ...]
 Value = TypeVar("Value")
 
 
+_SLOT_WORDS: Mapping[str, Callable[[str | int], str]] = {
+    "repeats": lambda number: "once" if number == 1 else f"{number} times",
+    "visit": "on visit {}".format,
+    "placement": "on target {} of the video".format,
+    "relation": "on the target {} the press".format,
+}
+"""Words for the values of slots that do not speak for themselves."""
+
+
 def values_in(content: SlotValue) -> tuple[str | int, ...]:
     """Return the values of a slot, one or several; what was read from a file has lists."""
     return tuple(content) if isinstance(content, tuple | list) else (content,)
+
+
+def describe_goal(goal: Mapping[str, Any]) -> str:
+    """Return a goal, or what a model takes for one, in words: ``red, 3 times``."""
+    values = {slot: values_in(content) for slot, content in goal.items()}
+    if {"colors", "counts"} <= values.keys():
+        amounts = itertools.zip_longest(values.pop("counts"), values.pop("colors"), fillvalue="?")
+        values["amounts"] = tuple(f"{count} {color}" for count, color in amounts)
+    return ", ".join(_SLOT_WORDS.get(slot, str)(one) for slot, own in values.items() for one in own)
 
 
 @dataclass(frozen=True, slots=True)

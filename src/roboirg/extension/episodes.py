@@ -16,7 +16,6 @@ from roboirg.tasks import goals_of, with_goal
 from roboirg.tasks.splits.splits import SIZES, get_episode
 
 __all__ = [
-    "DEFAULT_LANGUAGE",
     "ENVIRONMENT_VERSION",
     "LANGUAGE_VERSIONS",
     "Episode",

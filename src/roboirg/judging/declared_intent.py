@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from roboirg.core.episode import Episode, SlotValue, values_in
+from roboirg.core.episode import Episode, SlotValue, describe_goal, values_in
 from roboirg.core.failures import FailureName
 from roboirg.judging.failure_attribution import FailureAttribution
 
@@ -49,7 +49,7 @@ class DeclaredIntent(NamedTuple):
         if self.understood is None:
             return FailureAttribution.of("no_answer", None, 0, "the model named no goal")
         if _slots(self.understood) != _slots(meant):
-            words = f"understood {_in_words(self.understood)}; meant {_in_words(meant)}"
+            words = f"understood {describe_goal(self.understood)}; meant {describe_goal(meant)}"
             return FailureAttribution.of("misunderstood", None, 0, words)
         return _not_followed(found)
 
@@ -64,7 +64,3 @@ def _not_followed(found: FailureAttribution) -> FailureAttribution:
 
 def _slots(goal: Mapping[str, SlotValue]) -> dict[str, tuple[str | int, ...]]:
     return {slot: values_in(content) for slot, content in goal.items()}
-
-
-def _in_words(goal: Mapping[str, SlotValue]) -> str:
-    return ", ".join(" ".join([slot, *map(str, one)]) for slot, one in _slots(goal).items())

@@ -56,6 +56,11 @@ class _Deviation(NamedTuple):
     violation: Fact | Rule
     act: Fact | None
 
+    @property
+    def failure(self) -> FailureName | None:
+        """The name that its rule has for the failure; None if it has none, and for a fact."""
+        return self.violation.failure if isinstance(self.violation, Rule) else None
+
 
 def attribute_failure(
     episode: Episode,
@@ -99,9 +104,8 @@ def attribute_failure(
     else:
         found = describe_end_state(replay)
         if first is not None and found.failure == "out_of_time":
-            failure: FailureName | None = getattr(first.violation, "failure", None)
             words = _describe_deviation(replay, first)
-            found = FailureAttribution.of(failure or "out_of_time", None, first.step, words)
+            found = FailureAttribution.of(first.failure or "out_of_time", None, first.step, words)
     act = None if first is None else first.act
     found = refine_wrong_object(found, replay, mirrored or {}, None if act is None else act.place)
     found = found._replace(step=found.step - policy_start_step)
@@ -111,7 +115,7 @@ def attribute_failure(
 def _attribute_act(replay: EpisodeReplay, deviation: _Deviation, act: Fact) -> FailureAttribution:
     """Return the failure of a forbidden act, or the slips that explain it."""
     slips, step = find_slips(replay), deviation.step
-    failure = getattr(deviation.violation, "failure", None)
+    failure = deviation.failure
     if failure == "mistimed":
         failure = judge_moment(replay, step)
     dropped = drop_before(slips, FactInterval(act, step, None))

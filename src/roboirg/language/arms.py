@@ -25,7 +25,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import instruct_with
 from roboirg.language.instruction import Instruction, Utterance
 from roboirg.language.settings import EXPLICIT
-from roboirg.language.worded_command import describe_goal
+from roboirg.language.worded_command import goal_name
 from roboirg.tasks import get_task, with_goal
 from roboirg.tasks.other_goals import draw_other_goal
 
@@ -117,8 +117,8 @@ def word_trial(episode: Episode, options: InstructionOptions, arm: str = TOLD) -
     is_explicit = (options.setting, arm) == (EXPLICIT, TOLD)
     explicit = told if is_explicit else instruct_with(stated, replace(options, setting=EXPLICIT))
     every = get_task(stated.task).goals(stated.scene)
-    goals = {describe_goal(goal): with_goal(stated, goal) for goal in every}
-    return TrialWords(stated, told, explicit.text, describe_goal(stated.goal), goals)
+    goals = {goal_name(goal): with_goal(stated, goal) for goal in every}
+    return TrialWords(stated, told, explicit.text, goal_name(stated.goal), goals)
 
 
 def _paraphrase(

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Unpack
 
 from roboirg.core.delivery import DELIVERIES
-from roboirg.core.episode import Episode
+from roboirg.core.episode import Episode, describe_goal
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.instruction_options import (
     DEFAULT_FRAME,
@@ -34,7 +34,7 @@ from roboirg.language.settings import all_settings, get_setting, settings_of
 from roboirg.language.settings.setting import Setting
 from roboirg.language.template_sampler import sampler_of
 from roboirg.language.templates import LANGUAGE_VERSIONS
-from roboirg.language.worded_command import TaskWordings, describe_goal
+from roboirg.language.worded_command import TaskWordings
 from roboirg.language.wordings.wording_store import find_wordings
 from roboirg.tasks import get_task
 
@@ -186,7 +186,7 @@ def _missing(request: InstructionRequest) -> str | None:
         return f"wordings {identity} have no commands of {episode.task}"
     return (
         f"wordings {identity} have no command of {episode.task} for the goal of episode "
-        f"{episode.key}: {describe_goal(episode.goal)}"
+        f"{episode.key}: {describe_goal(episode.goal.as_mapping())}"
     )
 
 

@@ -220,6 +220,9 @@ def _slots_of(name: str) -> set[str]:
     return {"colors", "counts"} if base == "cubes" else {base}
 
 
-def describe_goal(goal: Goal) -> str:
-    """Return a goal in words for messages: ``color red, repeats 3``."""
+def goal_name(goal: Goal) -> str:
+    """Return the name that records have for a goal: ``color red, repeats 3``.
+
+    It stays as it is, because records that were published are compared with it.
+    """
     return ", ".join(f"{name} {value}" for name, value in goal_fields(goal).items())

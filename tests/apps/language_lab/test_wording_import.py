@@ -90,7 +90,7 @@ def test_the_command_writes_a_file_that_is_read_again(one_task, tmp_path):
         assert not out.exists()
 
 
-ASKED = r"RoboMME's get_language_goal, asked for a goal of VideoRepick \(repeats \d\), "
+ASKED = r"RoboMME's get_language_goal, asked for a goal of VideoRepick \((?:once|\d times)\), "
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ ASKED = r"RoboMME's get_language_goal, asked for a goal of VideoRepick \(repeats
         ("['soul\\u00e8ve-le']", "must be printable ASCII on one line"),
         (
             "[f'lift it, this is {self.difficulty}']",
-            r"two sentences for a goal of VideoRepick \(repeats \d\): 'lift it, .*' and 'lift it, ",
+            r"two sentences for a goal of VideoRepick \((?:once|\d times)\): 'lift it, .*' and 'lift it, ",
         ),
     ],
 )

@@ -13,7 +13,6 @@ import torch
 from pydantic import NonNegativeInt, PositiveInt
 
 from roboirg.extension.episodes import (
-    DEFAULT_LANGUAGE,
     ENVIRONMENT_VERSION,
     LANGUAGE_VERSIONS,
     Episode,
@@ -58,8 +57,8 @@ class TrainingPlan(NamedTuple):
         tasks: names of tasks.
         settings: names of settings whose instructions it hears, harder ones where they can
             express the episode.
-        words: the pool of words.
         language: version of the words.
+        words: the pool of words.
         scenes: random scenes of each task beyond the train split.
         goals: goals of each scene with an implicit instruction.
             In other settings only the episode's own is.
@@ -73,8 +72,8 @@ class TrainingPlan(NamedTuple):
 
     tasks: tuple[str, ...]
     settings: tuple[str, ...]
+    language: int
     words: WordPool = "train"
-    language: int = DEFAULT_LANGUAGE
     scenes: NonNegativeInt = 300
     goals: PositiveInt = 4
     detector_epochs: PositiveInt = 6

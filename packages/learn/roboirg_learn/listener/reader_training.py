@@ -12,7 +12,6 @@ from torch.nn import functional
 
 from roboirg.extension.commands import InvalidValueError
 from roboirg.extension.episodes import (
-    DEFAULT_LANGUAGE,
     Episode,
     all_settings,
     episodes_of,
@@ -43,7 +42,7 @@ def said(
     words: str,
     goals: int,
     seed: int,
-    language: int = DEFAULT_LANGUAGE,
+    language: int,
 ) -> Iterator[tuple[Episode, str]]:
     """Yield the instructions of episodes, and of more goals of each scene.
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from pydantic import NonNegativeInt, PositiveInt
 
-from roboirg.extension.episodes import DEFAULT_LANGUAGE, Episode, plain_settings
+from roboirg.extension.episodes import Episode, plain_settings
 from roboirg.extension.sight import ExpertRecording
 from roboirg_learn.listener.vocabulary import USUAL_ENCODERS, WordPool
 
@@ -27,9 +27,9 @@ class PolicyPlan(NamedTuple):
 
     Attributes:
         tasks: names of tasks.
+        language: version of the words.
         settings: names of settings whose instructions it hears; none for a policy without words.
         words: the pool of words.
-        language: version of the words.
         memory: what it remembers; a name of `MEMORY_NAMES`.
         scenes: random scenes of each task in which the disturbed expert is recorded.
         drawn: those of them of which pictures are drawn, for the detector.
@@ -42,9 +42,9 @@ class PolicyPlan(NamedTuple):
     """
 
     tasks: tuple[str, ...]
+    language: int
     settings: tuple[str, ...] = ("explicit",)
     words: WordPool = "train"
-    language: int = DEFAULT_LANGUAGE
     memory: str = "recurrent"
     scenes: PositiveInt = 300
     drawn: PositiveInt = 300

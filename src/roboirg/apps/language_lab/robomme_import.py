@@ -12,14 +12,13 @@ from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
-from roboirg.core.episode import COLORS, DIFFICULTIES, Goal
+from roboirg.core.episode import COLORS, DIFFICULTIES, Goal, describe_goal
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError
 from roboirg.language.settings import EXPLICIT, plain_settings
 from roboirg.language.worded_command import (
     ROBOMME_NAME,
     Wordings,
-    describe_goal,
     goal_fields,
 )
 from roboirg.language.wordings.robomme_sentences import check_robomme_name
@@ -103,14 +102,16 @@ def _sentences(function: SentenceFunction, task: Task) -> dict[Goal, str]:
                     if found.setdefault(goal, said) != said:
                         raise InvalidValueError(
                             f"RoboMME has two sentences for a goal of {task.name} "
-                            f"({describe_goal(goal)}): {found[goal]!r} and {said!r}."
+                            f"({describe_goal(goal.as_mapping())}): {found[goal]!r} and {said!r}."
                         )
     return found
 
 
 def _ask(function: SentenceFunction, task: str, goal: Goal, difficulty: str) -> str:
     """Return the first sentence for a goal."""
-    about = f"RoboMME's {FUNCTION}, asked for a goal of {task} ({describe_goal(goal)}),"
+    about = (
+        f"RoboMME's {FUNCTION}, asked for a goal of {task} ({describe_goal(goal.as_mapping())}),"
+    )
     try:
         said = function(stand_in(goal, difficulty), task)
     except Exception as error:

@@ -11,7 +11,7 @@ from roboirg.evaluation.records.record import EventRecord, GoalOutcomes, Origina
 from roboirg.judging import Event, FailureAttribution, Status
 from roboirg.judging.episode_replay import Decision, decide
 from roboirg.language.arms import TrialWords
-from roboirg.language.worded_command import describe_goal
+from roboirg.language.worded_command import goal_name
 
 
 def judged_events(events: Iterable[EventRecord], start: int) -> list[Event]:
@@ -75,7 +75,7 @@ def name_other_goal(
 
     That is, it reached that goal, or its first wrong act agrees with it.
     """
-    if goals.original != "success" and describe_goal(original.goal) not in goals.agrees:
+    if goals.original != "success" and goal_name(original.goal) not in goals.agrees:
         return found
     words = f"followed the other goal, which was not stated: {found.sentence[:-1]}"
     return FailureAttribution.of("other_goal", found.subject, found.step, words)

@@ -236,7 +236,7 @@ class Attribution(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class GoalOutcomes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Which goals of the scene the trajectory reached; goals are in words.
+    """Which goals of the scene the trajectory reached; goals have names such as `color red`.
 
     Attributes:
         stated: the goal that the verdict is about.

@@ -11,10 +11,9 @@ page omits them for others.
 from __future__ import annotations
 
 import functools
-import itertools
 import os
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,7 +22,7 @@ from urllib.parse import quote
 import msgspec
 
 from roboirg.core.conditions import Fact, facts_of
-from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Scene, values_in
+from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Scene, describe_goal
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.fact_traits import fact_traits
 from roboirg.core.plain_text import counted
@@ -35,7 +34,6 @@ from roboirg.judging.episode_replay import Event, completed_stages
 from roboirg.judging.judge import describe_object, plain_subgoal
 from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.language.arms import arm_episode
-from roboirg.language.number_words import times
 from roboirg.language.settings import EXPLICIT
 from roboirg.tasks.splits.splits import get_episode
 
@@ -44,15 +42,6 @@ EMBEDDED = "#"
 
 _KINDS = {"shuttle": "the moving cube", "site": "the spot on the table"}
 """Words for objects that causes do not name."""
-
-_TIMES = {str(number): times(number) for number in range(1, 11)}
-_SLOT_WORDS: Mapping[str, Callable[[str], str]] = {
-    "repeats": lambda number: _TIMES.get(number, f"{number} times"),
-    "visit": "on visit {}".format,
-    "placement": "on target {} of the video".format,
-    "relation": "on the target {} the press".format,
-}
-"""Words for the values of slots that do not speak for themselves."""
 
 Details = dict[str, Any]
 
@@ -123,7 +112,7 @@ class EpisodeDetails:
             ],
             "command": None if record.setting == EXPLICIT else index(record.command),
             "resolved": self._optional(_resolved_form(job) if is_known else None),
-            "goal": index(goal_words(record.goal)),
+            "goal": index(describe_goal(record.goal)),
             "slots": list(map(index, record.goal)),
             "named": self._optional(_named(record) if record.outcome == "failure" else None),
             "cause": self._optional(record.cause),
@@ -262,21 +251,10 @@ def _named(record: Record) -> str | None:
     """
     goal, cause = record.policy_metadata.get("understood"), record.attribution
     if isinstance(goal, dict):
-        return goal_words(goal)
+        return describe_goal(goal)
     end = record.steps if cause is None or cause.step is None else cause.step
     said = [one for one in record.subgoals if one.step <= end]
     return f"“{said[-1].text}”; due was “{said[-1].due or 'nothing'}”" if said else None
-
-
-def goal_words(goal: Mapping[str, Any]) -> str:
-    """Return the values of a goal, or of what a model named, in words: ``red, three times``."""
-    values = {slot: values_in(content) for slot, content in goal.items()}
-    if {"colors", "counts"} <= values.keys():
-        amounts = itertools.zip_longest(values.pop("counts"), values.pop("colors"), fillvalue="?")
-        values["amounts"] = tuple(f"{count} {color}" for count, color in amounts)
-    return ", ".join(
-        _SLOT_WORDS.get(slot, str)(str(one)) for slot, own in values.items() for one in own
-    )
 
 
 def _prompt(record: Record) -> str | None:
