@@ -63,19 +63,18 @@ def evaluate(
     """
     from roboirg.evaluation.api.python_run import play_plan, python_plan
     from roboirg.evaluation.api.results import Results
+
+    _check_options(options)
+    plan = python_plan(
+        policy, tasks=tasks, settings=settings, forms=forms, split=split, episodes=episodes,
+        policy_seeds=policy_seeds, video=video, **options,
+    )  # fmt: skip
+    return Results(play_plan(plan, out, workers=workers, progress=progress))
+
+
+def _check_options(options: Mapping[str, object]) -> None:
+    """Refuse further options that no plan has; the nearest name may be a parameter's, too."""
     from roboirg.evaluation.plan.plan import PLAN_KEYS
 
     own = inspect.signature(evaluate).parameters
-    check_names("option of evaluate()", options, {**own, **dict.fromkeys(PLAN_KEYS)})
-    plan = python_plan(
-        policy,
-        tasks=tasks,
-        settings=settings,
-        forms=forms,
-        split=split,
-        episodes=episodes,
-        policy_seeds=policy_seeds,
-        video=video,
-        **options,
-    )
-    return Results(play_plan(plan, out, workers=workers, progress=progress))
+    check_names("option of evaluate()", options, (*own, *PLAN_KEYS))
