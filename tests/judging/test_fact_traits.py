@@ -64,7 +64,7 @@ def test_traits_agree(kind: str) -> None:
     words = traits.past.format(subject="SUBJECT", place="PLACE")
     assert ("PLACE" in words) == bool(traits.places)
     assert ("SUBJECT" in words) == (traits.subjects != ("robot",))
-    assert (traits.role is FactRole.STATE) <= (not traits.touches)
+    assert (traits.role is FactRole.STATE) <= (not traits.grips)
 
 
 def test_an_unknown_kind_in_a_record_is_called_by_its_name() -> None:

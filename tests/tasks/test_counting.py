@@ -235,7 +235,7 @@ def test_swing_markers_cover_their_targets_and_glow_for_the_target_cube(difficul
 @each_difficulty
 def test_swing_stages_go_right_then_left_with_the_goals_cube(difficulty):
     for scene, _ in scenes("SwingXtimes", difficulty)[:50]:
-        for goal in swing_x_times.goals(scene):
+        for goal in swing_x_times.TASK.goals(scene):
             stages = swing_x_times.stages(scene, goal)
             repeats = goal.number("repeats")
             assert len(stages) == 2 * repeats + 3
@@ -251,7 +251,7 @@ def test_swing_stages_go_right_then_left_with_the_goals_cube(difficulty):
 
 def test_swing_subgoals_number_the_repetitions():
     scene, _ = scenes("SwingXtimes", "easy")[0]
-    goal = swing_x_times.goals(scene)[1]
+    goal = swing_x_times.TASK.goals(scene)[1]
     color = goal.text("color")
     assert [stage.subgoal for stage in swing_x_times.stages(scene, goal)] == [
         f"pick up the {color} cube {{at}}",

@@ -89,11 +89,6 @@ class FactTraits:
         """Whether the object is in the hand."""
         return self.role in (FactRole.GRIP, FactRole.RAISE)
 
-    @property
-    def touches(self) -> bool:
-        """Whether the hand is at the object."""
-        return self.grips or self.role in (FactRole.TOUCH, FactRole.PRESS)
-
 
 _MOVABLE = ("cube", "tape")
 _GRASPABLE = (*_MOVABLE, "container")

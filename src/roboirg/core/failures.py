@@ -165,8 +165,3 @@ FAILURES: Mapping[FailureName, FailureMeaning] = {
     ),
 }
 """Every name of a failure, by kind, in the order of tables."""
-
-
-def failures_of(kind: FailureKind) -> tuple[FailureName, ...]:
-    """Return the names of a kind."""
-    return tuple(name for name, one in FAILURES.items() if one.kind == kind)

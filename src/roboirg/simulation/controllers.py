@@ -16,7 +16,7 @@ from roboirg.core.actions import CHOICE, EE_POSE, JOINT_ANGLE, POSE_SIZE, WAYPOI
 from roboirg.core.choices import Choice
 from roboirg.core.episode import HANDLES_HELD, PICKS, ROBOT, Primitive
 from roboirg.core.errors import MotionPlanningError
-from roboirg.simulation.panda import JointTrajectory, Panda
+from roboirg.simulation.panda import JointTrajectory, Panda, with_gripper
 from roboirg.simulation.physics_settings import CLOSED, GRIPPER_STEPS, OPEN
 
 if TYPE_CHECKING:
@@ -93,13 +93,12 @@ class WaypointController:
             raise MotionPlanningError(
                 f"no straight move reaches {describe_pose(action)}"
             ) from error
-        yield self._with_gripper(path)
+        yield with_gripper(path, self._gripper)
         if action[POSE_SIZE] in (OPEN, CLOSED):
             self._gripper = float(action[POSE_SIZE])
-            yield self._with_gripper(np.tile(self._robot.arm_positions, (GRIPPER_STEPS, 1)))
-
-    def _with_gripper(self, joints: NDArray[np.float64]) -> JointTrajectory:
-        return np.column_stack([joints, np.full(len(joints), self._gripper)])
+            yield with_gripper(
+                np.tile(self._robot.arm_positions, (GRIPPER_STEPS, 1)), self._gripper
+            )
 
 
 class ChoiceController:

@@ -245,6 +245,11 @@ class _PandaLoader(URDFLoader):  # type: ignore[misc]  # SAPIEN's wrappers have 
             link_builder.visual_records.clear()
 
 
+def with_gripper(joints: NDArray[np.float64], gripper: float) -> JointTrajectory:
+    """Return a trajectory of joint targets (n, 7) with the same gripper in every row."""
+    return np.column_stack([joints, np.full(len(joints), gripper)])
+
+
 @functools.cache
 def _loader(visible: bool, stock: bool) -> _PandaLoader:
     """Return the parsed description, cached because parsing takes longer than building."""

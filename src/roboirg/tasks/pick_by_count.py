@@ -6,13 +6,15 @@ whether the robot continues. Facts: the paper's study with a real robot. Difficu
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from roboirg.core.conditions import Elapsed, Fact, Rule
 from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stage
 from roboirg.core.footprints import Circle, Footprint, Region
 from roboirg.core.word_pools import Pools
-from roboirg.tasks.shared.fixtures import ORDINALS, draw_number, draw_target
+from roboirg.tasks.shared.fixtures import ORDINALS, counted_goals, draw_number, draw_target
 from roboirg.tasks.shared.real_table import draw_sides, draw_tape, on_side
 from roboirg.tasks.shared.stages import pick_stage, place_stage
 from roboirg.tasks.task import Commands, Task, Wording
@@ -49,15 +51,6 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     chosen = TAPES[int(rng.integers(len(TAPES)))]
     goal = Goal.of(color=str(chosen), repeats=draw_number(rng, REPEATS))
     return Scene((*tapes, target)), goal
-
-
-def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Return a goal for every tape of the scene, once or twice."""
-    return tuple(
-        Goal.of(color=str(tape.color), repeats=repeats)
-        for tape in scene.of_kind("tape")
-        for repeats in range(REPEATS[0], REPEATS[1] + 1)
-    )
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
@@ -112,7 +105,7 @@ TASK = Task(
     code=13,
     spatial=True,
     sample=sample,
-    goals=goals,
+    goals=partial(counted_goals, kind="tape", most=REPEATS[1]),
     stages=stages,
     commands=COMMANDS,
 )

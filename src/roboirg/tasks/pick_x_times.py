@@ -6,6 +6,8 @@ alike, so the policy must count its placements to know when to press. Facts: Rob
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from roboirg.core.conditions import Fact
@@ -15,6 +17,7 @@ from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     button_keep_out,
+    counted_goals,
     cube_obstacle,
     draw_button,
     draw_colored_cubes,
@@ -46,15 +49,6 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     chosen = cubes[int(rng.integers(len(cubes)))]
     goal = Goal.of(color=str(chosen.color), repeats=repeats)
     return Scene((button, *cubes, target)), goal
-
-
-def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Return a goal for every cube of the scene, one to five times."""
-    return tuple(
-        Goal.of(color=str(cube.color), repeats=repeats)
-        for cube in scene.of_kind("cube")
-        for repeats in range(1, MAX_REPEATS + 1)
-    )
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
@@ -94,7 +88,7 @@ TASK = Task(
     code=1,
     spatial=True,
     sample=sample,
-    goals=goals,
+    goals=partial(counted_goals, kind="cube", most=MAX_REPEATS),
     stages=stages,
     commands=COMMANDS,
 )

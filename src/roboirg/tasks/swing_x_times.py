@@ -7,6 +7,7 @@ count. Facts: RoboMME.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     button_keep_out,
+    counted_goals,
     cube_obstacle,
     draw_button,
     draw_colored_cubes,
@@ -80,15 +82,6 @@ def make_scene(
         for marker, target in zip(markers, targets, strict=True)
     )
     return Scene((button, *cubes, *targets, *markers), motions)
-
-
-def goals(scene: Scene) -> tuple[Goal, ...]:
-    """Return a goal for every cube of the scene, one to three times."""
-    return tuple(
-        Goal.of(color=str(cube.color), repeats=repeats)
-        for cube in scene.of_kind("cube")
-        for repeats in range(1, MAX_REPEATS + 1)
-    )
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
@@ -165,7 +158,7 @@ TASK = Task(
     code=3,
     spatial=True,
     sample=sample,
-    goals=goals,
+    goals=partial(counted_goals, kind="cube", most=MAX_REPEATS),
     stages=stages,
     commands=COMMANDS,
 )

@@ -240,7 +240,8 @@ def recording_jobs(plan: ExportPlan) -> list[tuple[RecordingJob, tuple[TaskText,
 def _texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
     """Return the instructions of an episode; an explicit one is its own resolved form."""
     found = instructions([episode], plan.settings, plan.forms, plan.options)
-    explicit = instruct_with(episode, InstructionOptions(wordings=plan.options.wordings)).text
+    words = InstructionOptions(wordings=plan.options.wordings, language=plan.options.language)
+    explicit = instruct_with(episode, words).text
     said = []
     for _, one in found:
         is_repeated = one.form == "resolved" and "implicit" in plan.forms

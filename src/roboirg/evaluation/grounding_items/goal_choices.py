@@ -45,9 +45,9 @@ def draw_choices(
     return (*others[:right], episode.goal, *others[right:]), right
 
 
-def explicit_command(episode: Episode, goal: Goal, pool: str) -> str:
-    """Return the explicit command of a goal of the scene, in words of a pool."""
-    return instruct(with_goal(episode, goal), "explicit", wordings=pool).text
+def explicit_command(episode: Episode, goal: Goal, pool: str, language: int) -> str:
+    """Return the explicit command of a goal of the scene, in words of a pool of a language."""
+    return instruct(with_goal(episode, goal), "explicit", wordings=pool, language=language).text
 
 
 def _wrong_goals(episode: Episode, instruction: Instruction) -> Sequence[Goal]:

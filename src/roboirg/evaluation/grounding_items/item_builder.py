@@ -97,7 +97,7 @@ def _make_item(
     texts = question_texts(listener, schema, instruction.text, media.steps)
     choices, right = draw_choices(episode, instruction, name)
     pool = next(one for one in POOLS if one != instruction.metadata["pool"])
-    commands = [explicit_command(episode, goal, pool) for goal in choices]
+    commands = [explicit_command(episode, goal, pool, options.language) for goal in choices]
     goals, answers = task.goals(episode.scene), schema.answers
     return GroundingItem(
         id=name,

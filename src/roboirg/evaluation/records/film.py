@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from pathlib import PurePosixPath
-from typing import Literal, get_args
+from typing import Literal
 
 VideoMode = Literal["off", "failures", "all"]
-VIDEO_MODES: tuple[VideoMode, ...] = get_args(VideoMode)
 """Which episodes get a video."""
 VIDEO_FOLDER = "videos"
 FRAME_STEPS, FRAME_RATE = 8, 10

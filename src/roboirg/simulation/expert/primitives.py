@@ -12,7 +12,6 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from roboirg.core.actions import ARM_JOINTS
@@ -22,7 +21,7 @@ from roboirg.core.errors import MotionPlanningError
 from roboirg.core.motions import Point
 from roboirg.simulation.expert.grasping import grasp_rotations
 from roboirg.simulation.expert.motion_planning import MotionPlanner, ToolPose
-from roboirg.simulation.panda import JointTrajectory, rotation_of
+from roboirg.simulation.panda import JointTrajectory, rotation_of, with_gripper
 from roboirg.simulation.physics_settings import CLOSED, GRIPPER_STEPS, HOME_ACTION, OPEN
 from roboirg.simulation.world import World
 
@@ -183,7 +182,7 @@ class MotionPrimitives:
     def _grip(self, gripper: float) -> JointTrajectory:
         """Hold the arm still while the gripper opens or closes."""
         self._gripper = gripper
-        return self._with_gripper(np.tile(self._world.robot.arm_positions, (GRIPPER_STEPS, 1)))
+        return with_gripper(np.tile(self._world.robot.arm_positions, (GRIPPER_STEPS, 1)), gripper)
 
     def _approach(self, name: str, height: float) -> tuple[JointTrajectory, Rotation]:
         """Plan a move to above an object; returns it with the grasp rotation."""
@@ -211,10 +210,8 @@ class MotionPrimitives:
 
     def _plan(self, position: Point, rotation: Rotation) -> JointTrajectory:
         goal = ToolPose(np.asarray(position, dtype=np.float64), rotation)
-        return self._with_gripper(self._planner.plan_move(self._world.robot.arm_positions, goal))
-
-    def _with_gripper(self, joints: NDArray[np.float64]) -> JointTrajectory:
-        return np.column_stack([joints, np.full(len(joints), self._gripper)])
+        path = self._planner.plan_move(self._world.robot.arm_positions, goal)
+        return with_gripper(path, self._gripper)
 
     def _position(self, name: str) -> Point:
         return self._world.bodies[name].position

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from roboirg.core import object_sizes
-from roboirg.core.episode import COLORS, Color, SceneObject
+from roboirg.core.episode import COLORS, Color, Goal, ObjectKind, Scene, SceneObject
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.footprints import Circle, Footprint, Line, Obstacle, Rectangle, Region, place
 from roboirg.core.motions import Point
@@ -31,6 +31,15 @@ def draw_number(rng: np.random.Generator, bounds: tuple[int, int]) -> int:
     """Draw a whole number between two bounds, both included, uniformly."""
     low, high = bounds
     return int(rng.integers(low, high + 1))
+
+
+def counted_goals(scene: Scene, kind: ObjectKind, most: int) -> tuple[Goal, ...]:
+    """Return a goal for the color of every object of a kind, once up to so many times."""
+    return tuple(
+        Goal.of(color=str(item.color), repeats=repeats)
+        for item in scene.of_kind(kind)
+        for repeats in range(1, most + 1)
+    )
 
 
 def draw_button(rng: np.random.Generator, region: Region, name: str = "button") -> SceneObject:
