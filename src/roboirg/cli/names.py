@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeVar
 
-from roboirg.core.errors import UnknownNameError
-
-Name = TypeVar("Name", bound=str)
+from roboirg.core.errors import Name, known_name
 
 
 def known_tasks(given: object, wordings: str | None = None) -> tuple[str, ...]:
@@ -29,18 +26,6 @@ def known_settings(given: object) -> tuple[str, ...]:
     from roboirg.language.settings import find_settings
 
     return find_settings(parse_names("setting", given))
-
-
-def known_name(kind: str, name: str, known: Sequence[Name]) -> Name:
-    """Return a name if it is known.
-
-    Raises:
-        UnknownNameError: it is not.
-    """
-    for one in known:
-        if name == one:
-            return one
-    raise UnknownNameError(kind, name, known)
 
 
 def known_names(kind: str, given: object, known: Sequence[Name]) -> tuple[Name, ...]:

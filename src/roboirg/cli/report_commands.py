@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from roboirg.cli.names import known_name, known_names
-from roboirg.core.errors import InvalidValueError
+from roboirg.cli.names import known_names
+from roboirg.core.errors import InvalidValueError, known_name
 
 if TYPE_CHECKING:
     from roboirg.evaluation.analysis.stats.breakdowns import Breakdown

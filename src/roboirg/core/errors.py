@@ -17,9 +17,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import TypeVar
 
 from roboirg.core.plain_text import printable
+
+Name = TypeVar("Name", bound=str)
 
 
 class RoboIRGError(Exception):
@@ -61,6 +64,18 @@ def check_names(kind: str, names: Iterable[object], known: Iterable[str]) -> Non
     for name in names:
         if name not in every:
             raise UnknownNameError(kind, name, every)
+
+
+def known_name(kind: str, name: str, known: Sequence[Name]) -> Name:
+    """Return a name if it is known.
+
+    Raises:
+        UnknownNameError: it is not.
+    """
+    for one in known:
+        if name == one:
+            return one
+    raise UnknownNameError(kind, name, known)
 
 
 class InvalidActionError(RoboIRGError, ValueError):

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from roboirg.cli.names import known_name
 from roboirg.cli.options import PlanName, PlanWords, Tasks, Workers, check_output_file
-from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.errors import InvalidValueError, MissingDependencyError, known_name
 from roboirg.util.atomic_write import locked, write_atomically
 from roboirg.util.parallel_map import parallel_map
 from roboirg.util.processor import worker_count

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 from roboirg.core.episode import Goal
 
@@ -101,6 +101,19 @@ class Instruction:
     def span(self, mention: Mention) -> str:
         """Return the text of a mention."""
         return self.utterances[mention.utterance].text[mention.start : mention.end]
+
+
+def command_expressions(mentions: Iterable[Any], last: int) -> tuple[str, ...]:
+    """Return the classes of the anaphors of the last utterance, each once.
+
+    Those of the context add no referent.
+
+    Args:
+        mentions: of an instruction, or of its record.
+        last: index of the last utterance.
+    """
+    found = (one.expression for one in mentions if one.utterance == last)
+    return tuple(dict.fromkeys(one for one in found if one is not None))
 
 
 def hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:

@@ -7,9 +7,9 @@ from collections.abc import Collection
 from dataclasses import replace
 
 from roboirg.core.episode import Scene, SceneObject
-from roboirg.core.motions import Swap
 from roboirg.reader.places import Place, find_objects
 from roboirg.reader.temporal_relations import Time
+from roboirg.tasks.shared.swapping import places_at_last
 
 
 def objects_at(
@@ -28,10 +28,6 @@ def objects_at(
 @functools.lru_cache(maxsize=256)
 def scene_at_last(scene: Scene) -> Scene:
     """Return the scene with everything where it stands after the last swap."""
-    places = {item.name: item.position for item in scene.objects}
-    for motion in scene.motions:
-        if isinstance(motion, Swap):
-            first, second = motion.first, motion.second
-            places[first], places[second] = places[second], places[first]
+    places = places_at_last(scene)
     moved = (replace(item, position=places[item.name]) for item in scene.objects)
     return replace(scene, objects=tuple(moved))

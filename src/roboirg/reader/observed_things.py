@@ -10,7 +10,7 @@ from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Swap
 from roboirg.reader.object_positions import objects_at, scene_at_last
 from roboirg.reader.phrases import Phrases, Span
-from roboirg.reader.places import TIE, Place, place_mentions, present
+from roboirg.reader.places import TIE, Place, place_mentions, present, ranked
 from roboirg.reader.temporal_relations import Time
 
 _NOUN = "(?P<noun>cube|container)"
@@ -142,7 +142,7 @@ def _neighbors(text: str, scene: Scene) -> Iterator[Span]:
         for at_time in _scenes(scene, noun, found["when"] or found["late"]):
             for anchor in _at(place, at_time, noun):
                 others = [item for item in present(at_time, noun) if item != anchor]
-                nearest += _ranked(others, _distance(anchor), rank)
+                nearest += ranked(others, rank, _distance(anchor), TIE)
         now = _NOW.match(text, end)
         yield found.start(), now.end() if now else end, _named(nearest, scene, noun)
 
@@ -198,16 +198,6 @@ def _at(place: Place, scene: Scene, noun: str) -> tuple[SceneObject, ...]:
 
 def _distance(anchor: SceneObject) -> Callable[[SceneObject], float]:
     return lambda item: math.dist(item.position[:2], anchor.position[:2])
-
-
-def _ranked(
-    things: Sequence[SceneObject], measure: Callable[[SceneObject], float], rank: int
-) -> list[SceneObject]:
-    """Return what has a rank, small measures first, with everything that ties with it."""
-    if rank > len(things):
-        return []
-    wanted = sorted(map(measure, things))[rank - 1]
-    return [item for item in things if abs(measure(item) - wanted) <= TIE]
 
 
 def _named(things: Collection[SceneObject], scene: Scene, noun: str) -> str | None:

@@ -306,7 +306,7 @@ def _find(
             found += _find(place.member, group, scene, mirrored=mirrored)
     else:
         for others, measure, tie in _orders(place, candidates, scene, mirrored=mirrored):
-            found += _ranked(others, place.rank, measure, tie)
+            found += ranked(others, place.rank, measure, tie)
     return tuple(dict.fromkeys(found))
 
 
@@ -317,7 +317,7 @@ def _groups(
     if isinstance(place.group, MemberPlace) or place.group.rank != 1:
         return
     for others, measure, tie in _orders(place.group, candidates, scene, mirrored=mirrored):
-        border = _ranked(others, place.size, measure, tie)
+        border = ranked(others, place.size, measure, tie)
         if not border:
             continue
         outside = [item for item in others if measure(item) > max(map(measure, border))]
@@ -352,7 +352,7 @@ def present(scene: Scene, kind: str) -> list[SceneObject]:
     return [item for item in scene.objects if item.kind in kinds and item.name not in late]
 
 
-def _ranked(
+def ranked(
     items: list[SceneObject], rank: int, measure: Measure, tie: float
 ) -> tuple[SceneObject, ...]:
     """Return the items of a rank, small measures first, with those that tie with them."""

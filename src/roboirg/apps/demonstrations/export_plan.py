@@ -12,9 +12,8 @@ from typing import Any, Literal, NamedTuple, get_args
 from roboirg.apps.demonstrations.picture_coding import PictureCoding
 from roboirg.apps.demonstrations.trajectory import SUFFIX, TRAJECTORY_VERSION
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
-from roboirg.cli.names import known_name
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError, known_name
 from roboirg.core.instruction_options import InstructionOptions, identifying
 from roboirg.core.observations import CAMERAS, check_cameras
 from roboirg.core.word_pools import pool_of

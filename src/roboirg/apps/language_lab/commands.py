@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from roboirg.cli.export_commands import export_app
-from roboirg.cli.names import known_name, known_settings, known_tasks
+from roboirg.cli.names import known_settings, known_tasks
 from roboirg.cli.options import (
     AnySplit,
     PlanName,
@@ -19,7 +19,7 @@ from roboirg.cli.options import (
     Tasks,
     check_output_file,
 )
-from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.core.errors import InvalidValueError, RoboIRGError, known_name
 from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:

@@ -10,13 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from roboirg.apps.leaderboard.action_replay import replay, unplayed
-from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
+from roboirg.evaluation.play.job_instruction import other_versions
 from roboirg.evaluation.records.action_log import ActionLog, read_actions
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.record_codec import read_record
 from roboirg.evaluation.records.store import RECORDS_FILE
-from roboirg.language import LANGUAGE_VERSIONS
 
 TOLERANCE = 0.02
 """Largest difference of an end state, in m, rad and s, that is granted to a record from another
@@ -101,7 +100,11 @@ def check_line(one: LineToCheck, folder: Path) -> RecordCheck:
 
 
 def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
-    if findings := [*_versions(record)]:
+    findings = [
+        f"{what}_version: the record says {recorded}; this roboirg checks {installed}."
+        for what, recorded, installed in other_versions(record)
+    ]
+    if findings:
         return RecordCheck(record.slug, tuple(findings))
     log = None if record.action_log is None else read_actions(folder, record.action_log)
     if log is not None and play:
@@ -130,20 +133,6 @@ def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
 
 def _same_answers(played: ActionLog, log: ActionLog) -> bool:
     return len(played.rows) == len(log.rows) and np.array_equal(played.requests, log.requests)
-
-
-def _versions(record: Record) -> Iterator[str]:
-    """Yield why the record cannot be checked by this version of the benchmark."""
-    for what, recorded, installed in (
-        ("environment", record.environment_version, ENVIRONMENT_VERSION),
-        (
-            "language",
-            record.language_version,
-            LANGUAGE_VERSIONS.get(record.options.language, "unknown"),
-        ),
-    ):
-        if recorded != installed:
-            yield f"{what}_version: the record says {recorded}; this roboirg checks {installed}."
 
 
 def _words(record: Record, unplayed: Record) -> Iterator[str]:

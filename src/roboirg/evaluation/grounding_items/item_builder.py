@@ -17,7 +17,7 @@ from roboirg.evaluation.grounding_items.media_store import EpisodeMedia
 from roboirg.evaluation.grounding_items.referents import is_ordered, noun, pointed_kinds
 from roboirg.language import instruct_with
 from roboirg.language.generator import find_refusal
-from roboirg.language.instruction import Instruction
+from roboirg.language.instruction import command_expressions
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.templates import LANGUAGE_VERSIONS
 from roboirg.policies.vlm.goal_schema import goal_schema
@@ -136,16 +136,12 @@ def _make_item(
         if options.form == "resolved"
         else list(hidden_slots((episode, instruction))),
         pattern=cast("str | None", instruction.metadata["pattern"]),
-        expressions=_expressions(instruction),
+        expressions=list(
+            command_expressions(instruction.mentions, len(instruction.utterances) - 1)
+        ),
         language_version=LANGUAGE_VERSIONS[options.language],
         environment_version=ENVIRONMENT_VERSION,
     )
-
-
-def _expressions(instruction: Instruction) -> list[str]:
-    last = len(instruction.utterances) - 1
-    found = (one.expression for one in instruction.mentions if one.utterance == last)
-    return list(dict.fromkeys(one for one in found if one is not None))
 
 
 def _choice_question(questions: Prompts, commands: Sequence[str]) -> str:

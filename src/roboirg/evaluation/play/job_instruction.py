@@ -1,14 +1,16 @@
-"""The episode and the words of a job, and its policy's seed."""
+"""The episode and the words of a job, its policy's seed, and of which versions a record is."""
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 from roboirg.core.arms import AGAIN, TOLD
-from roboirg.core.episode import Episode
-from roboirg.evaluation.records.record import Job
+from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
+from roboirg.evaluation.records.record import Job, Summary
+from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.language.arms import TrialWords, arm_episode, say_arm, word_trial
 from roboirg.language.instruction import Instruction
 from roboirg.language.wordings.wording_store import open_wordings
@@ -52,6 +54,20 @@ def instruct_job(job: Job) -> Instruction:
 def _open_wordings(job: Job) -> None:
     if job.options.wordings is not None:
         open_wordings(job.wordings_file, job.options.wordings)
+
+
+def other_versions(record: Summary) -> Iterator[tuple[str, str | int, str | int]]:
+    """Yield where a record's language or environment is not of the installed version.
+
+    These are what it is the version of, the record's, and the installed one.
+    """
+    language = LANGUAGE_VERSIONS.get(record.options.language, "unknown")
+    for what, recorded, installed in (
+        ("environment", record.environment_version, ENVIRONMENT_VERSION),
+        ("language", record.language_version, language),
+    ):
+        if recorded != installed:
+            yield what, recorded, installed
 
 
 def episode_policy_seed(policy_seed: int, episode_seed: int, arm: str = TOLD) -> int:

@@ -12,7 +12,6 @@ from pathlib import Path
 from types import FrameType
 from typing import NamedTuple
 
-from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.error_words import MAX_CAUSE_LENGTH
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
@@ -20,6 +19,7 @@ from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.evaluation.episode_errors import Terminated, format_cause
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import write_plan
+from roboirg.evaluation.play.job_instruction import other_versions
 from roboirg.evaluation.play.rollout import EpisodeRunner, PlayJob
 from roboirg.evaluation.play.video_writer import check_video_support, without_unfinished_videos
 from roboirg.evaluation.records.film import VIDEO_FOLDER
@@ -33,18 +33,11 @@ from roboirg.evaluation.records.store import (
 )
 from roboirg.evaluation.run.executor import Executor
 from roboirg.evaluation.run.progress import Reporter
-from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.policies.vlm.models.reply_store import ReplySettings
 from roboirg.tasks.splits.splits import get_episode
 
 UNREACHABLE_AFTER = 20
 """After this many consecutive connection errors, skip the rest of this policy."""
-
-
-def _our_versions(record: Summary) -> dict[str, str | int]:
-    """Return the versions that a record has if this roboirg played it."""
-    language = LANGUAGE_VERSIONS.get(record.options.language, "unknown")
-    return {"language": language, "environment": ENVIRONMENT_VERSION}
 
 
 class RunSummary(NamedTuple):
@@ -231,12 +224,11 @@ class _RunLoop:
 
 def _check_record_version(record: Record) -> None:
     """Refuse what a worker with another version of language or environment has played."""
-    for what, ours in _our_versions(record).items():
-        if (version := getattr(record, f"{what}_version")) != ours:
-            raise StoreError(
-                f"A worker returned {record.slug} with {what} version {version}, but this roboirg "
-                f"has version {ours}; the record was not stored."
-            )
+    for what, version, ours in other_versions(record):
+        raise StoreError(
+            f"A worker returned {record.slug} with {what} version {version}, but this roboirg has "
+            f"version {ours}; the record was not stored."
+        )
 
 
 def _report_damage(store: RecordStore, reporter: Reporter) -> None:
@@ -267,12 +259,11 @@ def _warn_of_untrained(plan: Plan, reporter: Reporter) -> None:
 def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> None:
     """Refuse records of other versions of words, scenes or policies: rates must not mix them."""
     for record in records:
-        for what, ours in _our_versions(record).items():
-            if (version := getattr(record, f"{what}_version")) != ours:
-                raise StoreError(
-                    f"{folder} holds episodes of {what} version {version}, but this roboirg has "
-                    f"version {ours}; choose another --out."
-                )
+        for what, version, ours in other_versions(record):
+            raise StoreError(
+                f"{folder} holds episodes of {what} version {version}, but this roboirg has "
+                f"version {ours}; choose another --out."
+            )
     for task, split, episode, seed in {
         (record.task, record.split, record.episode, record.seed) for record in records
     }:

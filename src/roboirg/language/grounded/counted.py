@@ -16,6 +16,7 @@ from roboirg.language.grounded.clue import Clue
 from roboirg.language.grounded.things import AXES, directed, late
 from roboirg.language.landmarks import MARGIN
 from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.tasks.shared.swapping import places_at_last
 
 KEPT_SWAPS = {1: (1, 2), 2: (1, 3), 3: (1, 1)}
 """Share of the scenes with this number of swaps that say it, so that all are equally frequent.
@@ -82,13 +83,8 @@ def _beside(request: InstructionRequest, number: GoalValue, axis: str, color: st
 
 def _at_last(request: InstructionRequest, item: SceneObject) -> SceneObject:
     """Return a thing where it is after the last swap."""
-    scene = request.episode.scene
-    places = {one.name: one.position for one in scene.objects}
-    for motion in scene.motions:
-        if isinstance(motion, Swap):
-            first, second = motion.first, motion.second
-            places[first], places[second] = places[second], places[first]
-    return SceneObject(item.name, item.kind, places[item.name], color=item.color)
+    place = places_at_last(request.episode.scene)[item.name]
+    return SceneObject(item.name, item.kind, place, color=item.color)
 
 
 def count_beside(

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Iterable, Sequence
 
-from roboirg.core.episode import SceneObject
+from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Motion, Point, Swap
 
 SWAP_STEPS = 50
@@ -44,6 +44,16 @@ def plan_swaps(
         swaps.append(Swap(first, second, begin, SWAP_STEPS, lane, pinned, stage))
         places[first], places[second] = places[second], places[first]
     return tuple(swaps)
+
+
+def places_at_last(scene: Scene) -> dict[str, Point]:
+    """Return where each object of a scene stands after the last swap."""
+    places = {item.name: item.position for item in scene.objects}
+    for motion in scene.motions:
+        if isinstance(motion, Swap):
+            first, second = motion.first, motion.second
+            places[first], places[second] = places[second], places[first]
+    return places
 
 
 def last_step(motions: Iterable[Motion]) -> int:

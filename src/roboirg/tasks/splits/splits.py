@@ -25,7 +25,7 @@ import numpy as np
 
 from roboirg.core.conditions import Fact, facts_of
 from roboirg.core.episode import ROBOT, SPLITS, Difficulty, Episode, Goal, Scene, Split, Stage
-from roboirg.core.errors import InvalidValueError, SceneRejectedError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, SceneRejectedError, UnknownNameError, known_name
 from roboirg.core.fact_traits import FACT_TRAITS, FactTraits
 from roboirg.tasks import Task, get_task
 from roboirg.tasks.splits.fingerprint import fingerprint
@@ -80,7 +80,7 @@ def slot_key(split: Split, index: int) -> str:
 def check_split(split: str) -> Split:
     """Return the name as a split whose episodes this process can draw."""
     check_salt(split)
-    return split if is_private(split) else _known_split(split, tuple(SIZES))
+    return split if is_private(split) else known_name("split", split, tuple(SIZES))
 
 
 def split_size(split: str) -> int:
@@ -91,7 +91,7 @@ def split_size(split: str) -> int:
 
 def check_fixed_split(split: str) -> Split:
     """Return the name as a split of a fixed number of episodes: train, val or test."""
-    return _known_split(split, SPLITS)
+    return known_name("split", split, SPLITS)
 
 
 def make_episode(
@@ -176,13 +176,6 @@ def fingerprint_of(task_name: str, passed_over: Mapping[str, int]) -> str:
         for split in SPLITS
         for index in range(SIZES[split])
     )
-
-
-def _known_split(split: str, splits: tuple[Split, ...]) -> Split:
-    for known in splits:
-        if split == known:
-            return known
-    raise UnknownNameError("split", split, splits)
 
 
 def _check_index(split: Split, index: SupportsIndex) -> int:

@@ -28,8 +28,7 @@ from inspect_ai.model import (
 from inspect_ai.scorer import Score, Scorer, Target, accuracy, grouped, scorer, stderr
 from inspect_ai.solver import Generate, Solver, TaskState, solver
 
-from roboirg.cli.names import known_name
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError, known_name
 from roboirg.evaluation.grounding_items.answer_file import Answer
 from roboirg.evaluation.grounding_items.grounding_item import (
     QUESTION_KINDS,

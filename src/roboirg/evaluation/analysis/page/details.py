@@ -22,17 +22,16 @@ from urllib.parse import quote
 import msgspec
 
 from roboirg.core.conditions import Fact, facts_of
-from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Scene, describe_goal
+from roboirg.core.episode import Episode, Scene, describe_goal
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.fact_traits import fact_traits
 from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import words_label
 from roboirg.evaluation.analysis.page.episodes import PageEpisode
-from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.job_instruction import instruct_job, other_versions
 from roboirg.evaluation.records.record import EventRecord, Job, Record, SubgoalRecord
 from roboirg.judging.episode_replay import Event, completed_stages
 from roboirg.judging.judge import describe_object, plain_subgoal
-from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.language.arms import arm_episode
 from roboirg.language.settings import EXPLICIT
 from roboirg.tasks.splits.splits import get_episode
@@ -92,14 +91,12 @@ class EpisodeDetails:
             policy="", task=record.task, split=record.split, episode=record.episode,
             options=record.options, arm=record.arm, wordings_file=record.wordings_file,
         )  # fmt: skip
-        is_current = record.environment_version == ENVIRONMENT_VERSION
+        foreign = {what for what, *_ in other_versions(record)}
         scene = (
             _played_scene(job.task, job.split, job.episode, job.arm)
-            if is_current
+            if "environment" not in foreign
             else _PlayedScene(None, {}, {})
         )
-        ours = LANGUAGE_VERSIONS.get(record.options.language)
-        is_known = is_current and record.language_version == ours
         cause, audit = record.attribution, record.prompt
         found: Details = {
             "turns": [[index(turn.stage), index(turn.text)] for turn in record.instruction],
@@ -111,7 +108,7 @@ class EpisodeDetails:
                 for one in record.mentions
             ],
             "command": None if record.setting == EXPLICIT else index(record.command),
-            "resolved": self._optional(_resolved_form(job) if is_known else None),
+            "resolved": self._optional(None if foreign else _resolved_form(job)),
             "goal": index(describe_goal(record.goal)),
             "slots": list(map(index, record.goal)),
             "named": self._optional(_named(record) if record.outcome == "failure" else None),

@@ -9,6 +9,7 @@ from roboirg.evaluation.analysis.results.frame import Frame, FrameColumn, as_col
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.records.record_codec import identity_key
+from roboirg.language.instruction import command_expressions
 from roboirg.util.freed_memory import paused_collection
 
 RIVAL, NO_RIVAL = "recency rival", "no recency rival"
@@ -20,10 +21,7 @@ Texts = tuple[str, ...]
 
 
 def _expressions(record: Record) -> Texts:
-    """Return the classes of the command's anaphors; those of the context add no referent."""
-    last = len(record.instruction) - 1
-    found = (one.expression for one in record.mentions if one.utterance == last)
-    return tuple(dict.fromkeys(one for one in found if one is not None))
+    return command_expressions(record.mentions, len(record.instruction) - 1)
 
 
 def _rival(record: Record) -> str | None:
