@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from typing import NamedTuple, assert_never
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import sapien
@@ -16,6 +16,7 @@ from roboirg.core.motions import Away, Glow, Motion, Point, Shuttle, Swap, Vanis
 from roboirg.simulation.bodies import Body
 
 Bodies = Mapping[str, Body]
+M = TypeVar("M", bound=Motion)
 
 _SPACING = 0.5
 """Meters between the parking spots of absent objects, so that they do not touch."""
@@ -41,7 +42,7 @@ class MotionPlayer:
     def __init__(self, motions: Sequence[Motion], bodies: Bodies) -> None:
         spots = (Point(10.0 + _SPACING * index, 10.0, 10.0) for index in range(len(motions)))
         players = [
-            _scripted_motion(motion, bodies, spot)
+            _PLAYERS[type(motion)](motion, bodies, spot)
             for motion, spot in zip(motions, spots, strict=True)
         ]
         # Swaps come first: an object that returns under another needs that one's new position.
@@ -66,8 +67,13 @@ class MotionPlayer:
         return frozenset(player.subject for player in self._players if player.stopped)
 
 
-class _ScriptedMotion(ABC):
+class _ScriptedMotion(ABC, Generic[M]):
     """Plays one motion of one object.
+
+    Args:
+        motion: what is played.
+        bodies: all objects of the scene, by name.
+        spot: where the object is while it is out of the world.
 
     Attributes:
         subject: name of the object.
@@ -75,10 +81,11 @@ class _ScriptedMotion(ABC):
         stopped: whether the object has stopped permanently.
     """
 
-    def __init__(self, subject: str) -> None:
-        self.subject = subject
-        self.absent = False
-        self.stopped = False
+    def __init__(self, motion: M, bodies: Bodies, spot: Point) -> None:
+        self._motion, self._bodies, self._spot = motion, bodies, spot
+        self.subject = motion.first if isinstance(motion, Swap) else motion.subject
+        self._body = bodies[self.subject]
+        self.absent = self.stopped = False
 
     @abstractmethod
     def before_step(self, context: MotionContext) -> None: ...
@@ -87,12 +94,9 @@ class _ScriptedMotion(ABC):
         del facts
 
 
-class _AwayMotion(_ScriptedMotion):
+class _AwayMotion(_ScriptedMotion[Away]):
     def __init__(self, motion: Away, bodies: Bodies, spot: Point) -> None:
-        super().__init__(motion.subject)
-        self._motion, self._spot = motion, spot
-        self._body = bodies[motion.subject]
-        self._under = None if motion.under is None else bodies[motion.under]
+        super().__init__(motion, bodies, spot)
         self.absent = motion.start == 0
 
     def before_step(self, context: MotionContext) -> None:
@@ -101,18 +105,17 @@ class _AwayMotion(_ScriptedMotion):
             self._body.put(self._spot)
         elif context.step == self._motion.end:
             place = self._body.item.position
-            if self._under is not None:
-                x, y, _ = self._under.position
+            if self._motion.under is not None:
+                x, y, _ = self._bodies[self._motion.under].position
                 place = place._replace(x=x, y=y)
             self._body.put(place)
 
 
-class _SwapMotion(_ScriptedMotion):
-    def __init__(self, motion: Swap, bodies: Bodies) -> None:
-        super().__init__(motion.first)
-        self._motion = motion
+class _SwapMotion(_ScriptedMotion[Swap]):
+    def __init__(self, motion: Swap, bodies: Bodies, spot: Point) -> None:
+        super().__init__(motion, bodies, spot)
         names = (motion.first, motion.second, *motion.pinned)
-        self._bodies = [bodies[name] for name in names]
+        self._moved = [bodies[name] for name in names]
         self._poses: list[sapien.Pose] = []
 
     def before_step(self, context: MotionContext) -> None:
@@ -123,7 +126,7 @@ class _SwapMotion(_ScriptedMotion):
         if not 0 <= elapsed <= self._motion.steps:
             return
         if elapsed == 0:
-            self._poses = [body.entity.pose for body in self._bodies]
+            self._poses = [body.entity.pose for body in self._moved]
         first, second = self._poses[:2]
         share = elapsed / self._motion.steps
         poses = (
@@ -131,15 +134,11 @@ class _SwapMotion(_ScriptedMotion):
             _on_lane(second, first, share, self._motion.lane),
             *self._poses[2:],
         )
-        for body, pose in zip(self._bodies, poses, strict=True):
+        for body, pose in zip(self._moved, poses, strict=True):
             body.set_pose(pose)
 
 
-class _ShuttleMotion(_ScriptedMotion):
-    def __init__(self, motion: Shuttle, bodies: Bodies) -> None:
-        super().__init__(motion.subject)
-        self._motion, self._body = motion, bodies[motion.subject]
-
+class _ShuttleMotion(_ScriptedMotion[Shuttle]):
     def before_step(self, context: MotionContext) -> None:
         if self.stopped:
             return
@@ -147,10 +146,9 @@ class _ShuttleMotion(_ScriptedMotion):
         self.stopped = self._motion.stopped_by in context.facts
 
 
-class _GlowMotion(_ScriptedMotion):
+class _GlowMotion(_ScriptedMotion[Glow]):
     def __init__(self, motion: Glow, bodies: Bodies, spot: Point) -> None:
-        super().__init__(motion.subject)
-        self._motion, self._body, self._spot = motion, bodies[motion.subject], spot
+        super().__init__(motion, bodies, spot)
         self._last: int | None = None
         self.absent = True
 
@@ -161,11 +159,7 @@ class _GlowMotion(_ScriptedMotion):
         self._body.put(self._spot if self.absent else self._body.item.position)
 
 
-class _VanishMotion(_ScriptedMotion):
-    def __init__(self, motion: Vanish, bodies: Bodies, spot: Point) -> None:
-        super().__init__(motion.subject)
-        self._motion, self._body, self._spot = motion, bodies[motion.subject], spot
-
+class _VanishMotion(_ScriptedMotion[Vanish]):
     def before_step(self, context: MotionContext) -> None:
         del context
         if self.absent:
@@ -177,20 +171,14 @@ class _VanishMotion(_ScriptedMotion):
             self._body.put(self._spot)
 
 
-def _scripted_motion(motion: Motion, bodies: Bodies, spot: Point) -> _ScriptedMotion:
-    match motion:
-        case Away():
-            return _AwayMotion(motion, bodies, spot)
-        case Swap():
-            return _SwapMotion(motion, bodies)
-        case Shuttle():
-            return _ShuttleMotion(motion, bodies)
-        case Glow():
-            return _GlowMotion(motion, bodies, spot)
-        case Vanish():
-            return _VanishMotion(motion, bodies, spot)
-        case _:
-            assert_never(motion)
+_PLAYERS: Mapping[type[Motion], type[_ScriptedMotion[Any]]] = {
+    Away: _AwayMotion,
+    Swap: _SwapMotion,
+    Shuttle: _ShuttleMotion,
+    Glow: _GlowMotion,
+    Vanish: _VanishMotion,
+}
+"""What plays each kind of motion."""
 
 
 def shuttle_position(motion: Shuttle, step: int) -> Point:

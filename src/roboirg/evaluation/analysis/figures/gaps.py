@@ -22,7 +22,7 @@ from roboirg.evaluation.analysis.figures.rates import Rate, RateRow, draw_rates
 from roboirg.evaluation.analysis.published import TRIALS, RateTable, published_rows
 from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
-from roboirg.evaluation.analysis.stats.cells import NOTHING, Cell, Cells
+from roboirg.evaluation.analysis.stats.cells import NOTHING, ByTask, Cell, Cells
 from roboirg.evaluation.analysis.stats.measure import measure_groups
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.table_kinds import PAPER_TABLES, row_order, stages_text
@@ -57,7 +57,7 @@ def draw_next_to_reference(which: RateTable, content: RunData, published: bool) 
         return None
     tasks = {one: names for one, names in tasks.items() if one != table.reference(one)} or tasks
     shown = {task for names in tasks.values() for task in names}
-    every = {**{table.reference(one): shown for one in tasks}, **tasks}
+    every = {table.reference(one): shown for one in tasks} | tasks
     cells = {
         key: cell
         for key, cell in content.cells.items()
@@ -128,20 +128,19 @@ def _own_rates(
     which: RateTable, policy_run: PolicyRun, played: Played, tasks: Tasks
 ) -> dict[str, Rate]:
     """Return the rates of a policy run by column, over exactly the column's tasks."""
-    reference = PAPER_TABLES[which].reference
+    table = PAPER_TABLES[which]
+
+    def reference(key: tuple[InstructionOptions]) -> ByTask:
+        before = table.reference(key[0])
+        return NOTHING if key[0] == before else played.get((before, policy_run), NOTHING)
+
     found = measure_groups(
         {
             (options,): {task: own[task] for task in names}
             for options, names in tasks.items()
             if (own := played.get((options, policy_run)))
         },
-        [
-            lambda key: (
-                NOTHING
-                if key[0] == reference(key[0])
-                else played.get((reference(key[0]), policy_run), {})
-            )
-        ],
+        [reference],
         is_mean=lambda _key: True,
     )
     rates = {}

@@ -26,7 +26,8 @@ TWIN_MARK = " (twin)"
 
 
 def row_order(options: InstructionOptions) -> tuple[object, ...]:
-    return (*setting_sort_key(options.setting), len(options.stages), options.stages)
+    stages, language = options.stages, options.language
+    return (*setting_sort_key(options.setting), len(stages), stages, language)
 
 
 def stages_text(options: InstructionOptions) -> str:
