@@ -22,6 +22,7 @@ from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.apps.demonstrations.export_plan import recording_jobs
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
 
 HERE = Path(__file__).parent
 KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "4"))
@@ -273,6 +274,12 @@ def test_the_card_tells_counts_and_lines_to_train(export):
     config = text.split("```python\n")[1].split("```")[0]
     compile(config, "config", "exec")
     assert '"observation/wrist_image": "wrist_image"' in config
+
+
+def test_the_explicit_text_is_of_the_exported_language(make_plan):
+    plan = make_plan(tasks=("PickXtimes",), options=InstructionOptions(language=4))
+    for _, (explicit, direct) in recording_jobs(plan):
+        assert direct.facts["explicit"] == explicit.text
 
 
 def test_an_explicit_instruction_is_its_own_resolved_form(make_plan):

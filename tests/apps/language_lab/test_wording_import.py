@@ -104,7 +104,7 @@ ASKED = r"RoboMME's get_language_goal, asked for a goal of VideoRepick \((?:once
         ("['soul\\u00e8ve-le']", "must be printable ASCII on one line"),
         (
             "[f'lift it, this is {self.difficulty}']",
-            r"two sentences for a goal of VideoRepick \((?:once|\d times)\): 'lift it, .*' and 'lift it, ",
+            r"two sentences for a goal of VideoRepick \(.+\): 'lift it, .*' and 'lift it, ",
         ),
     ],
 )
