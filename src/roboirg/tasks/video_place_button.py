@@ -22,17 +22,14 @@ RELATIONS = ("before", "after")
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
     """Draw a scene in which the cube goes to ``target_0``, then to ``target_1`` after the press."""
-    objects = video_place.draw_table(
-        rng, video_place.CUBES[difficulty], DISCS[difficulty], SITE_RADIUS
-    )
-    table = Scene(objects)
-    cubes, discs = table.of_kind("cube"), table.of_kind("target")
-    cube = cubes[int(rng.integers(len(cubes)))]
+    cubes = video_place.CUBES[difficulty]
+    table, cube = video_place.draw_table(rng, cubes, DISCS[difficulty], SITE_RADIUS)
+    discs = table.of_kind("target")
     before, after = (Fact("placed", cube.name, disc.name) for disc in discs[:2])
     past = (before, PRESSED, after)
     swaps = (video_place.draw_swap(rng, discs, past),) if difficulty == "hard" else ()
     relation = RELATIONS[int(rng.integers(len(RELATIONS)))]
-    return Scene(objects, swaps, past), Goal.of(color=str(cube.color), relation=relation)
+    return Scene(table.objects, swaps, past), Goal.of(color=str(cube.color), relation=relation)
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:

@@ -25,10 +25,9 @@ SITE_RADIUS = 0.1
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
     """Draw the visited discs, their order, the goal's disc and the time of the press."""
-    objects = video_place.draw_table(rng, video_place.CUBES[difficulty], DISCS, SITE_RADIUS)
-    table = Scene(objects)
-    cubes, discs = table.of_kind("cube"), table.of_kind("target")
-    cube = cubes[int(rng.integers(len(cubes)))]
+    cubes = video_place.CUBES[difficulty]
+    table, cube = video_place.draw_table(rng, cubes, DISCS, SITE_RADIUS)
+    discs = table.of_kind("target")
     placements = draw_number(rng, PLACEMENTS)
     order = rng.permutation(DISCS)[:placements]
     shown = [Fact("placed", cube.name, discs[index].name) for index in order]
@@ -36,7 +35,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     pressed_after = int(rng.integers(1, placements + 1))
     past = (*shown[:pressed_after], PRESSED, *shown[pressed_after:])
     swaps = (video_place.draw_swap(rng, discs, past),) if difficulty == "hard" else ()
-    return Scene(objects, swaps, past), Goal.of(color=str(cube.color), placement=placement)
+    return Scene(table.objects, swaps, past), Goal.of(color=str(cube.color), placement=placement)
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:

@@ -91,16 +91,11 @@ class MotionPrimitives:
         yield self._grip(CLOSED)
         yield self._move(_above(place, CUBE_HOVER), rotation)
 
-    def _place_on(self, primitive: Primitive) -> Iterator[JointTrajectory]:
-        is_site = self._world.bodies[str(primitive.place)].item.kind == "site"
-        return self._release(primitive, SITE_RELEASE if is_site else TARGET_RELEASE)
-
-    def _put_into(self, primitive: Primitive) -> Iterator[JointTrajectory]:
-        return self._release(primitive, BOX_RELEASE)
-
-    def _release(self, primitive: Primitive, height: float) -> Iterator[JointTrajectory]:
-        """Yield the trajectories that let go of a thing over a place, at a tool height."""
+    def _release(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+        """Yield the trajectories that let go of a thing over a place, at its kind's height."""
         place, rotation = self._place(primitive), self._rotation()
+        kind = self._world.bodies[str(primitive.place)].item.kind
+        height = {"site": SITE_RELEASE, "box": BOX_RELEASE}.get(kind, TARGET_RELEASE)
         yield self._move(_above(place, CUBE_HOVER), rotation)
         yield self._move(_above(place, height), rotation)
         yield self._grip(OPEN)
@@ -228,9 +223,9 @@ class MotionPrimitives:
 # ruff: noqa: SLF001
 _ROUTINES: dict[str, Callable[[MotionPrimitives, Primitive], Iterator[JointTrajectory]]] = {
     "pick_cube": MotionPrimitives._pick_cube,
-    "place_on": MotionPrimitives._place_on,
+    "place_on": MotionPrimitives._release,
     "drop_into": MotionPrimitives._drop_into,
-    "put_into": MotionPrimitives._put_into,
+    "put_into": MotionPrimitives._release,
     "move_over": MotionPrimitives._move_over,
     "put_down": MotionPrimitives._put_down,
     "pick_container": MotionPrimitives._pick_container,

@@ -47,9 +47,10 @@ HOLD_STEPS = 60
 
 def draw_table(
     rng: np.random.Generator, cubes: int, discs: int, site_radius: float
-) -> tuple[SceneObject, ...]:
-    """Draw site, button, cubes of different colors and target discs, ``target_0`` first.
+) -> tuple[Scene, SceneObject]:
+    """Draw site, button, cubes of different colors and target discs, and choose one of the cubes.
 
+    The first disc is ``target_0``.
     The site is the round place for the cube at the end of the video; its radius is in meters.
     """
     x, y = SITE_REGION.draw(rng, inset=site_radius)
@@ -66,7 +67,7 @@ def draw_table(
         disc = draw_target(rng, f"target_{number}", TARGET_RADIUS, WORK_REGION, GAP, obstacles)
         objects.append(disc)
         obstacles.append(Circle(disc.position.x, disc.position.y, TARGET_RADIUS))
-    return tuple(objects)
+    return Scene(tuple(objects)), colored[int(rng.integers(len(colored)))]
 
 
 def draw_swap(rng: np.random.Generator, discs: Sequence[SceneObject], past: Sequence[Fact]) -> Swap:
