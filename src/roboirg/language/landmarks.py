@@ -253,7 +253,7 @@ def _far_sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Se
         return
     left, right = (direction.ranking for direction in _directions(frame) if direction.sided)
     for side, ranking in (("left", left), ("right", right)):
-        corners = tuple(_nearness((area["far"], area[side])) for area in (WORK_AREA, TABLE))
+        corners = tuple(nearness((area["far"], area[side])) for area in (WORK_AREA, TABLE))
         landmark = Landmark(f"at your far {side}", LandmarkClass.EXTREME, sided=True)
         yield Selector(landmark, (ranking, *corners), candidates)
 
@@ -268,7 +268,7 @@ def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sele
                 phrase = f"closest to the camera's {side} corner {reach} the robot"
                 y = mirrored
             corners = [(area[depth], area[y]) for area in (WORK_AREA, TABLE)]
-            rankings = tuple(_nearness(corner) for corner in corners)
+            rankings = tuple(nearness(corner) for corner in corners)
             yield Selector(Landmark(phrase, LandmarkClass.CORNER, sided=True), rankings, candidates)
 
 
@@ -320,7 +320,7 @@ def _other_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
         if anchor.color is None or len(like) != 1:
             continue
         landmark = Landmark(f"closest to the {anchor.color} cube", LandmarkClass.OTHER_COLOR)
-        yield Selector(landmark, (_nearness(anchor.position),), _without(candidates, anchor))
+        yield Selector(landmark, (nearness(anchor.position),), _without(candidates, anchor))
 
 
 def _chains(
@@ -341,7 +341,7 @@ def _chains(
         nearest = f"{ORDINALS[rank]} nearest" if rank else "nearest"
         phrase = f"{nearest} to the {thing.removeprefix('hidden_')} {selector.landmark.phrase}"
         landmark = Landmark(phrase, kind, selector.landmark.sided)
-        yield Selector(landmark, (_nearness(anchor.position),), others, rank)
+        yield Selector(landmark, (nearness(anchor.position),), others, rank)
 
 
 def _members(
@@ -373,7 +373,8 @@ def _without(candidates: Sequence[SceneObject], anchor: SceneObject) -> tuple[Sc
     return tuple(item for item in candidates if item is not anchor)
 
 
-def _nearness(place: Sequence[float]) -> Ranking:
+def nearness(place: Sequence[float]) -> Ranking:
+    """Return the order by the distance from a place, the nearest first."""
     return Ranking(_negated(_distance(place)))
 
 

@@ -5,6 +5,7 @@ The rules are those of `roboirg.language.patterns`; here they give values instea
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 from roboirg.language.instruction import REFERENCE
@@ -79,11 +80,8 @@ def _second(request: InstructionRequest) -> Iterator[Offer]:
     colors = request.color_values
     if request.values_of("amount") or len(colors) != PAIR:
         return
-    first, second = request.sampler.pick("complement order", ((0, 1), (1, 0)))
-    both = [named(colors[first]), named(colors[second])]
-    values = {**several("list", both), "taken": (named(colors[0]),)}
-    fields = [one.field for one in colors]
-    yield _derived("contextual logic", fields, values, listed=colors[0].slot)
+    both = [named(one) for one in colors]
+    yield _one_of(request, both, both[0], [one.field for one in colors], colors[0].slot)
 
 
 def _other(request: InstructionRequest) -> Iterator[Offer]:
@@ -93,9 +91,20 @@ def _other(request: InstructionRequest) -> Iterator[Offer]:
         of_slot = [pair for pair in pairs if pair.slot == slot]
         pair: ValuePair = request.sampler.pick(f"complement {slot}", of_slot)
         both = [IntroducedValue(REFERENCE, one.slot_type, one.value) for one in pair]
-        first, second = request.sampler.pick("complement order", ((0, 1), (1, 0)))
-        values = {**several("list", (both[first], both[second])), "taken": (both[1],)}
-        yield _derived("contextual logic", [pair.meant.field], values, listed=slot)
+        yield _one_of(request, both, both[1], [pair.meant.field], slot)
+
+
+def _one_of(
+    request: InstructionRequest,
+    both: list[IntroducedValue],
+    taken: IntroducedValue,
+    fields: list[str],
+    slot: str,
+) -> Offer:
+    """Return the offer of two values in an order that is drawn, and of the one that is taken."""
+    order = request.sampler.pick("complement order", list(itertools.permutations(both)))
+    values = {**several("list", order), "taken": (taken,)}
+    return _derived("contextual logic", fields, values, listed=slot)
 
 
 def _derived(

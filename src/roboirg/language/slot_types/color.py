@@ -63,8 +63,7 @@ def draw_reference(
     others = [color for color in request.scene_colors if color not in colors]
     left = next(request.sampler.cycle("listed colors", list(itertools.permutations(others))))
     members = [*colors, *left[: size - len(colors)]]
-    order = request.sampler.pick("list order", list(itertools.permutations(range(size))))
-    introduced = tuple(members[at] for at in order)
+    introduced = request.sampler.pick("list order", list(itertools.permutations(members)))
     pointers = _pointers(request, size)
     return ColorReference(introduced, tuple(pointers[introduced.index(one)] for one in colors))
 
