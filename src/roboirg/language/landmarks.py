@@ -237,12 +237,11 @@ def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sel
 
 
 def _sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    left, right = (direction.ranking for direction in _directions(frame) if direction.sided)
     owner = "your" if frame == "robot" else "the camera's"
-    for side, ranking in (("left", left), ("right", right)):
+    for side, direction in zip(("left", "right"), _directions(frame), strict=False):
         yield Selector(
             Landmark(f"on {owner} {side}", LandmarkClass.EXTREME, sided=True),
-            (ranking,),
+            (direction.ranking,),
             candidates,
         )
 
@@ -251,11 +250,10 @@ def _far_sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Se
     """Yield *at your far right*, where the side and the far corner mean the same object."""
     if frame != "robot":
         return
-    left, right = (direction.ranking for direction in _directions(frame) if direction.sided)
-    for side, ranking in (("left", left), ("right", right)):
+    for side, direction in zip(("left", "right"), _directions(frame), strict=False):
         corners = tuple(nearness((area["far"], area[side])) for area in (WORK_AREA, TABLE))
         landmark = Landmark(f"at your far {side}", LandmarkClass.EXTREME, sided=True)
-        yield Selector(landmark, (ranking, *corners), candidates)
+        yield Selector(landmark, (direction.ranking, *corners), candidates)
 
 
 def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
@@ -293,13 +291,12 @@ def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Sel
         if len(fixtures) != 1:
             continue
         away = _distance(fixtures[0].position)
-        near = Landmark(f"closest to the {kind}", LandmarkClass.FIXTURE)
-        yield Selector(near, (Ranking(_negated(away)),), candidates)
-        yield Selector(
-            Landmark(f"farthest from the {kind}", LandmarkClass.FIXTURE),
-            (Ranking(away),),
-            candidates,
-        )
+        for words, ranking in (
+            ("closest to", Ranking(_negated(away))),
+            ("farthest from", Ranking(away)),
+        ):
+            landmark = Landmark(f"{words} the {kind}", LandmarkClass.FIXTURE)
+            yield Selector(landmark, (ranking,), candidates)
 
 
 def _fixture_ranks(

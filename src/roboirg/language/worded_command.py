@@ -203,13 +203,14 @@ def goal_fields(goal: Goal) -> dict[str, str]:
     if "counts" in slots:
         pairs = zip(goal.texts("colors"), goal.numbers("counts"), strict=True)
         return {f"cubes.{at}": f"{count} {color}" for at, (color, count) in enumerate(pairs)}
-    return {name: str(value) for slot in slots for name, value in _fields_of(goal, slot)}
+    return {name: str(value) for slot in slots for name, value in fields_of(goal, slot)}
 
 
-def _fields_of(goal: Goal, slot: str) -> Iterator[tuple[str, str | int]]:
+def fields_of(goal: Goal, slot: str) -> Iterator[tuple[str, str | int]]:
+    """Yield the value of each field for a slot, with an index if the slot has several."""
     value = goal[slot]
     if isinstance(value, tuple):
-        for at, one in enumerate(goal.texts(slot)):
+        for at, one in enumerate(value):
             yield f"{slot}.{at}", one
     else:
         yield slot, value

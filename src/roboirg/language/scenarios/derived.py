@@ -34,8 +34,7 @@ def derivations_of(request: InstructionRequest) -> Iterator[Offer]:
     for value in (*request.values_of("visit"), *request.values_of("placement")):
         yield from _stepped(request, value, "number deduction", derivations.COUNTED_STEPS)
         yield from _stepped(request, value, "sequential relation", derivations.STEPS)
-    yield from _excluded(request)
-    yield from _second(request)
+    yield from _colored(request)
     yield from _other(request)
 
 
@@ -66,22 +65,15 @@ def _counted(value: GoalValue, reference: int, offset: int) -> Values:
     return {"reference": (IntroducedValue(REFERENCE, value.slot_type, reference),), **step}
 
 
-def _excluded(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield the color that is left without others."""
-    colors = request.color_values
-    if request.values_of("amount") or len(colors) != 1:
-        return
-    excluded = tuple(IntroducedValue(REFERENCE, "color", one) for one in excluded_colors(request))
-    yield _derived("color exclusion", [colors[0].field], {"excluded": excluded})
-
-
-def _second(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield two colors in an order that is drawn, and the first one again: then the other one."""
-    colors = request.color_values
-    if request.values_of("amount") or len(colors) != PAIR:
-        return
-    both = [named(one) for one in colors]
-    yield _one_of(request, both, both[0], [one.field for one in colors], colors[0].slot)
+def _colored(request: InstructionRequest) -> Iterator[Offer]:
+    """Yield the color that is left without others; of two colors that one is the other one."""
+    colors = request.values_of("color")
+    if len(colors) == 1:
+        excluded = [IntroducedValue(REFERENCE, "color", one) for one in excluded_colors(request)]
+        yield _derived("color exclusion", [colors[0].field], {"excluded": tuple(excluded)})
+    if len(colors) == PAIR:
+        both = [named(one) for one in colors]
+        yield _one_of(request, both, both[0], [one.field for one in colors], colors[0].slot)
 
 
 def _other(request: InstructionRequest) -> Iterator[Offer]:
