@@ -159,12 +159,11 @@ def _lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
 def _list(request: InstructionRequest, scenario: Scenario) -> Sequence[IntroducedValue]:
     """Draw the goal's values among others, in any order."""
     slot = scenario.fields.list
-    own, others = _of_slot(request, slot), _others(request, slot)
+    own, others = goal_values(request)[slot], _others(request, slot)
     size = request.sampler.pick("list length", _lengths(request, scenario))
     left = list(itertools.permutations(others, size - len(own)))
-    values = [named(one) for one in own]
     drawn = request.sampler.pick("listed others", left)
-    values += [IntroducedValue(REFERENCE, own[0].slot_type, one) for one in drawn]
+    values = [*own, *(IntroducedValue(REFERENCE, own[0].kind, one) for one in drawn)]
     return request.sampler.pick("list order", list(itertools.permutations(values)))
 
 
