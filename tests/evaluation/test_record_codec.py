@@ -17,6 +17,7 @@ from roboirg.evaluation.records.store import (
     RecordStore,
     StoredRun,
     read_records,
+    read_results,
 )
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
@@ -43,7 +44,7 @@ def test_a_damaged_line_loses_only_its_episode(tmp_path: Path) -> None:
 
 def test_results_are_records_without_the_course(tmp_path: Path) -> None:
     run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
-    records, results = read_records(tmp_path), StoredRun(tmp_path, read_summary).newest
+    records, results = read_records(tmp_path), read_results(tmp_path)
     for record, result in zip(records, results, strict=True):
         named = {name: getattr(record, name) for name in Summary.__struct_fields__}
         assert msgspec.structs.asdict(result) == named

@@ -13,8 +13,8 @@ from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.records.record import Job, Record
-from roboirg.evaluation.records.record_codec import StoreError, read_summary
-from roboirg.evaluation.records.store import RecordStore, StoredRun, read_records
+from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.store import RecordStore, read_records, read_results
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
 from roboirg.policies import make_policy
@@ -68,7 +68,7 @@ def test_errors_before_the_server_told_its_version_do_not_count(tmp_path: Path) 
     plan = plan_of(3, tries=1)
     run_plan(plan, tmp_path, Told("refused", "a", "refused"), InProcess())
     assert versions(tmp_path) == ["a"] * 3
-    frame = make_frame([("run", StoredRun(tmp_path, read_summary).newest)])
+    frame = make_frame([("run", read_results(tmp_path))])
     assert list(frame.names.values()) == ["random"]
     (cell,) = cells_of(frame).values()
     assert (len(cell.verdicts), cell.errors) == (1, 2)
@@ -80,7 +80,7 @@ def test_runs_of_two_versions_are_not_averaged(tmp_path: Path) -> None:
         with RecordStore(tmp_path / name) as store:
             store.append(Told(name)(job))
     runs = [tmp_path / "a", tmp_path / "b"]
-    results = [(folder.name, StoredRun(folder, read_summary).newest) for folder in runs]
+    results = [(folder.name, read_results(folder)) for folder in runs]
     found = make_frame(results).names.values()
     assert {label.partition(" (server")[2] for label in found} == {" a)", " b)"}
 

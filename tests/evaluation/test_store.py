@@ -21,15 +21,15 @@ from msgspec.structs import replace
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.records.line_file import LOCK_FILE
 from roboirg.evaluation.records.record import EventRecord, Record
-from roboirg.evaluation.records.record_codec import StoreError, encode, identity_key, read_summary
+from roboirg.evaluation.records.record_codec import StoreError, encode, identity_key
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     TORN_FILE,
     RecordStore,
-    StoredRun,
     iterate_records,
     read_index,
     read_records,
+    read_results,
 )
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
@@ -180,7 +180,7 @@ def test_a_line_that_is_no_record_is_told_with_its_number(
     tmp_path: Path, line: bytes, sentence: str
 ) -> None:
     (tmp_path / RECORDS_FILE).write_bytes(line + b"\n")
-    for read in (read_records, lambda run: StoredRun(run, read_summary), read_index):
+    for read in (read_records, read_results, read_index):
         with pytest.raises(StoreError, match=sentence):
             read(tmp_path)
 

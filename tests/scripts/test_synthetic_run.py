@@ -12,8 +12,7 @@ from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.plan.stored_plans import read_plan
-from roboirg.evaluation.records.record_codec import read_summary
-from roboirg.evaluation.records.store import StoredRun, read_records
+from roboirg.evaluation.records.store import read_records, read_results
 
 pytest.importorskip("jinja2")
 
@@ -32,7 +31,7 @@ def test_parts_of_records_give_the_cells_of_whole_records(run: Path) -> None:
     assert plan is not None
     whole, parts = (
         cells_of(make_frame([("", records)], plan.jobs()))
-        for records in (read_records(run), StoredRun(run, read_summary).newest)
+        for records in (read_records(run), read_results(run))
     )
     assert list(whole.items()) == list(parts.items())
 

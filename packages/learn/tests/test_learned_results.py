@@ -6,8 +6,7 @@ import write_learned_table as tables
 from played_again import assert_holds_here
 
 from roboirg.evaluation.records.packs import opened_run
-from roboirg.evaluation.records.record_codec import read_summary
-from roboirg.evaluation.records.store import StoredRun
+from roboirg.evaluation.records.store import read_results
 from roboirg.language.settings import EXPLICIT, plain_settings, settings_of
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
@@ -92,7 +91,7 @@ def test_the_page_has_what_policies_of_one_task_and_act_solve():
     won = {}
     for pack in (PICKXTIMES, ACT):
         with opened_run(pack) as run:
-            for one in StoredRun(run, read_summary).newest:
+            for one in read_results(run):
                 won.setdefault(one.policy, []).append(one.outcome == "success")
     act, act20 = (won.pop(row) for row in ROWS)
     solved = [won[name] for name in sorted(won)]

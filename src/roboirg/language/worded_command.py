@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from roboirg.core.episode import Goal, SlotValue
+from roboirg.core.episode import Goal, SlotValue, values_in
 
 ROBOMME_NAME = "robomme"
 """Name of the wordings with RoboMME's sentences, before the @ of their identity."""
@@ -208,12 +208,9 @@ def goal_fields(goal: Goal) -> dict[str, str]:
 
 def fields_of(goal: Goal, slot: str) -> Iterator[tuple[str, str | int]]:
     """Yield the value of each field for a slot, with an index if the slot has several."""
-    value = goal[slot]
-    if isinstance(value, tuple):
-        for at, one in enumerate(value):
-            yield f"{slot}.{at}", one
-    else:
-        yield slot, value
+    several = isinstance(goal[slot], tuple)
+    for at, one in enumerate(values_in(goal[slot])):
+        yield f"{slot}.{at}" if several else slot, one
 
 
 def _slots_of(name: str) -> set[str]:

@@ -13,8 +13,8 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.paper_tables import make_table
-from roboirg.evaluation.records.record_codec import encode, read_record, read_summary
-from roboirg.evaluation.records.store import RecordStore, StoredRun, read_records
+from roboirg.evaluation.records.record_codec import encode, read_record
+from roboirg.evaluation.records.store import RecordStore, read_records, read_results
 
 
 def read(plan, folder):
@@ -49,9 +49,7 @@ def test_a_score_is_a_record_like_any_other(small):
     assert dropped.plan == plan.fingerprint
     # All that reads records reads these.
     assert read_record(encode(dropped), Path(), 1) == dropped
-    table = make_table(
-        "real", RunData(make_frame([("run", StoredRun(folder, read_summary).newest)]))
-    )
+    table = make_table("real", RunData(make_frame([("run", read_results(folder))])))
     assert {row.name for row in table.rows} == {f"{name}, on a robot" for name in plan.policies}
     assert "slipped" in render(read_records(folder))
 

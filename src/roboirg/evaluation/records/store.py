@@ -129,6 +129,15 @@ def read_records(folder: Path) -> tuple[Record, ...]:
     return StoredRun(folder, read_record).newest
 
 
+def read_results(folder: Path) -> tuple[Summary, ...]:
+    """Read the results of a run's folder: like `read_records`, but much faster and smaller.
+
+    Raises:
+        StoreError: there are none, or a line is not a record of this schema version.
+    """
+    return StoredRun(folder, read_summary).newest
+
+
 def iterate_records(folder: Path) -> Iterator[Record]:
     """Yield the records of a run, one after the other; takes no lock, so it may be going on.
 
