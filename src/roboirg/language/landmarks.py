@@ -201,6 +201,7 @@ class _Direction(NamedTuple):
 
 
 def _directions(frame: Frame) -> tuple[_Direction, ...]:
+    # Left and right come first: `_sides` and `_far_sides` take these two.
     if frame == "robot":
         robot, owner = "you", "your"
         left = Ranking(lambda item: item.position.y)
