@@ -35,7 +35,7 @@ from roboirg.policies import play
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
 from roboirg.simulation.motion_player import shuttle_position
 from roboirg.tasks import find_tasks
-from roboirg.tasks.splits.published_episodes import is_published
+from roboirg.tasks.splits.published_episodes import published_episode
 from roboirg.tasks.splits.splits import get_episode, split_episodes
 from roboirg.util.parallel_map import parallel_map
 
@@ -237,7 +237,7 @@ def main() -> int:
         find_tasks(parse_names("task", options.tasks)), parse_splits(options.split)
     )
     slots: list[Slot] = [(one.task, one.split, one.index) for one in episodes]
-    slots = [slot for slot in slots if is_published(*slot)]
+    slots = [slot for slot in slots if published_episode(*slot)]
     found = dict(parallel_map(compare, slots, options.workers))
     found = {slot: found[slot] for slot in slots}
     console = Console(width=150)

@@ -18,7 +18,7 @@ from roboirg.language import find_refusals
 from roboirg.language.settings import ACCEPTANCE_SETTINGS
 from roboirg.policies import make_policy, play
 from roboirg.tasks import every_task, get_task
-from roboirg.tasks.splits.published_episodes import is_published
+from roboirg.tasks.splits.published_episodes import published_episode
 from roboirg.tasks.splits.splits import (
     MAX_REJECTED,
     SIZES,
@@ -88,7 +88,7 @@ def episode_slots(
         for task in tasks
         for split in splits
         for index in range(SIZES[split])
-        if not is_published(task, split, index)
+        if published_episode(task, split, index) is None
     )
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from roboirg.core.errors import InvalidActionError, UnknownNameError
+from roboirg.core.errors import InvalidActionError, check_names
 
 ARM_JOINTS = 7
 POSE_SIZE = 6
@@ -95,9 +95,8 @@ def choice_action(label: str, point: tuple[float, float] | None = None) -> NDArr
 
 def find_action_space(name: object) -> ActionSpace:
     """Return the action space of that name."""
-    if not isinstance(name, str) or name not in ACTION_SPACES:
-        raise UnknownNameError("action space", name, ACTION_SPACES)
-    return ACTION_SPACES[name]
+    check_names("action space", [name], ACTION_SPACES)
+    return ACTION_SPACES[str(name)]
 
 
 def check_action(action: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray[np.float64]:

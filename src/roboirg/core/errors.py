@@ -72,10 +72,8 @@ def known_name(kind: str, name: str, known: Sequence[Name]) -> Name:
     Raises:
         UnknownNameError: it is not.
     """
-    for one in known:
-        if name == one:
-            return one
-    raise UnknownNameError(kind, name, known)
+    check_names(kind, [name], known)
+    return known[known.index(name)]
 
 
 class InvalidActionError(RoboIRGError, ValueError):

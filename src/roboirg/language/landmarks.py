@@ -201,6 +201,7 @@ class _Direction(NamedTuple):
 
 
 def _directions(frame: Frame) -> tuple[_Direction, ...]:
+    # Left and right come first: `_sides` and `_far_sides` take these two.
     if frame == "robot":
         robot, owner = "you", "your"
         left = Ranking(lambda item: item.position.y)
@@ -237,12 +238,11 @@ def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sel
 
 
 def _sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    left, right = (direction.ranking for direction in _directions(frame) if direction.sided)
     owner = "your" if frame == "robot" else "the camera's"
-    for side, ranking in (("left", left), ("right", right)):
+    for side, direction in zip(("left", "right"), _directions(frame), strict=False):
         yield Selector(
             Landmark(f"on {owner} {side}", LandmarkClass.EXTREME, sided=True),
-            (ranking,),
+            (direction.ranking,),
             candidates,
         )
 
@@ -251,11 +251,10 @@ def _far_sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Se
     """Yield *at your far right*, where the side and the far corner mean the same object."""
     if frame != "robot":
         return
-    left, right = (direction.ranking for direction in _directions(frame) if direction.sided)
-    for side, ranking in (("left", left), ("right", right)):
-        corners = tuple(_nearness((area["far"], area[side])) for area in (WORK_AREA, TABLE))
+    for side, direction in zip(("left", "right"), _directions(frame), strict=False):
+        corners = tuple(nearness((area["far"], area[side])) for area in (WORK_AREA, TABLE))
         landmark = Landmark(f"at your far {side}", LandmarkClass.EXTREME, sided=True)
-        yield Selector(landmark, (ranking, *corners), candidates)
+        yield Selector(landmark, (direction.ranking, *corners), candidates)
 
 
 def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
@@ -268,7 +267,7 @@ def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sele
                 phrase = f"closest to the camera's {side} corner {reach} the robot"
                 y = mirrored
             corners = [(area[depth], area[y]) for area in (WORK_AREA, TABLE)]
-            rankings = tuple(_nearness(corner) for corner in corners)
+            rankings = tuple(nearness(corner) for corner in corners)
             yield Selector(Landmark(phrase, LandmarkClass.CORNER, sided=True), rankings, candidates)
 
 
@@ -293,13 +292,12 @@ def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Sel
         if len(fixtures) != 1:
             continue
         away = _distance(fixtures[0].position)
-        near = Landmark(f"closest to the {kind}", LandmarkClass.FIXTURE)
-        yield Selector(near, (Ranking(_negated(away)),), candidates)
-        yield Selector(
-            Landmark(f"farthest from the {kind}", LandmarkClass.FIXTURE),
-            (Ranking(away),),
-            candidates,
-        )
+        for words, ranking in (
+            ("closest to", Ranking(_negated(away))),
+            ("farthest from", Ranking(away)),
+        ):
+            landmark = Landmark(f"{words} the {kind}", LandmarkClass.FIXTURE)
+            yield Selector(landmark, (ranking,), candidates)
 
 
 def _fixture_ranks(
@@ -320,7 +318,7 @@ def _other_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
         if anchor.color is None or len(like) != 1:
             continue
         landmark = Landmark(f"closest to the {anchor.color} cube", LandmarkClass.OTHER_COLOR)
-        yield Selector(landmark, (_nearness(anchor.position),), _without(candidates, anchor))
+        yield Selector(landmark, (nearness(anchor.position),), _without(candidates, anchor))
 
 
 def _chains(
@@ -341,7 +339,7 @@ def _chains(
         nearest = f"{ORDINALS[rank]} nearest" if rank else "nearest"
         phrase = f"{nearest} to the {thing.removeprefix('hidden_')} {selector.landmark.phrase}"
         landmark = Landmark(phrase, kind, selector.landmark.sided)
-        yield Selector(landmark, (_nearness(anchor.position),), others, rank)
+        yield Selector(landmark, (nearness(anchor.position),), others, rank)
 
 
 def _members(
@@ -373,7 +371,8 @@ def _without(candidates: Sequence[SceneObject], anchor: SceneObject) -> tuple[Sc
     return tuple(item for item in candidates if item is not anchor)
 
 
-def _nearness(place: Sequence[float]) -> Ranking:
+def nearness(place: Sequence[float]) -> Ranking:
+    """Return the order by the distance from a place, the nearest first."""
     return Ranking(_negated(_distance(place)))
 
 

@@ -82,13 +82,13 @@ def swap_particles(phrase: Phrase) -> Phrase:
     return tuple(pieces)
 
 
-def listed(phrases: Sequence[Phrase]) -> Phrase:
-    """Join phrases into a list: ``a``, ``a and b``, ``a, b and c``."""
+def listed(phrases: Sequence[Phrase], joint: str = "and") -> Phrase:
+    """Join phrases into a list: ``a``, ``a and b``, ``a, b and c``; *nor* joins all of them."""
     pieces: list[TaggedText] = []
     for position, phrase in enumerate(phrases):
         if position:
             last = position == len(phrases) - 1
-            pieces.append(TaggedText(" and " if last else ", "))
+            pieces.append(TaggedText(f" {joint} " if last or joint == "nor" else ", "))
         pieces.extend(phrase)
     return tuple(pieces)
 

@@ -21,7 +21,13 @@ from roboirg.language.instruction import Expression, UtteranceStage
 from roboirg.language.landmarks import Frame
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, swap_particles
 from roboirg.language.template_sampler import TemplateSampler
-from roboirg.language.worded_command import StatedPhrase, TaskWordings, WordedCommand, goal_fields
+from roboirg.language.worded_command import (
+    StatedPhrase,
+    TaskWordings,
+    WordedCommand,
+    fields_of,
+    goal_fields,
+)
 from roboirg.tasks import Task, get_task
 
 Distractor = Literal["neutral", "competing"]
@@ -65,6 +71,10 @@ class GoalValue(NamedTuple):
     def number(self) -> int:
         """The value, if it is a number."""
         return int(self.value)
+
+
+GoalValues = tuple[GoalValue, ...]
+"""Values of one type, or all of a goal, in the order of its slots."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,16 +128,16 @@ class InstructionRequest:
         return cast("Frame", self.options.frame)
 
     @property
-    def goal_values(self) -> tuple[GoalValue, ...]:
+    def goal_values(self) -> GoalValues:
         """The values of the goal, in the order of its slots."""
         return _goal_values(self.episode.goal)
 
-    def values_of(self, slot_type: SlotTypeName) -> tuple[GoalValue, ...]:
+    def values_of(self, slot_type: SlotTypeName) -> GoalValues:
         """Return the goal values of one slot type."""
         return tuple(one for one in self.goal_values if one.slot_type == slot_type)
 
     @property
-    def color_values(self) -> tuple[GoalValue, ...]:
+    def color_values(self) -> GoalValues:
         """The goal values that are colors, counted or not."""
         return tuple(one for one in self.goal_values if one.slot in COLOR_SLOTS)
 
@@ -321,19 +331,12 @@ class InstructionSpec:
 
 # Cached: all settings and forms of an episode ask for the same.
 @functools.lru_cache(maxsize=256)
-def _goal_values(goal: Goal) -> tuple[GoalValue, ...]:
+def _goal_values(goal: Goal) -> GoalValues:
     found: list[GoalValue] = []
     counted = "counts" in dict(goal.slots)
-    for slot, content in goal.slots:
+    for slot, _ in goal.slots:
         slot_type = "amount" if counted and slot in COLOR_SLOTS else SLOT_TYPE_NAMES[slot]
-        if isinstance(content, tuple):
-            several: tuple[str | int, ...] = content
-            found += [
-                GoalValue(f"{slot}.{index}", slot, slot_type, value)
-                for index, value in enumerate(several)
-            ]
-        else:
-            found.append(GoalValue(slot, slot, slot_type, content))
+        found += [GoalValue(name, slot, slot_type, value) for name, value in fields_of(goal, slot)]
     return tuple(found)
 
 
@@ -349,12 +352,11 @@ def _alternatives(
 
 @functools.lru_cache(maxsize=64)
 def _scene_colors(task: str, scene: Scene) -> tuple[str, ...]:
-    goals = [dict(one.slots) for one in get_task(task).goals(scene)]
     found = {
         color
-        for goal in goals
-        for slot in COLOR_SLOTS
-        if slot in goal
-        for color in values_in(goal[slot])
+        for goal in get_task(task).goals(scene)
+        for slot, content in goal.slots
+        if slot in COLOR_SLOTS
+        for color in values_in(content)
     }
     return tuple(color for color in get_task(task).commands.colors if color in found)

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from roboirg.core.episode import Goal, SlotValue
+from roboirg.core.episode import Goal, SlotValue, values_in
 
 ROBOMME_NAME = "robomme"
 """Name of the wordings with RoboMME's sentences, before the @ of their identity."""
@@ -203,16 +203,14 @@ def goal_fields(goal: Goal) -> dict[str, str]:
     if "counts" in slots:
         pairs = zip(goal.texts("colors"), goal.numbers("counts"), strict=True)
         return {f"cubes.{at}": f"{count} {color}" for at, (color, count) in enumerate(pairs)}
-    return {name: str(value) for slot in slots for name, value in _fields_of(goal, slot)}
+    return {name: str(value) for slot in slots for name, value in fields_of(goal, slot)}
 
 
-def _fields_of(goal: Goal, slot: str) -> Iterator[tuple[str, str | int]]:
-    value = goal[slot]
-    if isinstance(value, tuple):
-        for at, one in enumerate(goal.texts(slot)):
-            yield f"{slot}.{at}", one
-    else:
-        yield slot, value
+def fields_of(goal: Goal, slot: str) -> Iterator[tuple[str, str | int]]:
+    """Yield the value of each field for a slot, with an index if the slot has several."""
+    several = isinstance(goal[slot], tuple)
+    for at, one in enumerate(values_in(goal[slot])):
+        yield f"{slot}.{at}" if several else slot, one
 
 
 def _slots_of(name: str) -> set[str]:

@@ -51,12 +51,12 @@ _NEITHER = Phrases({
     "the cube that is neither closest to you nor closest to the button":
         rf"the {_NOUN} {_WHEN}neither ",
 })  # fmt: skip
-_NOR = Phrases({"nor closest to the button": "n?or "})
+_NOR = Phrases({"you nor closest to the button": " n?or "})
 _ONLY_NOT = Phrases({
     "the only cube that is not closest to you or closest to the button":
         rf"the only {_NOUN} {_WHEN}not ",
 })  # fmt: skip
-_OR = Phrases({"or closest to the button": "or "})
+_OR = Phrases({"you or closest to the button": " or "})
 _MOVES = Phrases({
     "the container that never moved":
         "the container that (?:(?P<still>never move[sd]|stay(?:s|ed) where it (?:is|was))"
@@ -77,24 +77,25 @@ def with_remaining(sentences: Sequence[str]) -> list[str]:
         aside = _SET_ASIDE.search(found[-1]) if found else None
         remaining = _REMAINING.search(text)
         if aside is not None and remaining is not None:
-            places = _two_places(found[-1], aside.end())
-            if places is not None:
+            read = _two_places(found[-1], aside.end(), _AND_ONE)
+            if read is not None:
+                words = [found[-1][start:end] for _, start, end in read]
                 when = aside["when"] or "that is "
-                meant = f"the {aside['noun']} {when}neither {places[0]} nor {places[1]}"
+                meant = f"the {aside['noun']} {when}neither {words[0]} nor {words[1]}"
                 found[-1] = f"{text[: remaining.start()]}{meant}{text[remaining.end() :]}"
                 continue
         found.append(text)
     return found
 
 
-def _two_places(text: str, start: int) -> tuple[str, str] | None:
-    """Return the words for the places of two things."""
+def _two_places(text: str, start: int, joint: Phrases) -> list[tuple[Place, int, int]] | None:
+    """Return two places with joining words between, each with where its words begin and end."""
     first = _place(text, start)
-    joint = _AND_ONE.match(text, first[1]) if first else None
-    second = _place(text, joint.end()) if joint else None
-    if first is None or joint is None or second is None:
+    then = joint.match(text, first[1]) if first else None
+    second = _place(text, then.end()) if then else None
+    if first is None or then is None or second is None:
         return None
-    return text[start : first[1]], text[joint.end() : second[1]]
+    return [(first[0], start, first[1]), (second[0], then.end(), second[1])]
 
 
 def observed_thing(text: str, scene: Scene) -> Iterator[Span]:
@@ -150,18 +151,14 @@ def _neighbors(text: str, scene: Scene) -> Iterator[Span]:
 def _left_over(text: str, scene: Scene, start: Phrases, joint: Phrases) -> Iterator[Span]:
     """Yield the words for what is left without two other things."""
     for found in start.finditer(text):
-        first = _place(text, found.end())
-        then = joint.match(text, first[1] + 1) if first else None
-        second = _place(text, then.end()) if then else None
-        if first is None or second is None:
+        read = _two_places(text, found.end(), joint)
+        if read is None:
             continue
         left: list[SceneObject] = []
         for at_time in _scenes(scene, found["noun"], found["when"]):
-            gone = {
-                item for place, _ in (first, second) for item in _at(place, at_time, found["noun"])
-            }
+            gone = {item for place, *_ in read for item in _at(place, at_time, found["noun"])}
             left += [item for item in present(at_time, found["noun"]) if item not in gone]
-        yield found.start(), second[1], _named(left, scene, found["noun"])
+        yield found.start(), read[1][2], _named(left, scene, found["noun"])
 
 
 def _moving(text: str, scene: Scene) -> Iterator[Span]:

@@ -224,17 +224,13 @@ def unsettled_choice(
             # The latter of a list is its last; but after a pair, a third value is none of it.
             if len(getattr(before, kind)) > max(2, most):
                 return "before the command there are more than two values of which to choose one"
-    if context.selected and not pair and _introduces(context):
+    introduced = context.colors or context.places or context.positions or context.moments
+    if context.selected and not pair and introduced:
         return "nothing before the command introduces two values of which to choose one"
     named_again = context.preferred_color or context.preferred_moment or context.preferred_position
     if not context.selected and pair and not named_again and CHOSEN.search(command):
         return "nothing before the command says which of two values is meant"
     return ""
-
-
-def _introduces(context: DiscourseContext) -> bool:
-    """Return whether something is introduced of which a remark may choose."""
-    return bool(context.colors or context.places or context.positions or context.moments)
 
 
 def _reordered(pair: tuple[Value, ...], index: int) -> tuple[Value, ...]:

@@ -20,7 +20,7 @@ from sapien.wrapper.articulation_builder import ArticulationBuilder
 
 from roboirg.core import object_sizes
 from roboirg.core.episode import ObjectKind, SceneObject
-from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.motions import Point
 from roboirg.simulation.rendering.tube_mesh import Rgba, tube
 
@@ -109,10 +109,8 @@ BodyBuilder = Callable[[sapien.Scene, SceneObject, bool], Body]
 
 def build(scene: sapien.Scene, item: SceneObject, *, visible: bool) -> Body:
     """Add an object to a scene, with or without its visual shapes."""
-    builder = BODY_BUILDERS.get(item.kind)
-    if builder is None:
-        raise UnknownNameError("kind of object", item.kind, BODY_BUILDERS)
-    return builder(scene, item, visible)
+    check_names("kind of object", [item.kind], BODY_BUILDERS)
+    return BODY_BUILDERS[item.kind](scene, item, visible)
 
 
 def register_body_builder(kind: ObjectKind, builder: BodyBuilder) -> None:

@@ -7,6 +7,8 @@ Facts: RoboMME.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
@@ -30,25 +32,35 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     return (press_stage(), *unmask.pick_stages(scene, goal))
 
 
-COMMANDS = unmask.seen_commands(
-    Pools(
-        train=(
-            Wording("Press the button, then lift {colors.0}."),
-            Wording("Press the button and lift {colors.0}."),
-            Wording("First press the button, then lift {colors.0}."),
-            Wording("Press the button, lift {colors.0}, put it down, then lift {colors.1}.", 2),
-            Wording("Press the button, lift {colors.0}, set it down, and lift {colors.1}.", 2),
-            Wording("Press the button, lift {colors.0}, put it back, then lift {colors.1}.", 2),
-        ),
-        test=(
-            Wording("Push the button, then raise {colors.0}."),
-            Wording("Push the button and pick up {colors.0}."),
-            Wording("Start by pushing the button, then raise {colors.0}."),
-            Wording("Push the button, raise {colors.0}, put it back, then raise {colors.1}.", 2),
-            Wording("Push the button, pick up {colors.0}, put it back and pick up {colors.1}.", 2),
-            Wording("Push the button, raise {colors.0}, set it back, and raise {colors.1}.", 2),
-        ),
-    )
+COMMANDS = replace(
+    unmask.container_commands(
+        Pools(
+            train=(
+                Wording("Press the button, then lift {colors.0}."),
+                Wording("Press the button and lift {colors.0}."),
+                Wording("First press the button, then lift {colors.0}."),
+                Wording("Press the button, lift {colors.0}, put it down, then lift {colors.1}.", 2),
+                Wording("Press the button, lift {colors.0}, set it down, and lift {colors.1}.", 2),
+                Wording("Press the button, lift {colors.0}, put it back, then lift {colors.1}.", 2),
+            ),
+            test=(
+                Wording("Push the button, then raise {colors.0}."),
+                Wording("Push the button and pick up {colors.0}."),
+                Wording("Start by pushing the button, then raise {colors.0}."),
+                Wording(
+                    "Push the button, raise {colors.0}, put it back, then raise {colors.1}.", 2
+                ),
+                Wording(
+                    "Push the button, pick up {colors.0}, put it back and pick up {colors.1}.", 2
+                ),
+                Wording("Push the button, raise {colors.0}, set it back, and raise {colors.1}.", 2),
+            ),
+        )
+    ),
+    # Only the cubes are there when the words are said.
+    by_place="the container over the cube {place}",
+    pointed="hidden_cube",
+    things_at="the cube {place}",
 )
 
 TASK = Task(

@@ -64,7 +64,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 COMMANDS = replace(
-    unmask.seen_commands(
+    unmask.container_commands(
         Pools(
             train=(
                 Wording("Press both buttons, then lift {colors.0}."),
@@ -97,6 +97,8 @@ COMMANDS = replace(
         )
     ),
     by_place="the container over the cube {place} now",
+    # Only the cubes are there when the words are said.
+    pointed="hidden_cube",
     things_at="the cube {place} now",
 )
 

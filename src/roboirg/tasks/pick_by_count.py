@@ -14,9 +14,9 @@ from roboirg.core.conditions import Elapsed, Fact, Rule
 from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stage
 from roboirg.core.footprints import Circle, Footprint, Region
 from roboirg.core.word_pools import Pools
-from roboirg.tasks.shared.fixtures import ORDINALS, counted_goals, draw_number, draw_target
+from roboirg.tasks.shared.fixtures import counted_goals, draw_number, draw_target
 from roboirg.tasks.shared.real_table import draw_sides, draw_tape, on_side
-from roboirg.tasks.shared.stages import pick_stage, place_stage
+from roboirg.tasks.shared.stages import placing_stages
 from roboirg.tasks.task import Commands, Task, Wording
 
 TAPES: tuple[Color, ...] = ("yellow", "gray")
@@ -63,11 +63,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
         if item.name != tape
     )
     again = Rule(Fact("picked", tape), f"picked up the {color} tape again", failure="wrong_count")
-    plan: list[Stage] = []
-    for ordinal in ORDINALS[: goal.number("repeats")]:
-        pick = f"pick up the {color} tape {{at}} for the {ordinal} time"
-        put = f"place the {color} tape onto the target {{at}}"
-        plan += [pick_stage(tape, pick, wrong), place_stage(tape, "target", put, wrong)]
+    plan = placing_stages("tape", color, goal.number("repeats"), wrong)
     leave = Stage(
         expects=Elapsed(WAIT_STEPS, timer="left alone"),
         forbids=(again, *wrong),

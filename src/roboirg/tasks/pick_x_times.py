@@ -12,19 +12,15 @@ import numpy as np
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
-from roboirg.core.footprints import Obstacle, Region
+from roboirg.core.footprints import Region
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
-    ORDINALS,
-    button_keep_out,
     counted_goals,
-    cube_obstacle,
-    draw_button,
-    draw_colored_cubes,
+    draw_button_and_cubes,
     draw_number,
     draw_target,
 )
-from roboirg.tasks.shared.stages import PRESSED, pick_stage, place_stage, press_stage
+from roboirg.tasks.shared.stages import PRESSED, placing_stages, press_stage
 from roboirg.tasks.task import Commands, Task, Wording
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
@@ -41,10 +37,9 @@ TARGET_GAP = 0.04
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
     """Draw button, cubes of different colors, target disc; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
-    button = draw_button(rng, BUTTON_REGION)
-    obstacles: list[Obstacle] = [button_keep_out(button)]
-    cubes = draw_colored_cubes(rng, CUBES[difficulty], WORK_REGION, CUBE_GAP, obstacles)
-    obstacles += [cube_obstacle(cube) for cube in cubes]
+    button, cubes, obstacles = draw_button_and_cubes(
+        rng, BUTTON_REGION, CUBES[difficulty], WORK_REGION, CUBE_GAP
+    )
     target = draw_target(rng, "target", TARGET_RADIUS, WORK_REGION, TARGET_GAP, obstacles)
     chosen = cubes[int(rng.integers(len(cubes)))]
     goal = Goal.of(color=str(chosen.color), repeats=repeats)
@@ -58,11 +53,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     cubes = tuple(item.name for item in scene.of_kind("cube"))
     wrong_cubes = (Fact("picked", other) for other in cubes if other != cube)
     wrong = (*wrong_cubes, PRESSED)
-    plan: list[Stage] = []
-    for ordinal in ORDINALS[: goal.number("repeats")]:
-        pick = f"pick up the {color} cube {{at}} for the {ordinal} time"
-        put = f"place the {color} cube onto the target {{at}}"
-        plan += [pick_stage(cube, pick, wrong), place_stage(cube, "target", put, wrong)]
+    plan = placing_stages("cube", color, goal.number("repeats"), wrong)
     picks = tuple(Fact("picked", any_cube) for any_cube in cubes)
     return (*plan, press_stage("press the button {at} to stop", picks))
 

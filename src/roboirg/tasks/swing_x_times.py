@@ -13,16 +13,13 @@ import numpy as np
 
 from roboirg.core.conditions import Fact, OccurrenceCount, Rule
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
-from roboirg.core.footprints import Circle, Obstacle, Region
+from roboirg.core.footprints import Circle, Region
 from roboirg.core.motions import Glow
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
-    button_keep_out,
     counted_goals,
-    cube_obstacle,
-    draw_button,
-    draw_colored_cubes,
+    draw_button_and_cubes,
     draw_number,
     draw_target,
     marker_over,
@@ -52,10 +49,9 @@ LINGER = 20
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
     """Draw button, cubes and a target on either side; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
-    button = draw_button(rng, BUTTON_REGION)
-    obstacles: list[Obstacle] = [button_keep_out(button)]
-    cubes = draw_colored_cubes(rng, CUBES[difficulty], CUBE_REGION, CUBE_GAP, obstacles)
-    obstacles += [cube_obstacle(cube) for cube in cubes]
+    button, cubes, obstacles = draw_button_and_cubes(
+        rng, BUTTON_REGION, CUBES[difficulty], CUBE_REGION, CUBE_GAP
+    )
     targets: list[SceneObject] = []
     for side, region in SIDES.items():
         name = f"target_{side}"

@@ -21,7 +21,7 @@ def demonstration(_scene: Scene) -> tuple[Stage, ...]:
     return (hold_still(HOLD_STEPS),)
 
 
-COMMANDS = unmask.hidden_commands(
+COMMANDS = unmask.container_commands(
     Pools(
         train=(
             Wording("Think back to the video and lift {colors.0}."),

@@ -31,7 +31,7 @@ def demonstration(scene: Scene) -> tuple[Stage, ...]:
 
 
 COMMANDS = replace(
-    unmask.hidden_commands(
+    unmask.container_commands(
         Pools(
             train=(
                 Wording("Think back to the video and lift {colors.0}."),

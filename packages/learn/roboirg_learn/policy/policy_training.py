@@ -267,12 +267,7 @@ def _lessons(
         for one in recorded
     }
     episodes = [one.episode for one in recorded]
-    told = [
-        (episode, text)
-        for episode, text in said(
-            episodes, plan.settings, plan.words, plan.goals, plan.seed, plan.language
-        )
-    ]
+    told = list(said(episodes, plan.settings, plan.words, plan.goals, plan.seed, plan.language))
     if not plan.settings:
         told = [(episode, "") for episode in episodes]
     vocabulary = make_vocabulary((text for _, text in told), sight.classes, plan.tasks)

@@ -40,7 +40,7 @@ from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.subgoal_text import split_point
 from roboirg.envs.factory import make
 from roboirg.policies.contract.base import Policy, close_policy
-from roboirg.policies.contract.play import EpisodeLoop
+from roboirg.policies.contract.play import EpisodeLoop, Moment
 from roboirg.util.atomic_write import replacing
 from roboirg.util.media import PICTURE_SIZE, Pixels, scaled_square
 
@@ -231,7 +231,7 @@ class _Recorder(EpisodeLoop):
             pictures |= {f"{name}_depth": cameras.depth(name) for name in CAMERAS}
         self._tracks.add(pictures)
 
-    def begin(self) -> tuple[dict[str, Any], dict[str, Any]]:
+    def begin(self) -> Moment:
         """Start the episode; store the policy's first observation, after a step at home."""
         from roboirg.simulation.physics_settings import HOME_ACTION
 
@@ -247,7 +247,7 @@ class _Recorder(EpisodeLoop):
         except MotionPlanningError as error:
             raise _GivenUpError(str(error)) from error
 
-    def execute(self, actions: ArrayLike) -> tuple[dict[str, Any], dict[str, Any]]:
+    def execute(self, actions: ArrayLike) -> Moment:
         """Execute and store one action after the other."""
         observation: dict[str, Any] = {}
         info: dict[str, Any] = {}

@@ -100,12 +100,8 @@ def check_version(player: PolicyPlayer) -> Iterator[CheckResult]:
 
 
 def check_acting(player: PolicyPlayer) -> Iterator[CheckResult]:
-    """Check shapes, types and ranges of actions without a video."""
+    """Check shapes, types and ranges of actions, without a video and after one."""
     yield from _describe_actions("without a video", player.space, player.first_rollout)
-
-
-def check_acting_after_video(player: PolicyPlayer) -> Iterator[CheckResult]:
-    """Check shapes, types and ranges of actions after a video."""
     yield from _describe_actions("with a video", player.space, player.expected)
 
 

@@ -15,7 +15,6 @@ from roboirg.apps.policy_check.check_result import (
 )
 from roboirg.apps.policy_check.contract_checks import (
     check_acting,
-    check_acting_after_video,
     check_determinism,
     check_loading,
     check_reports,
@@ -39,7 +38,6 @@ CHECKS: tuple[Check, ...] = (
     check_requirements,
     check_version,
     check_acting,
-    check_acting_after_video,
     check_reports,
     check_determinism,
     check_reset,

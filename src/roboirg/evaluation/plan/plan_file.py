@@ -13,7 +13,7 @@ from typing import Any
 import msgspec
 import yaml
 
-from roboirg.core.errors import InvalidValueError, UnknownNameError, check_names
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.evaluation.plan.plan import PLAN_KEYS, Plan, plan_options
 from roboirg.util.discovery import entry_names, entry_points_of, load_entry
 from roboirg.util.regular_file import read_regular
@@ -118,8 +118,7 @@ def _find(name: str) -> Path | Traversable:
     path = Path(name)
     if path.suffix in _SUFFIXES:
         return path
-    if name not in named_plans():
-        raise UnknownNameError("plan", name, [*named_plans(), "FILE.yaml"])
+    check_names("plan", [name], [*named_plans(), "FILE.yaml"])
     others = [
         resources.files(load_entry(one)) for one in entry_points_of(GROUP) if one.name == name
     ]

@@ -26,7 +26,7 @@ from roboirg.evaluation.records.action_log import ActionLog
 from roboirg.evaluation.records.record import Record, SubgoalRecord
 from roboirg.judging import judge_subgoal, plain_subgoal
 from roboirg.policies.contract.base import Policy
-from roboirg.policies.contract.play import EpisodeLoop
+from roboirg.policies.contract.play import EpisodeLoop, Moment
 from roboirg.policies.contract.policy_calls import (
     check_rows,
     policy_metadata,
@@ -98,7 +98,7 @@ class GuardedLoop(EpisodeLoop):
         timed_out, original = info["status"] == "timeout", info.get("original")
         conclude(record, self._prepared, self._start, timed_out=timed_out, original=original)
 
-    def begin(self) -> tuple[dict[str, Any], dict[str, Any]]:
+    def begin(self) -> Moment:
         """Start the episode and the policy."""
         env, record, writer = self.env, self._record, self._writer
         with self._guard.environment("env_reset"):
@@ -206,7 +206,7 @@ class GuardedLoop(EpisodeLoop):
             ),
         )
 
-    def execute(self, actions: ArrayLike) -> tuple[dict[str, Any], dict[str, Any]]:
+    def execute(self, actions: ArrayLike) -> Moment:
         """Execute actions, and keep those that were executed."""
         rows, record = np.asarray(actions), self._record
         with self._guard.environment("env_step"):

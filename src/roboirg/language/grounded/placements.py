@@ -8,8 +8,8 @@ from roboirg.core.episode import SceneObject
 from roboirg.core.motions import Swap
 from roboirg.language.grounded import grounded_templates as templates
 from roboirg.language.grounded.clue import Clue
-from roboirg.language.grounded.things import directed, nearness
-from roboirg.language.landmarks import Ranking
+from roboirg.language.grounded.things import directed
+from roboirg.language.landmarks import Ranking, nearness
 from roboirg.language.request import GoalValue, InstructionRequest
 
 KEPT = {2: (2, 6), 3: (3, 6), 4: (4, 6)}
@@ -44,7 +44,7 @@ def _at(request: InstructionRequest, shown: list[SceneObject], place: int) -> It
         (words, Ranking(directed(axis, sign))) for (axis, sign), words in templates.EXTREMES.items()
     ]
     (button,) = request.episode.scene.of_kind("button")
-    rankings.append(("closest to the button", nearness(button)))
+    rankings.append(("closest to the button", nearness(button.position)))
     for anchor, ranking in rankings:
         if ranking.select(shown, 0) is shown[place]:
             for words in templates.PLACEMENT_AT.of(request.pool):

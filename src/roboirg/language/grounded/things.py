@@ -7,7 +7,6 @@ nothing about the goal's color.
 from __future__ import annotations
 
 import itertools
-import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -17,7 +16,7 @@ from roboirg.core.motions import Away, Swap
 from roboirg.core.word_pools import PoolName
 from roboirg.language.grounded import grounded_templates as templates
 from roboirg.language.grounded.clue import Clue
-from roboirg.language.landmarks import LandmarkClass, Ranking, candidates_in, selectors
+from roboirg.language.landmarks import LandmarkClass, Ranking, candidates_in, nearness, selectors
 from roboirg.language.request import GoalValue, InstructionRequest
 
 AXES = ("x", "y")
@@ -94,7 +93,7 @@ def _places(
         words = templates.NEIGHBORS[rank].of(pool)[form]
         for anchor, other in anchors:
             others = [item for item in things if item is not other]
-            if nearness(other).select(others, rank) in targets:
+            if nearness(other.position).select(others, rank) in targets:
                 found.append(Clue("bridging", words.format(anchor=anchor, **fields)))
     return found + _left_over(things, targets, _anchors(scene, thing), pool, fields)
 
@@ -140,12 +139,6 @@ def _differ(first: str, second: str) -> bool:
     """Return whether two places do not lie along the same line: near and far, left and right."""
     one, other = first.rsplit(maxsplit=1)[-1], second.rsplit(maxsplit=1)[-1]
     return one != other and {one, other} != {"left", "right"}
-
-
-def nearness(anchor: SceneObject) -> Ranking:
-    """Return the order by the distance from a thing, the nearest first."""
-    x, y, _ = anchor.position
-    return Ranking(lambda item: -math.hypot(item.position.x - x, item.position.y - y))
 
 
 def directed(axis: str, sign: int) -> Callable[[SceneObject], float]:

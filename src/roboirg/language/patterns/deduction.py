@@ -10,7 +10,7 @@ from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import cardinal
 from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
-from roboirg.language.request import AMOUNT_FIELD, GoalValue, InstructionRequest
+from roboirg.language.request import AMOUNT_FIELD, GoalValues, InstructionRequest
 from roboirg.language.slot_types import amount
 from roboirg.language.slot_types.number import introduce_quantity
 from roboirg.language.templates import derivations
@@ -113,9 +113,7 @@ def _amounts(request: InstructionRequest) -> Derived:
     return Derived(context, fields, _notes(deduction))
 
 
-def _of_each(
-    request: InstructionRequest, goal_values: tuple[GoalValue, ...], deduction: Deduction
-) -> Phrase:
+def _of_each(request: InstructionRequest, goal_values: GoalValues, deduction: Deduction) -> Phrase:
     """Return ``half as many of each``; resolved, ``of each as six red and four blue cubes``."""
     relation, colors = deduction.relation, amount.all_colors(goal_values)
     if not request.resolved:

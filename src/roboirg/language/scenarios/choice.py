@@ -156,17 +156,15 @@ def _lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
     return [one for one in wanted if meant <= one <= possible]
 
 
-def _list(request: InstructionRequest, scenario: Scenario) -> list[IntroducedValue]:
+def _list(request: InstructionRequest, scenario: Scenario) -> Sequence[IntroducedValue]:
     """Draw the goal's values among others, in any order."""
     slot = scenario.fields.list
-    own, others = _of_slot(request, slot), _others(request, slot)
+    own, others = goal_values(request)[slot], _others(request, slot)
     size = request.sampler.pick("list length", _lengths(request, scenario))
     left = list(itertools.permutations(others, size - len(own)))
-    values = [named(one) for one in own]
     drawn = request.sampler.pick("listed others", left)
-    values += [IntroducedValue(REFERENCE, own[0].slot_type, one) for one in drawn]
-    order = request.sampler.pick("list order", list(itertools.permutations(range(size))))
-    return [values[at] for at in order]
+    values = [*own, *(IntroducedValue(REFERENCE, own[0].kind, one) for one in drawn)]
+    return request.sampler.pick("list order", list(itertools.permutations(values)))
 
 
 def _spatial(request: InstructionRequest) -> Iterator[Offer]:

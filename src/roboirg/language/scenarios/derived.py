@@ -5,6 +5,7 @@ The rules are those of `roboirg.language.patterns`; here they give values instea
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 from roboirg.language.instruction import REFERENCE
@@ -33,8 +34,7 @@ def derivations_of(request: InstructionRequest) -> Iterator[Offer]:
     for value in (*request.values_of("visit"), *request.values_of("placement")):
         yield from _stepped(request, value, "number deduction", derivations.COUNTED_STEPS)
         yield from _stepped(request, value, "sequential relation", derivations.STEPS)
-    yield from _excluded(request)
-    yield from _second(request)
+    yield from _colored(request)
     yield from _other(request)
 
 
@@ -65,25 +65,15 @@ def _counted(value: GoalValue, reference: int, offset: int) -> Values:
     return {"reference": (IntroducedValue(REFERENCE, value.slot_type, reference),), **step}
 
 
-def _excluded(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield the color that is left without others."""
-    colors = request.color_values
-    if request.values_of("amount") or len(colors) != 1:
-        return
-    excluded = tuple(IntroducedValue(REFERENCE, "color", one) for one in excluded_colors(request))
-    yield _derived("color exclusion", [colors[0].field], {"excluded": excluded})
-
-
-def _second(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield two colors in an order that is drawn, and the first one again: then the other one."""
-    colors = request.color_values
-    if request.values_of("amount") or len(colors) != PAIR:
-        return
-    first, second = request.sampler.pick("complement order", ((0, 1), (1, 0)))
-    both = [named(colors[first]), named(colors[second])]
-    values = {**several("list", both), "taken": (named(colors[0]),)}
-    fields = [one.field for one in colors]
-    yield _derived("contextual logic", fields, values, listed=colors[0].slot)
+def _colored(request: InstructionRequest) -> Iterator[Offer]:
+    """Yield the color that is left without others; of two colors that one is the other one."""
+    colors = request.values_of("color")
+    if len(colors) == 1:
+        excluded = [IntroducedValue(REFERENCE, "color", one) for one in excluded_colors(request)]
+        yield _derived("color exclusion", [colors[0].field], {"excluded": tuple(excluded)})
+    if len(colors) == PAIR:
+        both = [named(one) for one in colors]
+        yield _one_of(request, both, both[0], [one.field for one in colors], colors[0].slot)
 
 
 def _other(request: InstructionRequest) -> Iterator[Offer]:
@@ -93,9 +83,20 @@ def _other(request: InstructionRequest) -> Iterator[Offer]:
         of_slot = [pair for pair in pairs if pair.slot == slot]
         pair: ValuePair = request.sampler.pick(f"complement {slot}", of_slot)
         both = [IntroducedValue(REFERENCE, one.slot_type, one.value) for one in pair]
-        first, second = request.sampler.pick("complement order", ((0, 1), (1, 0)))
-        values = {**several("list", (both[first], both[second])), "taken": (both[1],)}
-        yield _derived("contextual logic", [pair.meant.field], values, listed=slot)
+        yield _one_of(request, both, both[1], [pair.meant.field], slot)
+
+
+def _one_of(
+    request: InstructionRequest,
+    both: list[IntroducedValue],
+    taken: IntroducedValue,
+    fields: list[str],
+    slot: str,
+) -> Offer:
+    """Return the offer of two values in an order that is drawn, and of the one that is taken."""
+    order = request.sampler.pick("complement order", list(itertools.permutations(both)))
+    values = {**several("list", order), "taken": (taken,)}
+    return _derived("contextual logic", fields, values, listed=slot)
 
 
 def _derived(

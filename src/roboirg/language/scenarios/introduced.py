@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from roboirg.language.instruction import REFERENCE, Expression
 from roboirg.language.number_words import cardinal, ordinal, plural, times
-from roboirg.language.phrases import Phrase, antecedent, plain
+from roboirg.language.phrases import Phrase, antecedent, listed, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.scenarios.markup import Slot
 from roboirg.language.templates.derivations import MOMENTS
@@ -70,14 +70,12 @@ class Introduced:
         """Return the words for a slot, each value a mention."""
         found = self.values[slot.name]
         joint, form = (slot.form, None) if slot.form in ("or", "nor") else ("and", slot.form)
-        pieces: list[Phrase] = []
-        for at, one in enumerate(found):
-            if at:
-                last = at == len(found) - 1
-                pieces.append(plain(f" {joint} " if last or joint == "nor" else ", "))
-            words = one.said(form)
-            pieces.append(antecedent(words, one.slot, one.value) if one.slot else plain(words))
-        return tuple(piece for phrase in pieces for piece in phrase)
+        said = [(one.said(form), one) for one in found]
+        phrases = [
+            antecedent(words, one.slot, one.value) if one.slot else plain(words)
+            for words, one in said
+        ]
+        return listed(phrases, joint)
 
     def referent(self, name: str) -> tuple[str, str | int]:
         """Return the slot and the value of mentions that point back at a slot."""

@@ -10,7 +10,6 @@ from typing import NamedTuple, cast
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.word_pools import PoolName
 from roboirg.language.instruction import REFERENCE, Expression, UtteranceStage
 from roboirg.language.phrases import (
     Phrase,
@@ -72,7 +71,11 @@ def _choose(request: InstructionRequest) -> _Choice:
         log: list[str] = []
         reason, chosen = all_settings()[name].refusal(request), None
         if reason is None:
-            known = _known(request.task.name, name, request.pool)
+            words = cast("TaskScenarios", task_scenarios(request.task.name))
+            wanted = (name, request.pool)
+            known = [
+                one for one in words.scenarios if (one.fields.setting, one.fields.pool) == wanted
+            ]
             chosen = choose(replace(request, sampler=replace(sampler, log=log)), name, known)
         if chosen is None:
             reason = reason or f"language 4 has no scenario for it in the pool {request.pool}"
@@ -102,13 +105,6 @@ def say(request: InstructionRequest) -> InstructionSpec:
 def in_language_4(name: str) -> Setting:
     """Return a setting that speaks in scenarios."""
     return replace(all_settings()[name], say=say, refusal=refusal)
-
-
-@functools.cache
-def _known(task: str, setting: str, pool: PoolName) -> tuple[Scenario, ...]:
-    """Return the scenarios of a setting in a pool."""
-    every = cast("TaskScenarios", task_scenarios(task)).scenarios
-    return tuple(one for one in every if (one.fields.setting, one.fields.pool) == (setting, pool))
 
 
 def say_chosen(

@@ -21,11 +21,6 @@ def never_refuses(_request: InstructionRequest) -> str | None:
     return None
 
 
-def no_pairing_rules(_instruct: Instruct) -> Iterable[str]:
-    """Return no complaint."""
-    return ()
-
-
 @dataclass(frozen=True, slots=True)
 class Setting:
     """One setting of the language; a file in ``settings/`` defines one as ``SETTING``.
@@ -64,7 +59,7 @@ class Setting:
     implicit: bool = True
     reads: frozenset[str] = frozenset()
     variants: Sequence[Mapping[str, Any]] = ({},)
-    pairing_rules: Callable[[Instruct], Iterable[str]] = no_pairing_rules
+    pairing_rules: Callable[[Instruct], Iterable[str]] = lambda _instruct: ()
     example: int = 0
     plain: str | None = None
 

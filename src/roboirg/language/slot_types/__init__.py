@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from roboirg.core.goal_slots import SlotTypeName
 from roboirg.language.phrases import Phrase
-from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.request import GoalValues, InstructionRequest
 from roboirg.language.slot_types import amount, color, number, ordinal, relation
 from roboirg.language.slot_types.slot_type import Fields, SlotType
 from roboirg.language.worded_command import goal_fields
@@ -30,7 +30,7 @@ SLOT_TYPES: Mapping[SlotTypeName, SlotType] = {
 }
 
 
-def slot_types_in(request: InstructionRequest) -> Iterator[tuple[SlotType, tuple[GoalValue, ...]]]:
+def slot_types_in(request: InstructionRequest) -> Iterator[tuple[SlotType, GoalValues]]:
     """Yield the slot types in the goal with their values, in the order of speaking."""
     for name, slot_type in SLOT_TYPES.items():
         goal_values = request.values_of(name)

@@ -6,7 +6,13 @@ from collections.abc import Sequence
 
 from roboirg.language.number_words import cardinal
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
-from roboirg.language.request import AMOUNT_FIELD, GoalValue, InstructionRequest, tagged_words
+from roboirg.language.request import (
+    AMOUNT_FIELD,
+    GoalValue,
+    GoalValues,
+    InstructionRequest,
+    tagged_words,
+)
 from roboirg.language.slot_types import color, number
 from roboirg.language.slot_types.slot_type import Fields, SlotType
 from roboirg.language.templates import introductions, remarks
@@ -14,7 +20,7 @@ from roboirg.language.templates import introductions, remarks
 THEM: tuple[color.Pointer, ...] = (("them", "them"),)
 
 
-def pairs(goal_values: tuple[GoalValue, ...]) -> tuple[tuple[GoalValue, GoalValue], ...]:
+def pairs(goal_values: GoalValues) -> tuple[tuple[GoalValue, GoalValue], ...]:
     """Return each color with its count."""
     colors = [goal_value for goal_value in goal_values if goal_value.slot == "colors"]
     counts = [goal_value for goal_value in goal_values if goal_value.slot == "counts"]
@@ -46,7 +52,7 @@ def _count(goal_value: GoalValue) -> Phrase:
     return antecedent(cardinal(goal_value.number), goal_value.slot, goal_value.value)
 
 
-def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+def _stated(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``two red cubes and one blue cube``, ``two red, one blue and one green cube``."""
     matched = pairs(goal_values)
     things = [cubes(shade, count.number) for shade, count in matched]
@@ -55,21 +61,19 @@ def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> 
     return _described(request, goal_values, things)
 
 
-def _counts_said(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> bool:
+def _counts_said(request: InstructionRequest, goal_values: GoalValues) -> bool:
     """Draw whether the command says how many cubes, and points back at the color alone."""
     if len(pairs(goal_values)) > 1:
         return False
     return request.sampler.pick("said in the command", ("color", "count")) == "count"
 
 
-def _color_reference(
-    request: InstructionRequest, goal_values: tuple[GoalValue, ...]
-) -> color.ColorReference:
+def _color_reference(request: InstructionRequest, goal_values: GoalValues) -> color.ColorReference:
     shades = tuple(shade for shade, _ in pairs(goal_values))
     return color.draw_reference(request, shades, THEM)
 
 
-def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``that many of them``, ``two of them``, or ``exactly those`` for several colors.
 
     The parts of a command from outside are ``that many of the former`` and so on.
@@ -107,7 +111,7 @@ def _after(request: InstructionRequest, index: int) -> Phrase:
     return () if outside is None else plain(outside.after)
 
 
-def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
     if _counts_said(request, goal_values):
         shades = tuple(shade for shade, _ in pairs(goal_values))
         reference = _color_reference(request, goal_values)
@@ -127,7 +131,7 @@ def color_of(shade: GoalValue) -> Phrase:
 
 def introduce_references(
     request: InstructionRequest,
-    goal_values: tuple[GoalValue, ...],
+    goal_values: GoalValues,
     slot: str,
     quantities: Sequence[int],
 ) -> Phrase:
@@ -136,7 +140,7 @@ def introduce_references(
     return fill(template, {"things": references(goal_values, slot, quantities)})
 
 
-def references(goal_values: tuple[GoalValue, ...], slot: str, quantities: Sequence[int]) -> Phrase:
+def references(goal_values: GoalValues, slot: str, quantities: Sequence[int]) -> Phrase:
     """Return ``six red and four blue cubes``, whose numbers only lead to the goal."""
     shades = [shade for shade, _ in pairs(goal_values)]
     nouns = [*map(color_of, shades[:-1]), cubes(shades[-1], quantities[-1])]
@@ -148,7 +152,7 @@ def references(goal_values: tuple[GoalValue, ...], slot: str, quantities: Sequen
     )
 
 
-def _pointing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+def _pointing(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
     shades = tuple(shade for shade, _ in pairs(goal_values))
     introduced = tuple(shade.color for shade in shades)
     if _counts_said(request, goal_values):
@@ -156,12 +160,12 @@ def _pointing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -
     return color.them(shades, introduced)
 
 
-def _competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
+def _competing(request: InstructionRequest, goal_values: GoalValues) -> list[Phrase]:
     return [*color.competing(request, goal_values), *number.competing(request, goal_values)]
 
 
 def _described(
-    request: InstructionRequest, goal_values: tuple[GoalValue, ...], things: Sequence[Phrase]
+    request: InstructionRequest, goal_values: GoalValues, things: Sequence[Phrase]
 ) -> Fields:
     items: list[Phrase] = []
     for index, ((_, count), thing) in enumerate(zip(pairs(goal_values), things, strict=True)):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from roboirg.language.instruction import REFERENCE, Expression
 from roboirg.language.number_words import plural
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
-from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.request import GoalValue, GoalValues, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_with
 from roboirg.language.templates import introductions, remarks
 
@@ -47,7 +47,7 @@ class ColorReference(NamedTuple):
 
 def draw_reference(
     request: InstructionRequest,
-    goal_values: tuple[GoalValue, ...],
+    goal_values: GoalValues,
     single: Sequence[Pointer] | None = None,
 ) -> ColorReference:
     """Draw whether other colors are introduced, too, and the words that point back."""
@@ -63,8 +63,7 @@ def draw_reference(
     others = [color for color in request.scene_colors if color not in colors]
     left = next(request.sampler.cycle("listed colors", list(itertools.permutations(others))))
     members = [*colors, *left[: size - len(colors)]]
-    order = request.sampler.pick("list order", list(itertools.permutations(range(size))))
-    introduced = tuple(members[at] for at in order)
+    introduced = request.sampler.pick("list order", list(itertools.permutations(members)))
     pointers = _pointers(request, size)
     return ColorReference(introduced, tuple(pointers[introduced.index(one)] for one in colors))
 
@@ -79,7 +78,7 @@ def _pointers(request: InstructionRequest, size: int) -> tuple[Pointer, ...]:
 
 def introduce_colors(
     request: InstructionRequest,
-    goal_values: tuple[GoalValue, ...],
+    goal_values: GoalValues,
     reference: ColorReference,
     *,
     many: bool = False,
@@ -100,7 +99,7 @@ def named(request: InstructionRequest, goal_value: GoalValue) -> Phrase:
     return antecedent(f"the {goal_value.color} {noun}", goal_value.slot, goal_value.value)
 
 
-def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+def _stated(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``the red cube``, or words for the container over it."""
     return {
         goal_value.field: request.by_color(goal_value, named(request, goal_value))
@@ -108,7 +107,7 @@ def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> 
     }
 
 
-def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``it``, ``the former`` and ``the latter``, or ``the first``, etc."""
     pointers = draw_reference(request, goal_values).pointers
     return {
@@ -119,32 +118,32 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
     }
 
 
-def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
     reference = draw_reference(request, goal_values)
     return introduce_colors(request, goal_values, reference)
 
 
-def _pointing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+def _pointing(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
     introduced = draw_reference(request, goal_values).introduced
     if len(introduced) == 1:
         return anaphor("it", "it", goal_values[0].slot, goal_values[0].value)
     return them(goal_values, introduced)
 
 
-def them(goal_values: tuple[GoalValue, ...], introduced: tuple[str, ...]) -> Phrase:
+def them(goal_values: GoalValues, introduced: tuple[str, ...]) -> Phrase:
     """Return a plural that refers to the things of all introduced colors."""
     slot = goal_values[0].slot if len(introduced) == len(goal_values) else REFERENCE
     return anaphor("them", "them", slot, " and ".join(introduced))
 
 
-def competing(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> list[Phrase]:
+def competing(request: InstructionRequest, goal_values: GoalValues) -> list[Phrase]:
     """Return remarks that name other colors."""
     words: dict[str, str] = {color: color for color in request.task.commands.colors}
     return competing_with(remarks.COMPETING_COLOR_DISTRACTORS, words)(request, goal_values)
 
 
 def _described(
-    _request: InstructionRequest, goal_values: tuple[GoalValue, ...], things: Sequence[Phrase]
+    _request: InstructionRequest, goal_values: GoalValues, things: Sequence[Phrase]
 ) -> Fields:
     return {goal_value.field: thing for goal_value, thing in zip(goal_values, things, strict=True)}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from roboirg.core.word_pools import Pools
 from roboirg.language.number_words import cardinal, times
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
-from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.request import GoalValues, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_with, pointing_at
 from roboirg.language.templates import introductions, remarks
 
@@ -18,7 +18,7 @@ SAME_NUMBER = Pools(
 """Words that fit once, too."""
 
 
-def _stated(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+def _stated(_request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``three times``."""
     return {
         goal_value.field: antecedent(times(goal_value.number), goal_value.slot, goal_value.value)
@@ -26,7 +26,7 @@ def _stated(_request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
     }
 
 
-def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``the same number of times``."""
     words = request.pick("same number", SAME_NUMBER)
     return {
@@ -35,7 +35,7 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
     }
 
 
-def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
     return introduce_quantity(request, goal_values[0].slot, goal_values[0].number)
 
 

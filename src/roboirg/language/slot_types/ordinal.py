@@ -9,7 +9,7 @@ from roboirg.core.word_pools import Pools
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import ordinal
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
-from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.request import GoalValue, GoalValues, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_with, pointing_at
 from roboirg.language.templates import introductions, remarks
 
@@ -46,14 +46,14 @@ def wrapped(request: InstructionRequest, goal_value: GoalValue, which: Phrase) -
     return {goal_value.field: request.around(goal_value.field, words)}
 
 
-def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+def _stated(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``during its third visit``, ``the target of the second placement``."""
     (goal_value,) = goal_values
     words = f"{OWNERS[goal_value.slot_type]} {ordinal(goal_value.number)} {goal_value.slot_type}"
     return wrapped(request, goal_value, antecedent(words, goal_value.slot, goal_value.value))
 
 
-def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``that visit``."""
     (goal_value,) = goal_values
     words = f"that {goal_value.slot_type}"
@@ -66,7 +66,7 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
     return {goal_value.field: request.around(goal_value.field, pointing)}
 
 
-def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
     return introduce_position(request, goal_values[0], goal_values[0].slot, goal_values[0].number)
 
 

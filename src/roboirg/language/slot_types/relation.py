@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboirg.language.instruction import Expression
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain
-from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.request import GoalValue, GoalValues, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_with, pointing_at
 from roboirg.language.templates import derivations, introductions, remarks
 
@@ -28,11 +28,11 @@ def named(goal_value: GoalValue) -> Phrase:
     return antecedent(derivations.MOMENTS[str(goal_value.value)], goal_value.slot, goal_value.value)
 
 
-def _stated(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+def _stated(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     return placed(request, goal_values[0], named(goal_values[0]))
 
 
-def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Fields:
+def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``at that moment``, or ``then``."""
     (goal_value,) = goal_values
     words = request.sampler.pick("moment anaphor", derivations.MOMENT_ANAPHORS)
@@ -45,7 +45,7 @@ def _reduced(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) ->
     return {goal_value.field: request.around(goal_value.field, target)}
 
 
-def _introduce(request: InstructionRequest, goal_values: tuple[GoalValue, ...]) -> Phrase:
+def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
     template = request.pick("moment introduction", introductions.MOMENT_INTRODUCTIONS)
     return fill(template, {"moment": named(goal_values[0])})
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from roboirg.core.goal_slots import SlotTypeName
 from roboirg.core.word_pools import Pools
 from roboirg.language.phrases import Phrase, anaphor, fill, plain
-from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.request import GoalValues, InstructionRequest
 
 Fields = dict[str, Phrase]
 """Words for the fields of a command."""
@@ -32,21 +32,19 @@ class SlotType:
     """
 
     name: SlotTypeName
-    stated: Callable[[InstructionRequest, tuple[GoalValue, ...]], Fields]
-    reduced: Callable[[InstructionRequest, tuple[GoalValue, ...]], Fields]
-    introduce: Callable[[InstructionRequest, tuple[GoalValue, ...]], Phrase]
-    pointing: Callable[[InstructionRequest, tuple[GoalValue, ...]], Phrase]
+    stated: Callable[[InstructionRequest, GoalValues], Fields]
+    reduced: Callable[[InstructionRequest, GoalValues], Fields]
+    introduce: Callable[[InstructionRequest, GoalValues], Phrase]
+    pointing: Callable[[InstructionRequest, GoalValues], Phrase]
     reinforcements: Pools[str]
-    competing: Callable[[InstructionRequest, tuple[GoalValue, ...]], list[Phrase]]
-    plural: Callable[[InstructionRequest, tuple[GoalValue, ...]], bool] = (
-        lambda _request, goal_values: len(goal_values) > 1
+    competing: Callable[[InstructionRequest, GoalValues], list[Phrase]]
+    plural: Callable[[InstructionRequest, GoalValues], bool] = lambda _request, goal_values: (
+        len(goal_values) > 1
     )
-    described: (
-        Callable[[InstructionRequest, tuple[GoalValue, ...], Sequence[Phrase]], Fields] | None
-    ) = None
+    described: Callable[[InstructionRequest, GoalValues, Sequence[Phrase]], Fields] | None = None
 
 
-def pointing_at(noun: str) -> Callable[[InstructionRequest, tuple[GoalValue, ...]], Phrase]:
+def pointing_at(noun: str) -> Callable[[InstructionRequest, GoalValues], Phrase]:
     """Return what points at the first value of a type: *that number* for the noun ``number``."""
     return lambda _request, goal_values: anaphor(
         f"that {noun}", "that", goal_values[0].slot, goal_values[0].value
@@ -55,7 +53,7 @@ def pointing_at(noun: str) -> Callable[[InstructionRequest, tuple[GoalValue, ...
 
 def competing_with(
     templates: Pools[str], words: Mapping[str, str] | Mapping[int, str]
-) -> Callable[[InstructionRequest, tuple[GoalValue, ...]], list[Phrase]]:
+) -> Callable[[InstructionRequest, GoalValues], list[Phrase]]:
     """Return what fills every template with the words of every value that is not the goal's."""
     return lambda request, goal_values: [
         fill(template, {"other": plain(word)}, plural=value != 1)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from roboirg.core.episode import SlotValue
-from roboirg.core.errors import InvalidValueError, UnknownNameError, check_names
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.language.settings import all_settings
 from roboirg.language.worded_command import (
     FIELD,
@@ -128,8 +128,7 @@ class _TaskReader:
         phrases = {**shared, **self._phrases(table.get("phrases", {}))}
         names = FIELD.findall(text)
         for at, name in enumerate(names):
-            if name not in FIELDS:
-                raise UnknownNameError(f"field ({self._where})", name, FIELDS)
+            check_names(f"field ({self._where})", [name], FIELDS)
             if name in names[:at]:
                 self._fail(f"has the field {{{name}}} twice in the command {text!r}")
             if name not in phrases and name.partition(".")[0] not in phrases:

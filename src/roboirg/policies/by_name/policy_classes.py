@@ -10,7 +10,12 @@ from types import ModuleType
 from typing import Any
 
 from roboirg.core.error_words import one_line
-from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.core.errors import (
+    InvalidValueError,
+    MissingDependencyError,
+    UnknownNameError,
+    check_names,
+)
 from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.batch_policy import make_batched, parameters_of, takes_batches
@@ -49,8 +54,7 @@ def find_class(spec: str, methods: tuple[str, ...] = ("reset", "act")) -> type[A
     """
     if is_url(spec):
         scheme, classes = spec.partition("://")[0], url_classes()
-        if scheme not in classes:
-            raise UnknownNameError("policy scheme", scheme, classes)
+        check_names("policy scheme", [scheme], classes)
         check_policy(spec, classes[scheme](spec), methods)
         return classes[scheme]
     if spec not in BUILTIN and ":" not in spec:

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
 
 
+Moment = tuple[dict[str, Any], dict[str, Any]]
+"""An observation, and the info that comes with it."""
+
+
 class EpisodeLoop:
     """The turns of an episode; subclasses guard, record or split its calls."""
 
@@ -26,7 +30,7 @@ class EpisodeLoop:
         """Play the episode from beginning to end. Returns the last step's info."""
         return self.take_turns(*self.begin())
 
-    def begin(self) -> tuple[dict[str, Any], dict[str, Any]]:
+    def begin(self) -> Moment:
         """Start the episode and the policy."""
         observation, info = self.env.reset()
         self.start_policy(observation["instruction"], info["demonstration"])
@@ -50,7 +54,7 @@ class EpisodeLoop:
         """Return the policy's next actions."""
         return self.policy.act(cast("Observation", observation))
 
-    def execute(self, actions: ArrayLike) -> tuple[dict[str, Any], dict[str, Any]]:
+    def execute(self, actions: ArrayLike) -> Moment:
         """Execute actions. Returns the observation and the info after them."""
         observation, *_, info = self.env.step_chunk(actions)
         return observation, info

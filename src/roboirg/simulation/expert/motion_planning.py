@@ -45,10 +45,14 @@ MAX_JOINT_STEP = 0.35
 """Radians between waypoints; above this the arm would swing around."""
 
 
+Vector = NDArray[np.float64]
+"""Arm joint positions (7,) in radians, a position (3,) or a pose error (6,); several are rows."""
+
+
 class ToolPose(NamedTuple):
     """A pose of the tool center point, world frame."""
 
-    position: NDArray[np.float64]
+    position: Vector
     rotation: Rotation
 
     @classmethod
@@ -69,13 +73,13 @@ class MotionPlanner:
         anywhere = np.random.default_rng(0).random((INVERSE_STARTS - 2, ARM_JOINTS))
         self._other_starts = self._low + anywhere * (self._high - self._low)
 
-    def forward_kinematics(self, arm: NDArray[np.float64]) -> ToolPose:
+    def forward_kinematics(self, arm: Vector) -> ToolPose:
         """Return the tool pose at arm joint positions (7)."""
         self._model.compute_forward_kinematics(_with_fingers(arm))
         pose = ToolPose.from_sapien(self._model.get_link_pose(self._tool))
         return ToolPose(pose.position + ROBOT_BASE, pose.rotation)
 
-    def plan_straight(self, arm: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64]:
+    def plan_straight(self, arm: Vector, goal: ToolPose) -> Vector:
         """Plan a straight move of the tool to `goal`.
 
         Args:
@@ -87,7 +91,7 @@ class MotionPlanner:
         """
         return time_parameterize(self._waypoints(arm, goal))
 
-    def plan_move(self, arm: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64]:
+    def plan_move(self, arm: Vector, goal: ToolPose) -> Vector:
         """Plan as `plan_straight`, but via home if the straight line is not feasible."""
         try:
             return self.plan_straight(arm, goal)
@@ -95,7 +99,7 @@ class MotionPlanner:
             home = time_parameterize(np.linspace(arm, HOME, 10))
             return np.concatenate([home, self.plan_straight(HOME, goal)])
 
-    def inverse_kinematics(self, arm: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64]:
+    def inverse_kinematics(self, arm: Vector, goal: ToolPose) -> Vector:
         """Return joint positions (7) within the limits that reach a tool pose.
 
         Starts the search from `arm`, so that a near pose needs small movements; if that fails,
@@ -114,9 +118,7 @@ class MotionPlanner:
                 return found
         raise MotionPlanningError(f"No joint positions reach {_format_position(goal)}.")
 
-    def _solve_within_limits(
-        self, start: NDArray[np.float64], goal: ToolPose
-    ) -> NDArray[np.float64] | None:
+    def _solve_within_limits(self, start: Vector, goal: ToolPose) -> Vector | None:
         """Solve for a pose by damped Newton steps within the limits; None if it fails."""
         arm = np.clip(start, self._low, self._high)
         error = self._pose_error(arm, goal)
@@ -132,9 +134,7 @@ class MotionPlanner:
             error = self._pose_error(arm, goal)
         return arm if float(np.abs(error).max()) <= INVERSE_TOLERANCE else None
 
-    def _limited_newton_step(
-        self, arm: NDArray[np.float64], error: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _limited_newton_step(self, arm: Vector, error: Vector) -> Vector:
         """Return a Newton step of the joints that are not blocked by a limit."""
         free = np.ones(ARM_JOINTS, dtype=bool)
         step = self._newton_step(arm, error)
@@ -148,10 +148,10 @@ class MotionPlanner:
 
     def _newton_step(
         self,
-        arm: NDArray[np.float64],
-        error: NDArray[np.float64],
+        arm: Vector,
+        error: Vector,
         free: NDArray[np.bool_] | None = None,
-    ) -> NDArray[np.float64]:
+    ) -> Vector:
         """Return the smallest change of the (free) joints that corrects a small pose error."""
         jacobian = np.asarray(
             self._model.compute_single_link_local_jacobian(_with_fingers(arm), self._tool)
@@ -161,7 +161,7 @@ class MotionPlanner:
         gain = jacobian @ jacobian.T + DAMPING * np.eye(6)
         return np.asarray(jacobian.T @ np.linalg.solve(gain, error))
 
-    def _pose_error(self, arm: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64]:
+    def _pose_error(self, arm: Vector, goal: ToolPose) -> Vector:
         """Return the error to a pose (6): meters, then radians, in the tool's frame."""
         current = self.forward_kinematics(arm)
         # Clipped, because huge offsets would overflow.
@@ -169,7 +169,7 @@ class MotionPlanner:
         back = current.rotation.inv()
         return np.concatenate([back.apply(offset), (back * goal.rotation).as_rotvec()])
 
-    def _waypoints(self, arm: NDArray[np.float64], goal: ToolPose) -> NDArray[np.float64]:
+    def _waypoints(self, arm: Vector, goal: ToolPose) -> Vector:
         start = self.forward_kinematics(arm)
         turn = (start.rotation.inv() * goal.rotation).as_rotvec()
         if float(np.abs(goal.position - start.position).max()) > MAX_TRAVEL:
@@ -189,7 +189,7 @@ class MotionPlanner:
             points.append(self._solve_near(pose, points[-1]))
         return np.stack(points)
 
-    def _solve_near(self, pose: ToolPose, seed: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _solve_near(self, pose: ToolPose, seed: Vector) -> Vector:
         """Return the joint positions nearest to `seed` that reach `pose` (damped Newton)."""
         arm = seed.copy()
         for _ in range(MAX_ITERATIONS):
@@ -201,9 +201,7 @@ class MotionPlanner:
             f"The arm cannot reach {_format_position(pose)} in a straight move."
         )
 
-    def _check_step(
-        self, arm: NDArray[np.float64], seed: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _check_step(self, arm: Vector, seed: Vector) -> Vector:
         if bool(((arm < self._low) | (arm > self._high)).any()):
             raise MotionPlanningError("A straight move would exceed a joint limit.")
         if float(np.abs(arm - seed).max()) > MAX_JOINT_STEP:
@@ -211,7 +209,7 @@ class MotionPlanner:
         return arm
 
 
-def _with_fingers(arm: NDArray[np.float64]) -> NDArray[np.float64]:
+def _with_fingers(arm: Vector) -> Vector:
     return np.append(arm, [0.0, 0.0])
 
 

@@ -32,6 +32,9 @@ DRAWN, LEFT_OUT = 0, 99
 """Shading modes; SAPIEN does not know the second."""
 
 
+Floats = NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class CullableBody:
     """Culling data of a body.
@@ -41,7 +44,7 @@ class CullableBody:
         cameras: cameras that draw it if it reaches into their views.
     """
 
-    hull: NDArray[np.float64]
+    hull: Floats
     cameras: Collection[str] = CAMERAS
 
 
@@ -74,13 +77,11 @@ class CullableBodies:
         self._drawn = np.ones(len(self._bodies), dtype=bool)
         self._buffered: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
 
-    def poses(self) -> NDArray[np.float64]:
+    def poses(self) -> Floats:
         """Return the current poses of the bodies, (n, 4, 4)."""
         return np.stack([body.entity.pose.to_transformation_matrix() for body in self._bodies])
 
-    def visible(
-        self, camera: str, poses: NDArray[np.float64], view: NDArray[np.float64]
-    ) -> NDArray[np.bool_]:
+    def visible(self, camera: str, poses: Floats, view: Floats) -> NDArray[np.bool_]:
         """Return for each body whether a camera draws it.
 
         Args:
@@ -113,7 +114,7 @@ class CullableBodies:
         camera.take_picture()
 
 
-def _outside(points: NDArray[np.float64], margin: float = 0.0) -> NDArray[np.bool_]:
+def _outside(points: Floats, margin: float = 0.0) -> NDArray[np.bool_]:
     """Return for each plane of a view's frustum, (5, ...), which points are outside.
 
     The half angle of view is 45 degrees, so the planes are z = NEAR, |x| = z and |y| = z.
@@ -133,26 +134,26 @@ def invalidate_command_buffers(body: sapien.render.RenderBodyComponent) -> None:
     body.visibility = 1.0
 
 
-_boxes_of_files: dict[tuple[object, ...], NDArray[np.float64]] = {}
+_boxes_of_files: dict[tuple[object, ...], Floats] = {}
 
 
-def _box(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _box(points: Floats) -> Floats:
     """Return homogeneous corners (8, 4) of the box around points (n, 3), with the margin."""
     low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
     return np.column_stack([_corners(low, high), np.ones(8)])
 
 
-def _corners(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+def _corners(low: Floats, high: Floats) -> Floats:
     grid = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1)
     return grid.reshape(-1, 3)
 
 
-def _points(body: sapien.render.RenderBodyComponent) -> NDArray[np.float64]:
+def _points(body: sapien.render.RenderBodyComponent) -> Floats:
     """Return corners (n, 3) of the boxes of a body's shapes in its entity's frame."""
     return np.concatenate([_shape_corners(shape) for shape in body.render_shapes])
 
 
-def _shape_corners(shape: sapien.render.RenderShape) -> NDArray[np.float64]:
+def _shape_corners(shape: sapien.render.RenderShape) -> Floats:
     """Return corners of a shape's box in its entity's frame, (8, 3)."""
     corners = _corners(*_shape_bounds(shape))
     matrix = shape.local_pose.to_transformation_matrix()
@@ -161,7 +162,7 @@ def _shape_corners(shape: sapien.render.RenderShape) -> NDArray[np.float64]:
 
 def _shape_bounds(
     shape: sapien.render.RenderShape,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Floats, Floats]:
     """Return lowest and highest coordinates in the shape's own frame."""
     if isinstance(shape, sapien.render.RenderShapeBox):
         half = np.asarray(shape.half_size, dtype=np.float64)

@@ -126,6 +126,16 @@ def draw_colored_cubes(
     return tuple(draw_cubes(rng, cubes, gap, obstacles))
 
 
+def draw_button_and_cubes(
+    rng: np.random.Generator, button_region: Region, count: int, region: Region, gap: float
+) -> tuple[SceneObject, tuple[SceneObject, ...], list[Obstacle]]:
+    """Draw a button and cubes as `draw_colored_cubes` does; return what keeps others away, too."""
+    button = draw_button(rng, button_region)
+    keep_out = button_keep_out(button)
+    cubes = draw_colored_cubes(rng, count, region, gap, [keep_out])
+    return button, cubes, [keep_out, *map(cube_obstacle, cubes)]
+
+
 def draw_target(
     rng: np.random.Generator,
     name: str,

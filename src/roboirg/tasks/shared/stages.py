@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from roboirg.core.conditions import Condition, Fact, Rule
 from roboirg.core.episode import Primitive, Stage
+from roboirg.tasks.shared.fixtures import ORDINALS
 
 PRESSED = Fact("pressed", "button")
 RETREAT_STEPS = 20
@@ -38,6 +39,19 @@ def place_stage(
         subgoal=subgoal,
         points_at=place,
     )
+
+
+def placing_stages(
+    kind: str, color: str, repeats: int, forbids: tuple[Fact | Rule, ...]
+) -> tuple[Stage, ...]:
+    """Return the stages in which a cube or tape is placed on the target a number of times."""
+    name = f"{kind}_{color}"
+    plan: list[Stage] = []
+    for ordinal in ORDINALS[:repeats]:
+        pick = f"pick up the {color} {kind} {{at}} for the {ordinal} time"
+        put = f"place the {color} {kind} onto the target {{at}}"
+        plan += [pick_stage(name, pick, forbids), place_stage(name, "target", put, forbids)]
+    return tuple(plan)
 
 
 def press_stage(

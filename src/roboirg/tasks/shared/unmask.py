@@ -148,7 +148,7 @@ def appearing(containers: Sequence[SceneObject]) -> tuple[Away, ...]:
     return tuple(Away(container.name, 0, APPEAR_STEP) for container in containers)
 
 
-def hidden_commands(wordings: Pools[Wording]) -> Commands:
+def container_commands(wordings: Pools[Wording]) -> Commands:
     """Return the commands of a task in which the containers stand when the words are said."""
     return Commands(
         thing="container",
@@ -156,16 +156,5 @@ def hidden_commands(wordings: Pools[Wording]) -> Commands:
         by_place="the container {place}",
         pointed="container",
         things_at="the container {place}",
-        wordings=wordings,
-    )
-
-
-def seen_commands(wordings: Pools[Wording]) -> Commands:
-    """Return the commands of a task in which only the cubes are there when the words are said."""
-    return Commands(
-        thing="container",
-        by_color="the container over {cube}",
-        by_place="the container over the cube {place}",
-        pointed="hidden_cube",
         wordings=wordings,
     )

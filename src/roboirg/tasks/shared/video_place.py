@@ -14,15 +14,9 @@ import numpy as np
 from roboirg.core import object_sizes
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Primitive, Scene, SceneObject, Stage
-from roboirg.core.footprints import Circle, Obstacle, Region
+from roboirg.core.footprints import Circle, Region
 from roboirg.core.motions import Point, Swap
-from roboirg.tasks.shared.fixtures import (
-    button_keep_out,
-    cube_obstacle,
-    draw_button,
-    draw_colored_cubes,
-    draw_target,
-)
+from roboirg.tasks.shared.fixtures import draw_button_and_cubes, draw_target
 from roboirg.tasks.shared.stages import (
     go_home,
     hold_still,
@@ -56,12 +50,9 @@ def draw_table(
     x, y = SITE_REGION.draw(rng, inset=site_radius)
     # A site is as high as a disc: the release height of the hand follows from it.
     site = SceneObject("site", "site", Point(x, y, object_sizes.TARGET_HEIGHT), radius=site_radius)
-    button = draw_button(rng, BUTTON_REGION)
-    keep_out = button_keep_out(button)
+    button, colored, obstacles = draw_button_and_cubes(rng, BUTTON_REGION, cubes, WORK_REGION, GAP)
     # As in RoboMME, cubes may lie on the site; discs may not.
-    colored = draw_colored_cubes(rng, cubes, WORK_REGION, GAP, [keep_out])
-    obstacles: list[Obstacle] = [keep_out, Circle(x, y, site_radius)]
-    obstacles += [cube_obstacle(cube) for cube in colored]
+    obstacles.append(Circle(x, y, site_radius))
     objects: list[SceneObject] = [site, button, *colored]
     for number in range(discs):
         disc = draw_target(rng, f"target_{number}", TARGET_RADIUS, WORK_REGION, GAP, obstacles)

@@ -42,13 +42,8 @@ class PublishedEpisode(NamedTuple):
     goal: Goal
 
 
-def is_published(task: str, split: str, index: int) -> bool:
-    """Return whether an episode is one of RoboMME's; the others are sampled."""
-    return (task, split, index) in _lines()
-
-
 def published_episode(task: str, split: str, index: int) -> PublishedEpisode | None:
-    """Return an episode, or None if RoboMME has none there."""
+    """Return an episode, or None if RoboMME has none there: it is sampled."""
     line = _lines().get((task, split, index))
     if line is None:
         return None

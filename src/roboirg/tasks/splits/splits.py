@@ -25,7 +25,7 @@ import numpy as np
 
 from roboirg.core.conditions import Fact, facts_of
 from roboirg.core.episode import ROBOT, SPLITS, Difficulty, Episode, Goal, Scene, Split, Stage
-from roboirg.core.errors import InvalidValueError, SceneRejectedError, UnknownNameError, known_name
+from roboirg.core.errors import InvalidValueError, SceneRejectedError, check_names, known_name
 from roboirg.core.fact_traits import FACT_TRAITS, FactTraits
 from roboirg.tasks import Task, get_task
 from roboirg.tasks.splits.fingerprint import fingerprint
@@ -228,8 +228,7 @@ def check_stages(task: str, scene: Scene, stages: Iterable[Stage]) -> None:
     for stage in stages:
         for condition in (stage.expects, *stage.forbids):
             for fact in facts_of(condition):
-                if fact.kind not in FACT_TRAITS:
-                    raise UnknownNameError("kind of fact", fact.kind, FACT_TRAITS)
+                check_names("kind of fact", [fact.kind], FACT_TRAITS)
                 for problem in _problems(fact, FACT_TRAITS[fact.kind], kinds):
                     raise InvalidValueError(f"{task}: {fact!r} can never hold: {problem}.")
 

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from roboirg.core.environment_options import MAX_STEPS
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.observations import CAMERAS, proprioception
+from roboirg.envs.action_chunks import StepResult
 from roboirg.envs.env_settings import EnvOptions
 from roboirg.envs.factory import make
+from roboirg.policies.contract.play import Moment
 from roboirg.util.media import PICTURE_SIZE, scaled_square
 
 NEW_ROLLOUT = "lerobot_new_rollout"
@@ -25,7 +27,6 @@ LONGEST_VIDEO = 2000
 STATE_SIZE = 8
 
 _log = logging.getLogger(__name__)
-_Transition = tuple[dict[str, Any], float, bool, bool, dict[str, Any]]
 
 
 class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
@@ -90,16 +91,14 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         self._next_frame = self._length = 0
         self._seen: dict[str, Any] = {}
         self._picture: NDArray[np.uint8] | None = None
-        self._last: _Transition | None = None
+        self._last: StepResult | None = None
 
     @property
     def task(self) -> str:
         """What LeRobot gives a policy where it does not know `task_description`: the same."""
         return self.task_description
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, Any], dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Moment:
         """Start an episode; repeat the end of the last one if LeRobot does not mean this reset."""
         chosen = dict(options or {})
         meant = chosen.pop(NEW_ROLLOUT, False) or seed is not None or chosen
@@ -115,7 +114,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
             self._shown, self._length = demonstration, demonstration.length
         return self._observe(self._seen), self._info(success=False)
 
-    def step(self, action: NDArray[np.floating[Any]]) -> _Transition:
+    def step(self, action: NDArray[np.floating[Any]]) -> StepResult:
         """Execute one action; while the video is streamed, show its next frame instead."""
         if self._last is not None:
             return self._last

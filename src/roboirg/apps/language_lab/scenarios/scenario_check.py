@@ -91,9 +91,9 @@ def scenes_of(task: str, random: int = RANDOM_SCENES) -> tuple[Episode, ...]:
 
 
 def check_scenarios(
-    words: TaskScenarios, name: str | None = None, scenes: Sequence[Episode] | None = None
+    words: TaskScenarios, name: str | None, scenes: Sequence[Episode]
 ) -> list[ScenarioReport]:
-    """Check the scenarios of a file, or the one of a frame, in scenes, by default in all of them.
+    """Check the scenarios of a file, or only the one of a frame, in scenes.
 
     Raises:
         InvalidValueError: there is no scenario of that frame.
@@ -101,9 +101,8 @@ def check_scenarios(
     frames = list(dict.fromkeys(one.fields.frame for one in words.scenarios))
     if name is not None and name not in frames:
         raise InvalidValueError(f"There is no scenario {name!r}; there are {', '.join(frames)}.")
-    episodes = scenes_of(words.task) if scenes is None else scenes
     chosen = [one for one in words.scenarios if name in (None, one.fields.frame)]
-    return [_checked(one, words, episodes) for one in chosen]
+    return [_checked(one, words, scenes) for one in chosen]
 
 
 def _in_both_pools(scenario: Scenario, others: Sequence[Scenario]) -> Iterator[str]:

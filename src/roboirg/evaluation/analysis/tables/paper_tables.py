@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from roboirg.core.errors import UnknownNameError
+from roboirg.core.errors import check_names
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.comparability import AllDifferences, differences_of
 from roboirg.evaluation.analysis.published import (
@@ -69,8 +69,7 @@ def make_table(
     """
     if which == COVERAGE:
         return _coverage()
-    if which not in PAPER_TABLES:
-        raise UnknownNameError("table", which, WHICH)
+    check_names("table", [which], WHICH)
     names: Mapping[PolicyRun, str] = {} if data is None else data.told.frame.names_as_played
     cells: Cells = {} if data is None else data.told.cells
     table = PAPER_TABLES[which]
