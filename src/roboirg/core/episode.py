@@ -49,8 +49,8 @@ SlotValue = str | int | tuple[str, ...] | tuple[int, ...]
 Value = TypeVar("Value")
 
 
-_SLOT_WORDS: Mapping[str, Callable[[str | int], str]] = {
-    "repeats": lambda number: "once" if number == 1 else f"{number} times",
+_SLOT_WORDS: Mapping[str, Callable[[Any], str]] = {
+    "repeats": lambda number: {1: "once", 2: "twice"}.get(number, f"{number} times"),
     "visit": "on visit {}".format,
     "placement": "on target {} of the video".format,
     "relation": "on the target {} the press".format,
