@@ -169,9 +169,9 @@ def learn_policy(
     typer.echo(f"{path}, {path.stat().st_size / 2**20:.1f} MiB")
     heard = ",".join(training.settings) or "explicit"
     options = f"--tasks {quote(','.join(training.tasks))} --split val --settings {quote(heard)}"
-    spoken = f"--language {training.language} --wordings test"
-    command = f"roboirg run --policy {quote(f'trained:{path}')} {options} {spoken}"
-    typer.echo(f"Play it with: {command} --out {quote(f'runs/{path.stem}')}")
+    options += f" --wordings test --out {quote(f'runs/{path.stem}')}"
+    typer.echo(f"Its plan has language {training.language}; a run in another than 3 needs a plan, too.")
+    typer.echo(f"Play it with: roboirg run --policy {quote(f'trained:{path}')} {options}")
 
 
 def _policy_plan(words: PlanWords, tasks: str, settings: str, memory: str) -> PolicyPlan:
