@@ -170,7 +170,7 @@ def learn_policy(
     heard = ",".join(training.settings) or "explicit"
     options = f"--tasks {quote(','.join(training.tasks))} --split val --settings {quote(heard)}"
     options += f" --wordings test --out {quote(f'runs/{path.stem}')}"
-    typer.echo(f"Its plan has language {training.language}; a run in another than 3 needs a plan, too.")
+    typer.echo(f"Its language is {training.language}; a run in another than 3 needs a plan file.")
     typer.echo(f"Play it with: roboirg run --policy {quote(f'trained:{path}')} {options}")
 
 
