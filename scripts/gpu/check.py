@@ -53,7 +53,7 @@ class Checks:
             found = {"code": done.returncode, "output": done.stdout, "errors": done.stderr[-600:]}
         except subprocess.TimeoutExpired:
             found = {"code": None, "output": "", "errors": f"no end within {LIMIT_S:g} s"}
-        return self.keep(name, found | {"seconds": round(time.perf_counter() - start, 1)})
+        return found | {"seconds": round(time.perf_counter() - start, 1)}
 
     def keep(self, name: str, found: dict[str, Any]) -> dict[str, Any]:
         """Store a result, so that a kill loses none."""
@@ -70,7 +70,7 @@ def main() -> None:
     parser.add_argument("--workers", default="8,16", help="numbers of worker processes")
     options = parser.parse_args()
     checks = Checks(options.kit, options.out)
-    checks.run("doctor", "after", "-m", "roboirg", "doctor")
+    checks.keep("doctor", checks.run("doctor", "after", "-m", "roboirg", "doctor"))
     check_pictures(checks, options.kit)
     check_steps(checks)
     for count in options.workers.split(","):

@@ -34,7 +34,7 @@ def draw_number(rng: np.random.Generator, bounds: tuple[int, int]) -> int:
 
 
 def counted_goals(scene: Scene, kind: ObjectKind, most: int) -> tuple[Goal, ...]:
-    """Return a goal for the color of every object of a kind, once up to so many times."""
+    """Return a goal for every object of a kind, by color, for once to `most` times."""
     return tuple(
         Goal.of(color=str(item.color), repeats=repeats)
         for item in scene.of_kind(kind)

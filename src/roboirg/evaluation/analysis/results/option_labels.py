@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
@@ -23,6 +24,7 @@ _PHRASES: dict[str, Callable[[Any], str]] = {
 """How labels name the value of an option; of any other option, by its name."""
 
 
+@functools.cache  # asked for every record
 def reference_of(options: InstructionOptions) -> InstructionOptions:
     """Return the options that a gap refers to: explicit, in the same language."""
     return InstructionOptions(EXPLICIT, language=options.language)
