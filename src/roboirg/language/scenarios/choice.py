@@ -198,8 +198,7 @@ def _grounded(request: InstructionRequest) -> Iterator[Offer]:
 def _seen(thing: GoalValue, clue: Clue, at: int) -> Values:
     """Return the slots for a clue; for one that sets two things aside, those of what is left."""
     if not clue.aside:
-        words = clue.words.replace("that comes ", "").replace("that is ", "")
-        seen = (IntroducedValue(thing.slot, "clue", thing.value, words),)
+        seen = (IntroducedValue(thing.slot, "clue", thing.value, clue.spoken),)
         return {"clue": seen, f"clue.{at}": seen}
     aside = [IntroducedValue("", "place", place, place) for place in clue.aside]
     return {

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple, cast
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
-from roboirg.language.instruction import REFERENCE, Expression, UtteranceStage
+from roboirg.language.instruction import REFERENCE, Expression, Meaning, Term, UtteranceStage
 from roboirg.language.phrases import (
     Phrase,
     TaggedText,
@@ -27,8 +27,9 @@ from roboirg.language.request import (
     UtteranceSpec,
 )
 from roboirg.language.scenarios.choice import Chosen, choose, rival_values
+from roboirg.language.scenarios.declared import SaidValues, chosen_term, pointed_term
 from roboirg.language.scenarios.introduced import Introduced, goal_values
-from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, slots_in
+from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, pointers_in, slots_in
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.scenario_file import general, task_scenarios
 from roboirg.language.settings import all_settings, contextual
@@ -95,7 +96,8 @@ def say(request: InstructionRequest) -> InstructionSpec:
     words = cast("TaskScenarios", task_scenarios(request.task.name))
     if request.options.setting == _EXPLICIT:
         speech = Speech(request, words, Introduced(goal_values(request)))
-        return InstructionSpec((UtteranceSpec("command", speech.command({}, ())),))
+        command = UtteranceSpec("command", speech.command({}, ()))
+        return InstructionSpec((command,), meaning=speech.meaning())
     choice = _choose(request)
     request.sampler.log.extend(choice.log)
     return say_chosen(request, words, cast("Chosen", choice.chosen))
@@ -123,9 +125,10 @@ def say_chosen(
     said = {scenario.said[0]: chosen.first}
     for name in scenario.said[1:]:
         said[name] = request.sampler.pick(f"{name} words", scenario.texts[f"say.{name}"])
-    fields = {name: speech.field(name, text) for name, text in said.items()}
+    fields = {name: speech.field(name, text, chosen.remark) for name, text in said.items()}
     command = speech.command(fields, _lead(request, chosen))
-    return InstructionSpec((*utterances, UtteranceSpec("command", command)), notes)
+    utterances.append(UtteranceSpec("command", command))
+    return InstructionSpec(tuple(utterances), notes, speech.meaning(pointing=fields.keys()))
 
 
 def _lead(request: InstructionRequest, chosen: Chosen) -> Text:
@@ -172,6 +175,8 @@ class Speech:
     ) -> None:
         self._request, self._words, self._introduced = request, words, introduced
         self._scenario = scenario
+        self._said = SaidValues(request.frame)
+        self._terms: dict[str, Term] = {}
 
     def phrase(
         self, text: Text, introduced: Introduced | None = None, *, resolved: bool = False
@@ -184,9 +189,12 @@ class Speech:
                 pieces.append(part)
             elif isinstance(part, Slot):
                 pieces.extend(values.phrase(part))
+                self._said.add(part.name, values.values[part.name])
             elif isinstance(part, Agreement):
                 words = part.one if values.count(part.controller) == 1 else part.many
                 pieces.append(TaggedText(words))
+                if part.controller == "step":  # *right before*, *two before*
+                    self._said.add("step", values.values["step"])
             else:
                 pieces.extend(self._named(part) if resolved else self._pointing(part))
         return tuple(piece for piece in pieces if piece.text)
@@ -213,14 +221,32 @@ class Speech:
             return (TaggedText("the "), Slot(name), TaggedText(ends[kind]))
         return (Slot(name, "times" if kind == "number" and name != REFERENCE else None),)
 
-    def field(self, name: str, words: Text) -> Phrase:
-        """Return the words for a field of the command, resolved if these are asked for."""
+    def field(self, name: str, words: Text, remark: str = "") -> Phrase:
+        """Return the words for a field of the command, resolved if these are asked for.
+
+        `remark` is the name of the one that chooses; empty if none does.
+        """
         scenario = self._scenario
         if self._request.resolved and scenario:
             states = scenario.fields.setting in _STATING
             usual = self._words.stated[name] if states else words
             words = scenario.texts.get(f"resolved.{name}", (usual,))[0]
-        return self.phrase(words, resolved=self._request.resolved)
+        phrase = self.phrase(words, resolved=self._request.resolved)
+        pointers = list(pointers_in(words))
+        if remark and pointers:
+            self._terms[name] = chosen_term(remark, pointers[-1], self._said)
+        elif pointers:
+            self._terms[name] = pointed_term(pointers[-1], self._said)
+        else:
+            self._terms[name] = Term("same", self._said.operands(name))
+        return phrase
+
+    def meaning(self, pointing: Collection[str] = ()) -> Meaning:
+        """Return what has been said, of which some fields point back at what came before."""
+        settled = set(self._terms)
+        if not self._request.resolved:
+            settled -= set(pointing)
+        return Meaning(dict(self._terms), frozenset(settled))
 
     def command(self, fields: Mapping[str, Phrase], lead: Text) -> Phrase:
         """Return the command with the words for some fields; the others state their values."""
@@ -238,10 +264,12 @@ class Speech:
         return (*before, *skeleton)
 
     def _skeleton(self, fields: Mapping[str, Phrase]) -> Phrase:
-        wanted = frozenset(one.field for one in self._request.goal_values)
+        wanted = frozenset(value.field for value in self._request.goal_values)
         possible = self._words.commands[self._request.pool, wanted]
         template = self._request.sampler.pick(f"command-{len(wanted)}", possible)
-        words = {one: fields.get(one) or self.phrase(self._words.stated[one]) for one in wanted}
+        words = {
+            name: fields.get(name) or self.field(name, self._words.stated[name]) for name in wanted
+        }
         return swap_particles(fill(template, words)) if fields else fill(template, words)
 
     def _outside(self, name: str, words: Phrase) -> Phrase:
