@@ -78,7 +78,7 @@ def pointed_term(pointer: Pointer, said: SaidValues) -> Term:
         rank = members.index(taken[0]) + 1 if taken and taken[0] in members else 0
         return Term("other", members, rank)
     if operation == "without":
-        return Term("without", said.operands("excluded"))
+        return Term("without", said.listed("excluded"))
     if slot == "rest":
         return Term("without", said.listed("aside"))
     if operation in ("double", "half"):
@@ -87,13 +87,21 @@ def pointed_term(pointer: Pointer, said: SaidValues) -> Term:
         return Term("step", said.operands(slot), step=_STEPS[operation])
     if operation in _DIRECTIONS:
         return Term("step", said.operands(slot), step=_DIRECTIONS[operation] * _step_of(said))
-    return Term("same", said.operands(slot))
+    operands = said.operands(slot)
+    if not operands and "rank" in said.by_slot:
+        # "It's the second one's turn, so pick it up": a list was named, then a position in it.
+        return Term("rank", said.listed("list"), rank=_rank_said(said))
+    return Term("same", operands)
 
 
 def _rank_of(pointer: Pointer, said: SaidValues) -> int:
     """Return the position that words name, by their class or as the number in them."""
     if pointer.expression in _RANKS:
         return _RANKS[pointer.expression]
+    return _rank_said(said)
+
+
+def _rank_said(said: SaidValues) -> int:
     (rank,) = said.by_slot["rank"]
     return int(rank.value)
 

@@ -20,8 +20,8 @@ Operation = Literal[
     "same", "rank", "other", "without", "minus", "plus", "double", "half", "earlier", "later",
     "before", "after", "two before", "two after", "place", "seen",
 ]  # fmt: skip
-PERSON = ("person", "he", "him", "his")
-"""The slots of a person; those of another one end in ``.2``."""
+PERSON = ("person", "he", "him", "his", "hers")
+"""The slots of a person, ``hers`` for *his* or *hers* alone; those of another one end in ``.2``."""
 PEOPLE = frozenset(f"{slot}{number}" for number in ("", ".2") for slot in PERSON)
 """Those of both."""
 REMARKS = ("former", "latter", "not_former", "not_latter")
