@@ -24,7 +24,7 @@ _COLOR_WORDS = frozenset(
 _TIME_WORDS = frozenset(
     ("before", "after", "earlier", "later", "previous", "previously", "next", "following")
 )
-_POINTERS = ("first", "second", "third", "one", "each")
+_POINTERS = ("first", "second", "third", "one", "each", "other")
 
 
 def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
