@@ -142,7 +142,7 @@ def test_every_mistake_of_a_file_is_named_by_scenario_and_field():
     [
         (DIRECT, "turns {repeats} today and ", "", "points at what the"),
         (DIRECT, "loves the", "has a {color} one and loves the", "has 2 antecedents"),
-        (DIRECT, "Let's surprise", "You saw this. Surprise", "in turns it is heard before"),
+        (DIRECT, "Let's surprise", "You saw this. Surprise", "what was seen is not checked"),
         (DIRECT, "The cake", "The second cake", "names second, which could be a value"),
         (DIRECT, "The cake", "Look at that cake", "may be covered"),
         (DIRECT, 'say.color = ["', 'lead = "Twice: "\nsay.color = ["', "names twice"),

@@ -144,7 +144,7 @@ class UtteranceRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
         stage: its part in the discourse.
         text: its words.
         step: control step of the policy's turn at which it was heard; 0 is before its first step,
-            and before the video if there is one; None if the episode ended before.
+            and after the video if there is one; None if the episode ended before.
     """
 
     stage: str
