@@ -11,15 +11,13 @@ import numpy as np
 from roboirg.core.episode import Episode, Goal
 from roboirg.core.observations import Demonstration
 from roboirg.policies.builtin.scripted import READING, ScriptedPolicy
+from roboirg.policies.contract.policy_calls import GUESSED
 from roboirg.shortcuts import draw_goal, guess_goal
 from roboirg.shortcuts.command_chance import goals_of_command, understood_goals
 from roboirg.tasks import goals_of
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
-
-GUESSED = "guessed"
-"""The entry of a listener's usage for an episode whose words mean nothing."""
 
 
 def choice_generator(seed: int, episode: Episode, instruction: str) -> np.random.Generator:
