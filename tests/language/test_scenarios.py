@@ -14,8 +14,9 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS
 from roboirg.language import instruct, instruct_with, open_wordings
 from roboirg.language.arms import say_arm
-from roboirg.language.generator import find_refusal
+from roboirg.language.generator import find_refusal, request_of
 from roboirg.language.number_words import ordinal, times
+from roboirg.language.scenarios.choice import choose
 from roboirg.language.scenarios.scenario_file import (
     FOLDER,
     pointer_table,
@@ -142,7 +143,7 @@ def test_every_mistake_of_a_file_is_named_by_scenario_and_field():
     [
         (DIRECT, "turns {repeats} today and ", "", "points at what the"),
         (DIRECT, "loves the", "has a {color} one and loves the", "has 2 antecedents"),
-        (DIRECT, "Let's surprise", "You saw this. Surprise", "in turns it is heard before"),
+        (DIRECT, "Let's surprise", "You saw this. Surprise", "what was seen is not checked"),
         (DIRECT, "The cake", "The second cake", "names second, which could be a value"),
         (DIRECT, "The cake", "Look at that cake", "may be covered"),
         (DIRECT, 'say.color = ["', 'lead = "Twice: "\nsay.color = ["', "names twice"),
@@ -167,6 +168,20 @@ def test_the_checker_names_the_rule_that_a_scenario_breaks(text, before, after, 
     except InvalidValueError as error:  # said no expression of the table
         broken = [str(error)]
     assert any(rule in one for one in broken), broken
+
+
+@pytest.mark.parametrize(("text", "setting"), [(DIRECT, "direct"), (FEWER, "reasoning")])
+def test_one_more_scenario_moves_no_text_but_those_that_say_it(text, setting):
+    (added,) = read_task_scenarios(text, "mine.toml").scenarios
+    ours = [one for one in task_scenarios("PickXtimes").scenarios if one.fields.setting == setting]
+    known = [one for one in ours if one.fields.pool == "train"]
+    told = 0
+    for episode in scenes_of("PickXtimes", 0):
+        request = request_of(episode, InstructionOptions(setting, language=4, wordings="train"))
+        before, after = choose(request, setting, known), choose(request, setting, [*known, added])
+        told += after.scenario is added
+        assert after == before or after.scenario is added
+    assert 3 < told < 60
 
 
 def test_authors_see_a_competing_remark_where_a_setting_has_one():

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, cast, get_args
 
 from roboirg.core.episode import Goal
+from roboirg.language.landmarks import Frame
 
 Form = Literal["implicit", "resolved"]
 UtteranceStage = Literal["introduction", "reinforcement", "distractor", "cue", "command"]
@@ -70,7 +71,7 @@ class Described(NamedTuple):
 
     phrase: str
     kind: Literal["place", "clue"]
-    frame: str
+    frame: Frame
 
 
 class Term(NamedTuple):

@@ -49,6 +49,12 @@ def candidate_goals(meaning: Meaning, episode: Episode) -> tuple[Goal, ...]:
     return _goals_with(values, meaning, episode)
 
 
+def field_values(meaning: Meaning, name: str, episode: Episode) -> Values:
+    """Return the values that an instruction gives a field: none if it is open, one if clear."""
+    term = meaning.terms.get(name)
+    return frozenset() if term is None else _values_of(term, name, episode)
+
+
 def _settled_values(meaning: Meaning, episode: Episode) -> dict[str, Values]:
     return {name: _values_of(meaning.terms[name], name, episode) for name in meaning.settled}
 
@@ -147,11 +153,11 @@ def _thing_at(place: Described, episode: Episode) -> SceneObject | None:
 def _values_of_thing(thing: SceneObject, name: str, episode: Episode) -> Values:
     """Return the values of a field by which a goal would ask for a thing."""
     request = _request_of(episode)
-    found: list[Value] = []
-    for value in _possible_values(name, episode):
-        if thing in request.objects_to_point_at(_goal_value(name, value)):
-            found.append(value)
-    return frozenset(found)
+    return frozenset(
+        value
+        for value in _possible_values(name, episode)
+        if thing in request.objects_to_point_at(_goal_value(name, value))
+    )
 
 
 def _values_seen(clue: Described, name: str, episode: Episode) -> Values:

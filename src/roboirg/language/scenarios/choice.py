@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 from roboirg.language.grounded import Clue
@@ -31,7 +30,6 @@ from roboirg.language.scenarios.scenario import PERSON, Scenario
 from roboirg.language.settings.grounded import clues_of
 from roboirg.language.settings.reasoning import BLOCK
 from roboirg.language.settings.spatial import draw_landmarks
-from roboirg.language.template_sampler import sampler_of
 
 _DESCRIBED = ("place", "clue", "aside", "rest")
 """Slots for a thing that is described; a scenario fits the things that have those that it names."""
@@ -56,38 +54,55 @@ class Chosen(NamedTuple):
     remark: str
 
 
+class _Sayable(NamedTuple):
+    """A way to lead to the goal, and the scenarios that say it."""
+
+    offer: Offer
+    scenarios: Sequence[Scenario]
+
+
 def choose(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
 ) -> Chosen | None:
     """Return what is said in a setting that does not refuse; None if no scenario fits."""
     sampler = request.sampler
-    known = [one for one in scenarios if _fits(one, request)]
-    said = [
-        (offer, saying)
-        for offer in _OFFERS[setting](request)
-        if (saying := [one for one in known if _says(one, offer)])
-    ]
-    if not said:
+    known = [scenario for scenario in scenarios if _fits(scenario, request)]
+    sayable: list[_Sayable] = []
+    for offer in _OFFERS[setting](request):
+        able = [scenario for scenario in known if _says(scenario, offer)]
+        if able:
+            sayable.append(_Sayable(offer, able))
+    if not sayable:
         return None
     if setting == "reasoning":
-        # By the turn of its pattern, as in language 3.
-        patterns = list(dict.fromkeys(offer.notes["pattern"] for offer, _ in said))
-        index = request.episode.index
-        pattern = patterns[(index + index // BLOCK) % len(patterns)]
-        of_pattern = [one for one in said if one[0].notes["pattern"] == pattern]
-        said = [sampler.pick(f"{pattern} derivation", of_pattern)]
-    ((offer, saying),) = said
+        offer, saying = _in_turn(request, sayable)
+    else:
+        ((offer, saying),) = sayable
     purpose = setting.removeprefix("direct-")
-    kinds = sorted({kind for one in saying for kind in one.classes})
-    kind = sampler.pick(f"{purpose} class", kinds)
-    scenario = sampler.pick(f"{purpose} scenario", [one for one in saying if kind in one.classes])
-    sampler.log.append(f"frame/{scenario.fields.frame}")
+    kinds = {kind: kind for scenario in saying for kind in scenario.classes}
+    kind = sampler.pick_named(f"{purpose} class", kinds)
+    of_kind = {scenario.fields.frame: scenario for scenario in saying if kind in scenario.classes}
+    scenario = sampler.pick_named(f"{purpose} scenario", of_kind)
     words = sampler.pick(f"{purpose} words", scenario.classes[kind])
     values = {**goal_values(request), **offer.values}
     if offer.listed is None and scenario.fields.list:
         values |= several("list", _list(request, scenario))
     values |= _people(request, scenario)
     return Chosen(scenario, Introduced(values, offer.notes), words, offer.remark)
+
+
+def _in_turn(request: InstructionRequest, sayable: Sequence[_Sayable]) -> _Sayable:
+    """Draw a derivation of the pattern whose turn it is, as in language 3."""
+    patterns = list(dict.fromkeys(str(way.offer.notes["pattern"]) for way in sayable))
+    index = request.episode.index
+    pattern = patterns[(index + index // BLOCK) % len(patterns)]
+    derivations: dict[str, _Sayable] = {}
+    for way in sayable:
+        notes = way.offer.notes
+        if notes["pattern"] == pattern:
+            name = f"{notes['relation']} {notes['reference']} {way.offer.listed}"
+            derivations[name] = way
+    return request.sampler.pick_named(f"{pattern} derivation", derivations)
 
 
 def _people(request: InstructionRequest, scenario: Scenario) -> Values:
@@ -213,9 +228,9 @@ def _plainest(words: Sequence[str]) -> int:
 
 
 def _rival(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield a pair as in language 3, whose partners make both values equally likely."""
-    pairs = rival_pairs(replace(request, sampler=sampler_of(request.episode)))
-    pair, order = balanced_rival(request, pairs), draw_order(request)
+    """Yield a pair whose partners make both values equally likely."""
+    pair = balanced_rival(request, rival_pairs(request))
+    order = draw_order(request)
     fields = [one.field for one in pair if pair.ordered or one is pair.meant]
     rival = IntroducedValue(pair.rival.slot, pair.meant.slot_type, pair.rival.value)
     both = (named(pair.meant), rival) if order.meant_first else (rival, named(pair.meant))

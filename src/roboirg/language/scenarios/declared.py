@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from roboirg.language.instruction import Described, Term
+from roboirg.language.landmarks import Frame
 from roboirg.language.scenarios.introduced import IntroducedValue
-from roboirg.language.scenarios.markup import Pointer
-from roboirg.language.scenarios.scenario import Operation
+from roboirg.language.scenarios.markup import Operation, Pointer
 
 Operand = str | int | Described
 
@@ -23,6 +24,18 @@ _STEPS: Mapping[Operation, int] = {"before": -1, "after": 1, "two before": -2, "
 """Steps that the operation itself names."""
 
 
+class Remark(NamedTuple):
+    """Words before the command that choose from a list of two, such as *Let's skip the former*.
+
+    Attributes:
+        pointer: the words that point at one of the two.
+        sets_aside: whether it is the other one that is chosen.
+    """
+
+    pointer: Pointer
+    sets_aside: bool
+
+
 @dataclass(slots=True)
 class SaidValues:
     """The values that the words have named so far.
@@ -32,7 +45,7 @@ class SaidValues:
         by_slot: the values of each slot that was said, in the order of speaking.
     """
 
-    frame: str
+    frame: Frame
     by_slot: dict[str, tuple[IntroducedValue, ...]] = field(default_factory=dict)
 
     def add(self, slot: str, values: tuple[IntroducedValue, ...]) -> None:
@@ -69,29 +82,21 @@ def pointed_term(pointer: Pointer, said: SaidValues) -> Term:
     """Return the term of words that point back at what was said."""
     operation, slot = pointer.operation, pointer.of
     if operation == "rank":
-        base = slot.partition(".")[0]
-        members = said.listed("list") or said.listed(base)
-        return Term("rank", members, rank=_rank_of(pointer, said))
+        members = said.listed("list") or said.listed(slot.partition(".")[0])
+        return Term("rank", members, _rank_of(pointer, said))
     if operation == "other":
         members = said.listed("list")
-        taken = said.operands("taken")
-        rank = members.index(taken[0]) + 1 if taken and taken[0] in members else 0
-        return Term("other", members, rank)
-    if operation == "without":
-        return Term("without", said.listed("excluded"))
-    if slot == "rest":
-        return Term("without", said.listed("aside"))
-    if operation in ("double", "half"):
-        return Term("double" if operation == "double" else "half", said.operands(slot))
-    if operation in _STEPS:
-        return Term("step", said.operands(slot), step=_STEPS[operation])
-    if operation in _DIRECTIONS:
-        return Term("step", said.operands(slot), step=_DIRECTIONS[operation] * _step_of(said))
+        return Term("other", members, _taken_rank(members, said))
+    if operation == "without" or slot == "rest":
+        return Term("without", said.listed("excluded") or said.listed("aside"))
+    if operation == "double" or operation == "half":  # noqa: PLR1714 - the type checker narrows it
+        return Term(operation, said.operands(slot))
     operands = said.operands(slot)
     if not operands and "rank" in said.by_slot:
         # "It's the second one's turn, so pick it up": a list was named, then a position in it.
-        return Term("rank", said.listed("list"), rank=_rank_said(said))
-    return Term("same", operands)
+        return Term("rank", said.listed("list"), _rank_said(said))
+    step = _step_of(operation, said)
+    return Term("step" if step else "same", operands, step=step)
 
 
 def _rank_of(pointer: Pointer, said: SaidValues) -> int:
@@ -106,20 +111,28 @@ def _rank_said(said: SaidValues) -> int:
     return int(rank.value)
 
 
-def _step_of(said: SaidValues) -> int:
-    (step,) = said.by_slot["step"]
-    return int(step.value)
+def _taken_rank(members: tuple[Operand, ...], said: SaidValues) -> int:
+    """Return the position in a list of what is said to be taken; 0 if it is not in it."""
+    taken = said.operands("taken")
+    if not taken or taken[0] not in members:
+        return 0
+    return members.index(taken[0]) + 1
 
 
-def chosen_term(remark: str, pointer: Pointer | None, said: SaidValues) -> Term:
-    """Return the term of a value that a remark has chosen from a list of two.
+def _step_of(operation: Operation, said: SaidValues) -> int:
+    """Return by how much an operation differs from the number that was said; 0 for most."""
+    if operation in _DIRECTIONS:
+        (step,) = said.by_slot["step"]
+        return _DIRECTIONS[operation] * int(step.value)
+    return _STEPS.get(operation, 0)
 
-    Args:
-        remark: ``former`` or ``latter``, or what it sets aside: ``not_former``, ``not_latter``.
-        pointer: the words for the field; *the other one* is the one that was not chosen.
-        said: what was said before.
+
+def chosen_term(pointer: Pointer, remark: Remark, said: SaidValues) -> Term:
+    """Return the term of words for a value that a remark has chosen from a list of two.
+
+    *The other one* is the one that was not chosen.
     """
-    rank = 1 if remark in ("former", "not_latter") else 2
-    if pointer is not None and pointer.operation == "other":
-        return Term("other", said.listed("list"), rank)
-    return Term("rank", said.listed("list"), rank)
+    members, rank = said.listed("list"), _RANKS[remark.pointer.expression]
+    if remark.sets_aside:
+        rank = 3 - rank  # of two
+    return Term("other" if pointer.operation == "other" else "rank", members, rank)

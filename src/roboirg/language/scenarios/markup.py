@@ -12,9 +12,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import NamedTuple, Union
+from typing import Literal, NamedTuple, Union
 
 from roboirg.language.phrases import TaggedText
+
+Operation = Literal[
+    "same", "rank", "other", "without", "minus", "plus", "double", "half", "earlier", "later",
+    "before", "after", "two before", "two after", "place", "seen",
+]  # fmt: skip
+"""How a value follows from what a pointer stands for."""
 
 _NAME = r"(?:rival )?[a-z]+(?:\.\d)?"
 _SLOT = re.compile(rf"\{{(?P<name>{_NAME})(?::(?P<form>[a-z -]+))?\}}")
@@ -72,7 +78,7 @@ class Pointer(NamedTuple):
     words: str
     parts: Text
     resolved: Text = ()
-    operation: str = "same"
+    operation: Operation = "same"
 
 
 def parse(text: object) -> Text:

@@ -27,7 +27,12 @@ from roboirg.language.request import (
     UtteranceSpec,
 )
 from roboirg.language.scenarios.choice import Chosen, choose, rival_values
-from roboirg.language.scenarios.declared import SaidValues, chosen_term, pointed_term
+from roboirg.language.scenarios.declared import (
+    Remark,
+    SaidValues,
+    chosen_term,
+    pointed_term,
+)
 from roboirg.language.scenarios.introduced import Introduced, goal_values
 from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, pointers_in, slots_in
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
@@ -125,22 +130,24 @@ def say_chosen(
     said = {scenario.said[0]: chosen.first}
     for name in scenario.said[1:]:
         said[name] = request.sampler.pick(f"{name} words", scenario.texts[f"say.{name}"])
-    lead = speech.phrase(_lead(request, chosen), resolved=request.resolved)
-    fields = {name: speech.field(name, text, chosen.remark) for name, text in said.items()}
-    command = speech.command(fields, lead)
+    lead, remark = _lead(request, chosen)
+    before = speech.phrase(lead, resolved=request.resolved)
+    fields = {name: speech.field(name, text, remark) for name, text in said.items()}
+    command = speech.command(fields, before)
     utterances.append(UtteranceSpec("command", command))
     return InstructionSpec(tuple(utterances), notes, speech.meaning(pointing=fields.keys()))
 
 
-def _lead(request: InstructionRequest, chosen: Chosen) -> Text:
-    """Return the words before the command: the lead, and the remark that chooses."""
+def _lead(request: InstructionRequest, chosen: Chosen) -> tuple[Text, Remark | None]:
+    """Return the words before the command, and the remark in them that chooses, if one does."""
     scenario = chosen.scenario
     if request.resolved and "resolved.lead" in scenario.texts:
-        return scenario.text("resolved.lead")
+        return scenario.text("resolved.lead"), None
     if not chosen.remark:
-        return scenario.text("lead")
-    remark = request.sampler.pick("remark", scenario.texts[f"remarks.{chosen.remark}"])
-    return (*scenario.text("lead"), *remark)
+        return scenario.text("lead"), None
+    text = request.sampler.pick("remark", scenario.texts[f"remarks.{chosen.remark}"])
+    remark = Remark(next(pointers_in(text)), chosen.remark.startswith("not_"))
+    return (*scenario.text("lead"), *text), remark
 
 
 def _stages(
@@ -222,10 +229,10 @@ class Speech:
             return (TaggedText("the "), Slot(name), TaggedText(ends[kind]))
         return (Slot(name, "times" if kind == "number" and name != REFERENCE else None),)
 
-    def field(self, name: str, words: Text, remark: str = "") -> Phrase:
+    def field(self, name: str, words: Text, remark: Remark | None = None) -> Phrase:
         """Return the words for a field of the command, resolved if these are asked for.
 
-        `remark` is the name of the one that chooses; empty if none does.
+        A remark, if there is one, has chosen what they point at.
         """
         scenario = self._scenario
         if self._request.resolved and scenario:
@@ -235,7 +242,7 @@ class Speech:
         phrase = self.phrase(words, resolved=self._request.resolved)
         pointers = list(pointers_in(words))
         if remark and pointers:
-            self._terms[name] = chosen_term(remark, pointers[-1], self._said)
+            self._terms[name] = chosen_term(pointers[-1], remark, self._said)
         elif pointers:
             self._terms[name] = pointed_term(pointers[-1], self._said)
         else:
@@ -292,7 +299,7 @@ class Speech:
         return self._request.around(name, tuple(piece for piece in words if piece.text))
 
     def neutral(self, scenario: Scenario) -> Iterator[Phrase]:
-        """Yield remarks: first the scenario's own in any order, then those about anything, for ever."""
+        """Yield remarks for ever: the scenario's own in any order, then those about anything."""
         own = scenario.texts.get("distractors", ())
         in_any_order = self._request.sampler.cycle("own distractor", own)
         yield from map(self.phrase, itertools.islice(in_any_order, len(own)))
