@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Away, Swap
 from roboirg.core.word_pools import PoolName
 from roboirg.language.grounded import grounded_templates as templates
-from roboirg.language.grounded.clue import Clue
+from roboirg.language.grounded.clue import Clue, ClueKind
 from roboirg.language.landmarks import LandmarkClass, Ranking, candidates_in, nearness, selectors
+from roboirg.language.places import PlaceClass, SpokenPlace, spoken_places
 from roboirg.language.request import GoalValue, InstructionRequest
 
 AXES = ("x", "y")
@@ -24,6 +26,12 @@ FEW = 3
 """Things of which two are set aside."""
 _ANCHORS = (LandmarkClass.EXTREME, LandmarkClass.FIXTURE)
 """Of the two things that are set aside."""
+_SPOKEN: Mapping[PlaceClass, ClueKind] = {
+    PlaceClass.MIDDLE: "betweenness",
+    PlaceClass.BETWEEN: "betweenness",
+    PlaceClass.NEIGHBOR: "bridging",
+}
+"""Places of language 4 that only who sees the others finds, as clues."""
 _LINKS = (
     (0, _ANCHORS),
     (0, (LandmarkClass.CORNER,)),
@@ -133,6 +141,33 @@ def _left_over(
                 for said in templates.LEFT_OVER_SAID.of(pool)
             ]
     return found
+
+
+class SpokenClue(NamedTuple):
+    """A clue in the words of language 4, and the thing that it leads to."""
+
+    thing: SceneObject
+    clue: Clue
+
+
+def spoken_clues(scene: Scene, kind: str) -> Iterator[SpokenClue]:
+    """Yield the clues of language 4 to all things of a kind, from what stands around them."""
+    noun = kind.removeprefix("hidden_")
+    things = candidates_in(scene, kind)
+    anchors: list[SpokenPlace] = []
+    for place in spoken_places(scene, kind, "robot"):
+        if not place.attributive:
+            continue
+        if place.kind in _SPOKEN:
+            clue = Clue(_SPOKEN[place.kind], f"the {noun} {place.attributive}")
+            yield SpokenClue(place.thing, clue)
+        elif place.kind in (PlaceClass.EXTREME, PlaceClass.FIXTURE):
+            anchors.append(place)
+    for first, second in itertools.combinations(anchors, 2):
+        left = [thing for thing in things if thing not in (first.thing, second.thing)]
+        if len(things) == FEW and len(left) == 1:
+            aside = (first.said(None), second.said(None))
+            yield SpokenClue(left[0], Clue("sets", " ".join(aside), aside=aside))
 
 
 def _differ(first: str, second: str) -> bool:

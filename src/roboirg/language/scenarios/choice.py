@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from roboirg.language.grounded import Clue
 from roboirg.language.instruction import REFERENCE
+from roboirg.language.places import USUAL, SpokenPlace, spoken_places
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.rivals.balanced_rivals import balanced_rival
 from roboirg.language.rivals.pair_draw import draw_order
@@ -26,18 +27,14 @@ from roboirg.language.scenarios.introduced import (
     named,
     several,
 )
-from roboirg.language.scenarios.markup import Text, slots_in
+from roboirg.language.scenarios.markup import Slot, Text, slots_said
 from roboirg.language.scenarios.scenario import PERSON, Scenario
 from roboirg.language.settings.grounded import clues_of
 from roboirg.language.settings.reasoning import BLOCK
-from roboirg.language.settings.spatial import draw_landmarks
 from roboirg.language.template_sampler import sampler_of
 
 _DESCRIBED = ("place", "clue", "aside", "rest")
 """Slots for a thing that is described; a scenario fits the things that have those that it names."""
-
-_HEAVY = ("second", "third", "corner")
-"""Words of clues that are hard to follow: *right next to the one second from your left*."""
 
 
 class Chosen(NamedTuple):
@@ -61,26 +58,24 @@ def choose(
 ) -> Chosen | None:
     """Return what is said in a setting that does not refuse; None if no scenario fits."""
     sampler = request.sampler
-    known = [one for one in scenarios if _fits(one, request)]
-    said = [
-        (offer, saying)
-        for offer in _OFFERS[setting](request)
-        if (saying := [one for one in known if _says(one, offer)])
-    ]
-    if not said:
+    known = [scenario for scenario in scenarios if _fits(scenario, request)]
+    possible = _OFFERS[setting](request)
+    offers = [offer for offer in possible if any(_says(scenario, offer) for scenario in known)]
+    if not offers:
         return None
     if setting == "reasoning":
         # By the turn of its pattern, as in language 3.
-        patterns = list(dict.fromkeys(offer.notes["pattern"] for offer, _ in said))
+        patterns = list(dict.fromkeys(offer.notes["pattern"] for offer in offers))
         index = request.episode.index
         pattern = patterns[(index + index // BLOCK) % len(patterns)]
-        of_pattern = [one for one in said if one[0].notes["pattern"] == pattern]
-        said = [sampler.pick(f"{pattern} derivation", of_pattern)]
-    ((offer, saying),) = said
+        of_pattern = [offer for offer in offers if offer.notes["pattern"] == pattern]
+        offers = [sampler.pick(f"{pattern} derivation", of_pattern)]
+    saying = [scenario for scenario in known if any(_says(scenario, offer) for offer in offers)]
     purpose = setting.removeprefix("direct-")
     kinds = sorted({kind for one in saying for kind in one.classes})
     kind = sampler.pick(f"{purpose} class", kinds)
     scenario = sampler.pick(f"{purpose} scenario", [one for one in saying if kind in one.classes])
+    offer = next(offer for offer in offers if _says(scenario, offer))
     sampler.log.append(f"frame/{scenario.fields.frame}")
     words = sampler.pick(f"{purpose} words", scenario.classes[kind])
     values = {**goal_values(request), **offer.values}
@@ -121,12 +116,7 @@ def _says(scenario: Scenario, offer: Offer) -> bool:
     return (
         set(scenario.said) == set(offer.fields)
         and offer.listed in (None, fields.list)
-        and offer.values.keys()
-        >= {
-            name
-            for name in slots_in(scenario.text("introduction"))
-            if name.partition(".")[0] in _DESCRIBED
-        }
+        and all(_has_words(slot, offer) for slot in slots_said(scenario.text("introduction")))
         and (
             derive is None
             or (
@@ -135,6 +125,14 @@ def _says(scenario: Scenario, offer: Offer) -> bool:
             )
         )
     )
+
+
+def _has_words(slot: Slot, offer: Offer) -> bool:
+    """Return whether an offer has words for a slot; those of values are always known."""
+    if slot.name.partition(".")[0] not in _DESCRIBED:
+        return True
+    values = offer.values.get(slot.name, ())
+    return bool(values) and (values[0].kind != "place" or values[0].form == slot.form)
 
 
 def _of_slot(request: InstructionRequest, slot: str) -> list[GoalValue]:
@@ -168,23 +166,52 @@ def _list(request: InstructionRequest, scenario: Scenario) -> Sequence[Introduce
 
 
 def _spatial(request: InstructionRequest) -> Iterator[Offer]:
-    marks = draw_landmarks(request)
-    # Of a single cube "at your far left" may be false; it is the one farthest to the left.
-    phrases = [mark.phrase.replace("at your far", "farthest to your") for mark in marks]
-    at = _plainest(phrases)
-    color = request.color_values[at]
-    place = (IntroducedValue(color.slot, "place", color.value, phrases[at]),)
+    """Yield a place after a noun, and a spot, if there are such words for a thing of the goal."""
+    for form in (None, "spot"):
+        places = _drawn_places(request, form)
+        if places:
+            # Of two things only that with the shorter words has a place.
+            at, place = min(places.items(), key=lambda item: len(item[1].said(form)))
+            yield _placed(request, at, place, form)
+
+
+def _drawn_places(request: InstructionRequest, form: str | None) -> dict[int, SpokenPlace]:
+    """Draw a place for each color of the goal, by its number, that has one in this form.
+
+    The class is drawn first, or most places would be extremes.
+    """
+    found: dict[int, SpokenPlace] = {}
+    scene, pointed = request.episode.scene, request.task.commands.pointed
+    for at, color in enumerate(request.color_values):
+        things = request.objects_to_point_at(color)
+        places = spoken_places(scene, pointed, request.frame)
+        known = [place for place in places if place.thing in things and place.said(form)]
+        usual = [place for place in known if place.kind <= USUAL]
+        if known:
+            possible = usual or known[:1]
+            kinds = list(dict.fromkeys(place.kind for place in possible))
+            kind = request.sampler.pick(f"{form} class-{color.field}", kinds)
+            of_kind = [place for place in possible if place.kind == kind]
+            found[at] = request.sampler.pick(f"{form} place-{color.field}", of_kind)
+    return found
+
+
+def _placed(request: InstructionRequest, at: int, place: SpokenPlace, form: str | None) -> Offer:
+    """Return the offer of a place for the color of a number."""
+    colors = request.color_values
+    color = colors[at]
+    words = place.said(form)
+    value = IntroducedValue(color.slot, "place", color.value, words, form)
     notes: dict[str, object] = {
-        "landmarks": [phrases[at]],
-        "landmark_classes": [marks[at].level],
+        "landmarks": [words],
+        "landmark_classes": [int(place.kind)],
         "frame": request.frame,
     }
-    fields = [one.field for one in request.color_values]
-    yield Offer(fields, {"place": place, f"place.{at}": place}, notes)
+    return Offer([one.field for one in colors], {"place": (value,), f"place.{at}": (value,)}, notes)
 
 
 def _grounded(request: InstructionRequest) -> Iterator[Offer]:
-    clues = clues_of(request, _HEAVY)
+    clues = clues_of(request, spoken=True)
     at = _plainest([clue.words for clue in clues.values()])
     thing, clue = list(clues.items())[at]
     notes: dict[str, object] = {
@@ -198,7 +225,7 @@ def _grounded(request: InstructionRequest) -> Iterator[Offer]:
 def _seen(thing: GoalValue, clue: Clue, at: int) -> Values:
     """Return the slots for a clue; for one that sets two things aside, those of what is left."""
     if not clue.aside:
-        seen = (IntroducedValue(thing.slot, "clue", thing.value, clue.spoken),)
+        seen = (IntroducedValue(thing.slot, "clue", thing.value, clue.words),)
         return {"clue": seen, f"clue.{at}": seen}
     aside = [IntroducedValue("", "place", place, place) for place in clue.aside]
     return {
