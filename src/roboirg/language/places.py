@@ -97,12 +97,18 @@ def spoken_places(scene: Scene, thing: ObjectKind, frame: Frame) -> tuple[Spoken
     places: list[SpokenPlace] = []
     if thing not in PAIRED:
         places += _in_directions(things, frame)
-        for anchor in _anchors(things, scene, frame):
+        if frame == "robot":
+            places += _corners(things)
+        anchors = list(_anchors(things, scene))
+        for place in places:
+            if place.attributive and place.kind != PlaceClass.RANK:
+                name = f"the one {place.attributive}"
+                anchors.append(_Anchor(PlaceClass.NEIGHBOR, name, place.thing))
+        for anchor in anchors:
             places += _near_anchor(anchor, things)
         places += _between(things, scene)
         places += _in_middle(things)
         if frame == "robot":
-            places += _corners(things)
             places += _on_sides(things, scene)
     for selector in selectors(scene, thing, frame):
         places += _said(PlaceClass.UNUSUAL, selector.select(), selector.landmark.phrase)
@@ -233,24 +239,20 @@ def _in_directions(things: Things, frame: Frame) -> Iterator[SpokenPlace]:
 
 
 class _Anchor(NamedTuple):
-    """What is near something: a fixture, the only cube of a color, the first in a direction."""
+    """What is near something: a fixture, the only cube of a color, a thing with a place."""
 
     kind: PlaceClass
     name: str
     thing: SceneObject
 
 
-def _anchors(things: Things, scene: Scene, frame: Frame) -> Iterator[_Anchor]:
+def _anchors(things: Things, scene: Scene) -> Iterator[_Anchor]:
     for fixture in _fixtures_of(scene):
         yield _Anchor(PlaceClass.FIXTURE, f"the {fixture.kind}", fixture)
     colors = [thing.color for thing in things]
     for thing in things:
         if thing.color and colors.count(thing.color) == 1:
             yield _Anchor(PlaceClass.COLOR, f"the {thing.color} cube", thing)
-    for words, direction in zip(_WORDS[frame], directions(frame), strict=True):
-        first = direction.ranking.select(things, 0)
-        if first is not None:
-            yield _Anchor(PlaceClass.NEIGHBOR, f"the one {words.most}", first)
 
 
 def _fixtures_of(scene: Scene) -> list[SceneObject]:
@@ -270,6 +272,8 @@ def _near_anchor(anchor: _Anchor, things: Things) -> Iterator[SpokenPlace]:
     beside = _only(others, _beyond(near, -reach))
     if kind == PlaceClass.FIXTURE:
         yield from _said(kind, beside, f"next to {name}", f"right by {name}")
+        away = near._replace(quantity=lambda thing: -near.quantity(thing))
+        yield from _said(kind, away.select(others, 0), f"farthest from {name}")
     if kind == PlaceClass.COLOR:
         yield from _said(kind, beside, f"next to {name}")
 

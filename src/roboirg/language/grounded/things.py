@@ -31,7 +31,9 @@ _SPOKEN: Mapping[PlaceClass, ClueKind] = {
     PlaceClass.BETWEEN: "betweenness",
     PlaceClass.NEIGHBOR: "bridging",
 }
-"""Places of language 4 that only who sees the others finds, as clues."""
+"""Places of language 4 that only who sees the other things finds, as clues."""
+_ASIDE = (PlaceClass.EXTREME, PlaceClass.FIXTURE, PlaceClass.CORNER)
+"""Places of language 4 of the two things that are set aside."""
 _LINKS = (
     (0, _ANCHORS),
     (0, (LandmarkClass.CORNER,)),
@@ -153,21 +155,29 @@ class SpokenClue(NamedTuple):
 def spoken_clues(scene: Scene, kind: str) -> Iterator[SpokenClue]:
     """Yield the clues of language 4 to all things of a kind, from what stands around them."""
     noun = kind.removeprefix("hidden_")
-    things = candidates_in(scene, kind)
-    anchors: list[SpokenPlace] = []
-    for place in spoken_places(scene, kind, "robot"):
-        if not place.attributive:
-            continue
-        if place.kind in _SPOKEN:
-            clue = Clue(_SPOKEN[place.kind], f"the {noun} {place.attributive}")
-            yield SpokenClue(place.thing, clue)
-        elif place.kind in (PlaceClass.EXTREME, PlaceClass.FIXTURE):
-            anchors.append(place)
-    for first, second in itertools.combinations(anchors, 2):
+    places = [place for place in spoken_places(scene, kind, "robot") if place.attributive]
+    led_to: set[str] = set()
+    for thing, aside in _others_aside(candidates_in(scene, kind), places):
+        led_to.add(thing.name)
+        yield SpokenClue(thing, Clue("sets", " ".join(aside), aside=aside))
+    for place in places:
+        words = f"the {noun} {place.attributive}"
+        # What no one says is said where there is nothing else.
+        is_needed = place.thing.name not in led_to and "nearest to" in words
+        if place.kind in _SPOKEN or (place.kind == PlaceClass.UNUSUAL and is_needed):
+            led_to.add(place.thing.name)
+            yield SpokenClue(place.thing, Clue(_SPOKEN.get(place.kind, "bridging"), words))
+
+
+def _others_aside(
+    things: Sequence[SceneObject], places: Sequence[SpokenPlace]
+) -> Iterator[tuple[SceneObject, tuple[str, str]]]:
+    """Yield each of three things with places of the two others."""
+    simple = [place for place in places if place.kind in _ASIDE]
+    for first, second in itertools.combinations(simple, 2):
         left = [thing for thing in things if thing not in (first.thing, second.thing)]
         if len(things) == FEW and len(left) == 1:
-            aside = (first.said(None), second.said(None))
-            yield SpokenClue(left[0], Clue("sets", " ".join(aside), aside=aside))
+            yield left[0], (first.said(None), second.said(None))
 
 
 def _differ(first: str, second: str) -> bool:

@@ -212,31 +212,31 @@ def _placed(request: InstructionRequest, at: int, place: SpokenPlace, form: str 
 
 def _grounded(request: InstructionRequest) -> Iterator[Offer]:
     clues = clues_of(request, spoken=True)
-    at = _plainest([clue.words for clue in clues.values()])
-    thing, clue = list(clues.items())[at]
+    if not clues:
+        return
+    # Of two things only that with the shorter words is described.
+    thing, clue = min(clues.items(), key=lambda item: len(item[1].words))
+    alike = [value for value in request.goal_values if value.slot == thing.slot]
+    fields = {value.field for value in (*clues, *alike)}
     notes: dict[str, object] = {
         "touched": [thing.slot],
         "pattern": clue.kind,
         "patterns": [clue.kind],
     }
-    yield Offer([one.field for one in clues], _seen(thing, clue, at), notes)
+    yield Offer(fields, _seen(thing, clue), notes)
 
 
-def _seen(thing: GoalValue, clue: Clue, at: int) -> Values:
+def _seen(thing: GoalValue, clue: Clue) -> Values:
     """Return the slots for a clue; for one that sets two things aside, those of what is left."""
     if not clue.aside:
         seen = (IntroducedValue(thing.slot, "clue", thing.value, clue.words),)
-        return {"clue": seen, f"clue.{at}": seen}
+        _, _, number = thing.field.partition(".")
+        return {"clue": seen, f"clue.{number}": seen}
     aside = [IntroducedValue("", "place", place, place) for place in clue.aside]
     return {
         "rest": (IntroducedValue(thing.slot, "clue", thing.value, "one"),),
         **several("aside", aside),
     }
-
-
-def _plainest(words: Sequence[str]) -> int:
-    """Return which of several things is described, the shortest way; the others are named."""
-    return min(range(len(words)), key=lambda at: len(words[at]))
 
 
 def _rival(request: InstructionRequest) -> Iterator[Offer]:

@@ -92,8 +92,9 @@ def clues_of(request: InstructionRequest, *, spoken: bool = False) -> Clues:
         if clue is not None:
             found[value] = clue
     colors = request.color_values
-    if len(colors) > MOST_COLORS or any(one not in found for one in colors):
-        # The words describe all colors of the goal, or none.
+    some_lack = not spoken and any(one not in found for one in colors)
+    if len(colors) > MOST_COLORS or some_lack:
+        # The words describe all colors of the goal, or none; those of language 4 only one.
         found = {value: clue for value, clue in found.items() if value not in colors}
     if any(one.slot == "colors" for one in found):
         found = {value: clue for value, clue in found.items() if value.slot != "counts"}
