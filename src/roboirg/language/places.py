@@ -95,26 +95,31 @@ def spoken_places(scene: Scene, thing: ObjectKind, frame: Frame) -> tuple[Spoken
     """
     things = candidates_in(scene, thing)
     places: list[SpokenPlace] = []
-    if thing not in PAIRED:
-        places += _in_directions(things, frame)
-        if frame == "robot":
-            places += _corners(things)
-        anchors = list(_anchors(things, scene))
-        for place in places:
-            if place.attributive and place.kind != PlaceClass.RANK:
-                name = f"the one {place.attributive}"
-                anchors.append(_Anchor(PlaceClass.NEIGHBOR, name, place.thing))
-        for anchor in anchors:
-            places += _near_anchor(anchor, things)
-        places += _between(things, scene)
-        places += _in_middle(things)
-        if frame == "robot":
-            places += _on_sides(things, scene)
+    if things and thing not in PAIRED:
+        places += _usual_places(scene, things, frame)
     for selector in selectors(scene, thing, frame):
         places += _said(PlaceClass.UNUSUAL, selector.select(), selector.landmark.phrase)
     if len(things) == 1:
         places = [place._replace(attributive=None) for place in places if place.spot]
     return tuple(sorted(places, key=lambda place: place.kind))
+
+
+def _usual_places(scene: Scene, things: Things, frame: Frame) -> list[SpokenPlace]:
+    """Return the places that people say, and the neighbors of what has one of the simplest."""
+    places = list(_in_directions(things, frame))
+    if frame == "robot":
+        places += _corners(things)
+        places += _on_sides(things, scene)
+    anchors = list(_anchors(things, scene))
+    for place in places:
+        if place.attributive and place.kind in (PlaceClass.EXTREME, PlaceClass.CORNER):
+            name = f"the one {place.attributive}"
+            anchors.append(_Anchor(PlaceClass.NEIGHBOR, name, place.thing))
+    for anchor in anchors:
+        places += _near_anchor(anchor, things)
+    places += _between(things, scene)
+    places += _in_middle(things)
+    return places
 
 
 @lru_cache(maxsize=64)
