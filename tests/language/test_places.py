@@ -234,6 +234,7 @@ def test_the_place_of_a_thing_alone_on_the_table_is_no_choice_among_others():
         places = spoken_places(scene, "cube", "robot")
         assert places
         assert not any(place.attributive for place in places)
+        assert not any("corner" in place.spot for place in places)
     assert usual(cubes((0.0, 0.1), (0.0, 0.0)), "cube_green", "cube").isdisjoint(
         {"nearest to the red cube", "next to the red cube"}
     )

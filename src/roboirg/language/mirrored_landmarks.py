@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -39,8 +40,9 @@ def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str,
     objects = things_at(episode.scene, get_task(episode.task).commands.pointed, frame)
     alike = _of_same_color if "counts" in episode.goal.as_mapping() else _alone
     names: dict[str, frozenset[str]] = {}
-    for phrase, item in objects.items():
-        if item is not None and (phrase in places or exchange_sides(phrase) in places):
+    for phrase in itertools.chain(places, map(exchange_sides, places)):
+        item = objects.get(phrase)
+        if item is not None:
             names[phrase] = alike(episode.scene, item)
     all_meant = frozenset[str]().union(*(names[place] for place in places if place in names))
     found: dict[str, frozenset[str]] = {}

@@ -123,14 +123,15 @@ def _usual_places(scene: Scene, things: Things, frame: Frame) -> list[SpokenPlac
 
 
 @lru_cache(maxsize=64)
-def things_at(scene: Scene, thing: ObjectKind, frame: Frame) -> Mapping[str, SceneObject | None]:
-    """Return what each phrase for a place singles out, in either language."""
-    found: dict[str, SceneObject | None] = {}
+def things_at(
+    scene: Scene, thing: ObjectKind, frame: Frame
+) -> Mapping[str | None, SceneObject | None]:
+    """Return what each phrase for a place singles out, in either language; None if unclear."""
+    found: dict[str | None, SceneObject | None] = {}
     for selector in selectors(scene, thing, frame):
-        found.setdefault(selector.landmark.phrase, selector.select())
+        found[selector.landmark.phrase] = selector.select()
     for place in spoken_places(scene, thing, frame):
-        for phrase in filter(None, (place.attributive, place.spot)):
-            found[phrase] = place.thing
+        found |= {place.attributive: place.thing, place.spot: place.thing}
     return found
 
 
@@ -320,7 +321,9 @@ def _corners(things: Things) -> Iterator[SpokenPlace]:
             yield from _said(PlaceClass.CORNER, thing, words, words)
             thing = _only(things, _beyond(quarter, _CLEARLY * MARGIN))
             words = f"in the {depth} {side} corner"
-            yield from _said(PlaceClass.CORNER, thing, words, words)
+            # Of the area where things stand: one alone is in none.
+            spot = words if len(things) > 1 else None
+            yield from _said(PlaceClass.CORNER, thing, words, spot)
 
 
 def _on_sides(things: Things, scene: Scene) -> Iterator[SpokenPlace]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -152,32 +152,33 @@ class SpokenClue(NamedTuple):
     clue: Clue
 
 
-def spoken_clues(scene: Scene, kind: str) -> Iterator[SpokenClue]:
-    """Yield the clues of language 4 to all things of a kind, from what stands around them."""
+def spoken_clues(scene: Scene, kind: str) -> list[SpokenClue]:
+    """Return the clues of language 4 to all things of a kind, from what stands around them."""
     noun = kind.removeprefix("hidden_")
     places = [place for place in spoken_places(scene, kind, "robot") if place.attributive]
-    led_to: set[str] = set()
-    for thing, aside in _others_aside(candidates_in(scene, kind), places):
-        led_to.add(thing.name)
-        yield SpokenClue(thing, Clue("sets", " ".join(aside), aside=aside))
+    found = _with_others_aside(candidates_in(scene, kind), places)
     for place in places:
-        words = f"the {noun} {place.attributive}"
-        # What no one says is said where there is nothing else.
-        is_needed = place.thing.name not in led_to and "nearest to" in words
-        if place.kind in _SPOKEN or (place.kind == PlaceClass.UNUSUAL and is_needed):
-            led_to.add(place.thing.name)
-            yield SpokenClue(place.thing, Clue(_SPOKEN.get(place.kind, "bridging"), words))
+        clue = Clue(_SPOKEN.get(place.kind, "bridging"), f"the {noun} {place.attributive}")
+        # A neighbor in words that no one says is said where there is nothing else.
+        is_rare = place.kind == PlaceClass.UNUSUAL and "nearest to" in clue.words
+        is_led_to = any(place.thing is known.thing for known in found)
+        if place.kind in _SPOKEN or (is_rare and not is_led_to):
+            found.append(SpokenClue(place.thing, clue))
+    return found
 
 
-def _others_aside(
+def _with_others_aside(
     things: Sequence[SceneObject], places: Sequence[SpokenPlace]
-) -> Iterator[tuple[SceneObject, tuple[str, str]]]:
-    """Yield each of three things with places of the two others."""
-    simple = [place for place in places if place.kind in _ASIDE]
+) -> list[SpokenClue]:
+    """Return the clues to each of three things by the places of the two others."""
+    found: list[SpokenClue] = []
+    simple = [place for place in places if place.kind in _ASIDE and len(things) == FEW]
     for first, second in itertools.combinations(simple, 2):
         left = [thing for thing in things if thing not in (first.thing, second.thing)]
-        if len(things) == FEW and len(left) == 1:
-            yield left[0], (first.said(None), second.said(None))
+        if len(left) == 1:
+            aside = (first.said(None), second.said(None))
+            found.append(SpokenClue(left[0], Clue("sets", " ".join(aside), aside=aside)))
+    return found
 
 
 def _differ(first: str, second: str) -> bool:

@@ -167,12 +167,21 @@ def _list(request: InstructionRequest, scenario: Scenario) -> Sequence[Introduce
 
 def _spatial(request: InstructionRequest) -> Iterator[Offer]:
     """Yield a place after a noun, and a spot, if there are such words for a thing of the goal."""
+    colors = request.color_values
     for form in (None, "spot"):
-        places = _drawn_places(request, form)
-        if places:
+        drawn = _drawn_places(request, form)
+        if drawn:
             # Of two things only that with the shorter words has a place.
-            at, place = min(places.items(), key=lambda item: len(item[1].said(form)))
-            yield _placed(request, at, place, form)
+            at, place = min(drawn.items(), key=lambda item: len(item[1].said(form)))
+            words = place.said(form)
+            value = (IntroducedValue(colors[at].slot, "place", colors[at].value, words, form),)
+            notes: dict[str, object] = {
+                "landmarks": [words],
+                "landmark_classes": [int(place.kind)],
+                "frame": request.frame,
+            }
+            fields = [color.field for color in colors]
+            yield Offer(fields, {"place": value, f"place.{at}": value}, notes)
 
 
 def _drawn_places(request: InstructionRequest, form: str | None) -> dict[int, SpokenPlace]:
@@ -181,33 +190,17 @@ def _drawn_places(request: InstructionRequest, form: str | None) -> dict[int, Sp
     The class is drawn first, or most places would be extremes.
     """
     found: dict[int, SpokenPlace] = {}
-    scene, pointed = request.episode.scene, request.task.commands.pointed
+    places = spoken_places(request.episode.scene, request.task.commands.pointed, request.frame)
     for at, color in enumerate(request.color_values):
         things = request.objects_to_point_at(color)
-        places = spoken_places(scene, pointed, request.frame)
         known = [place for place in places if place.thing in things and place.said(form)]
-        usual = [place for place in known if place.kind <= USUAL]
-        if known:
-            possible = usual or known[:1]
+        possible = [place for place in known if place.kind <= USUAL] or known[:1]
+        if possible:
             kinds = list(dict.fromkeys(place.kind for place in possible))
             kind = request.sampler.pick(f"{form} class-{color.field}", kinds)
             of_kind = [place for place in possible if place.kind == kind]
             found[at] = request.sampler.pick(f"{form} place-{color.field}", of_kind)
     return found
-
-
-def _placed(request: InstructionRequest, at: int, place: SpokenPlace, form: str | None) -> Offer:
-    """Return the offer of a place for the color of a number."""
-    colors = request.color_values
-    color = colors[at]
-    words = place.said(form)
-    value = IntroducedValue(color.slot, "place", color.value, words, form)
-    notes: dict[str, object] = {
-        "landmarks": [words],
-        "landmark_classes": [int(place.kind)],
-        "frame": request.frame,
-    }
-    return Offer([one.field for one in colors], {"place": (value,), f"place.{at}": (value,)}, notes)
 
 
 def _grounded(request: InstructionRequest) -> Iterator[Offer]:
