@@ -3,7 +3,8 @@
 A place has two wordings. *All the way on the right* follows a noun and singles out one of several
 things; *on the far right* says where something is or happens, and needs a truth of its own: the
 thing stands clearly there, and no other one does. Left and right are those of a frame, as in
-`landmarks`, and its margins hold: if one thing moves by less, no phrase goes over to another thing.
+`landmarks`, and its margins hold: if one thing moves by less, no phrase goes over to another thing
+(by half of it, if others are named as near to the one that moves).
 """
 
 from __future__ import annotations
@@ -69,7 +70,7 @@ class SpokenPlace(NamedTuple):
         kind: class.
         thing: what the words single out, by the margin.
         attributive: words after a noun: *the cube* **nearest to the button**. None for the only
-            thing of its kind on the table, which nobody tells from others.
+            thing of its kind on the table, which needs no telling apart.
         spot: words for where something happens: *the table wobbles* **right by the button**. None
             if the thing is not clearly there alone.
     """
