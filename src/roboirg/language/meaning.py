@@ -8,14 +8,13 @@ with their margins; the goal of the episode is never read.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import cast
 
 from roboirg.core.episode import Episode, Goal, SceneObject
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.grounded import spoken_clues
 from roboirg.language.instruction import Described, Meaning, Term
-from roboirg.language.landmarks import Frame, candidates_in
+from roboirg.language.landmarks import candidates_in
 from roboirg.language.places import things_at
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.template_sampler import sampler_of
@@ -145,7 +144,7 @@ def _operand_values(operand: Value | Described, name: str, episode: Episode) -> 
 def _thing_at(place: Described, episode: Episode) -> SceneObject | None:
     """Return the only thing at a place; None if none is clear by the margin."""
     pointed = get_task(episode.task).commands.pointed
-    return things_at(episode.scene, pointed, cast("Frame", place.frame)).get(place.phrase)
+    return things_at(episode.scene, pointed, place.frame).get(place.phrase)
 
 
 def _values_of_thing(thing: SceneObject, name: str, episode: Episode) -> Values:
