@@ -12,10 +12,10 @@ from collections.abc import Mapping
 from roboirg.core.episode import Episode, Goal, SceneObject
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.word_pools import POOLS
-from roboirg.language.grounded import thing_clues
+from roboirg.language.grounded import spoken_clues
 from roboirg.language.instruction import Described, Meaning, Term
-from roboirg.language.landmarks import candidates_in, selectors
+from roboirg.language.landmarks import candidates_in
+from roboirg.language.places import things_at
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.template_sampler import sampler_of
 from roboirg.language.worded_command import fields_of
@@ -143,11 +143,8 @@ def _operand_values(operand: Value | Described, name: str, episode: Episode) -> 
 
 def _thing_at(place: Described, episode: Episode) -> SceneObject | None:
     """Return the only thing at a place; None if none is clear by the margin."""
-    thing = get_task(episode.task).commands.pointed
-    for selector in selectors(episode.scene, thing, place.frame):
-        if selector.landmark.phrase == place.phrase:
-            return selector.select()
-    return None
+    pointed = get_task(episode.task).commands.pointed
+    return things_at(episode.scene, pointed, place.frame).get(place.phrase)
 
 
 def _values_of_thing(thing: SceneObject, name: str, episode: Episode) -> Values:
@@ -162,14 +159,11 @@ def _values_of_thing(thing: SceneObject, name: str, episode: Episode) -> Values:
 
 def _values_seen(clue: Described, name: str, episode: Episode) -> Values:
     """Return the values of a field that have a clue in the scene or the video."""
-    found: list[Value] = []
-    for pool in POOLS:
-        request = _request_of(episode, pool)
-        for value in _possible_values(name, episode):
-            clues = thing_clues(request, _goal_value(name, value))
-            if any(known.spoken == clue.phrase for known in clues):
-                found.append(value)
-    return frozenset(found)
+    pointed = get_task(episode.task).commands.pointed
+    for thing, known in spoken_clues(episode.scene, pointed):
+        if known.words == clue.phrase:
+            return _values_of_thing(thing, name, episode)
+    return frozenset()
 
 
 def _goal_value(name: str, value: Value) -> GoalValue:
@@ -177,7 +171,7 @@ def _goal_value(name: str, value: Value) -> GoalValue:
     return GoalValue(name, slot, SLOT_TYPE_NAMES[slot], value)
 
 
-def _request_of(episode: Episode, pool: str | None = None) -> InstructionRequest:
-    """Return a request by which things and clues of a scene are looked up."""
-    options = InstructionOptions("grounded", wordings=pool)
+def _request_of(episode: Episode) -> InstructionRequest:
+    """Return a request by which things of a scene are looked up."""
+    options = InstructionOptions("grounded")
     return InstructionRequest(episode, get_task(episode.task), options, sampler_of(episode))

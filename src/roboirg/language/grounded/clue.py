@@ -31,11 +31,6 @@ class Clue(NamedTuple):
     of_handled: bool = False
     aside: tuple[str, ...] = ()
 
-    @property
-    def spoken(self) -> str:
-        """The words in a sentence that people say."""
-        return self.words.replace("that comes ", "").replace("that is ", "")
-
 
 def draw_clue(request: InstructionRequest, purpose: str, clues: Sequence[Clue]) -> Clue | None:
     """Draw the kind first, then one of its clues; None if there is none."""

@@ -20,7 +20,7 @@ _RANKS: Mapping[str, int] = {"former": 1, "latter": 2, "first": 1, "second": 2, 
 """Positions that classes of expressions name."""
 _DIRECTIONS: Mapping[Operation, int] = {"minus": -1, "earlier": -1, "plus": 1, "later": 1}
 """Of a step that is said."""
-_STEPS: Mapping[Operation, int] = {"before": -1, "after": 1, "two before": -2, "two after": 2}
+_STEPS: Mapping[Operation, int] = {"before": -1, "after": 1}
 """Steps that the operation itself names."""
 
 
@@ -94,7 +94,7 @@ def pointed_term(pointer: Pointer, said: SaidValues) -> Term:
     operands = said.operands(slot)
     if not operands and "rank" in said.by_slot:
         # "It's the second one's turn, so pick it up": a list was named, then a position in it.
-        return Term("rank", said.listed("list"), _rank_said(said))
+        return Term("rank", said.listed("list"), _rank_of(pointer, said))
     step = _step_of(operation, said)
     return Term("step" if step else "same", operands, step=step)
 
@@ -103,10 +103,6 @@ def _rank_of(pointer: Pointer, said: SaidValues) -> int:
     """Return the position that words name, by their class or as the number in them."""
     if pointer.expression in _RANKS:
         return _RANKS[pointer.expression]
-    return _rank_said(said)
-
-
-def _rank_said(said: SaidValues) -> int:
     (rank,) = said.by_slot["rank"]
     return int(rank.value)
 

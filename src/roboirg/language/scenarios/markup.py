@@ -1,8 +1,8 @@
 """The marks in the sentences of a scenario: slots, pointers and agreement.
 
 =================================  ================================================================
-``{color}``, ``{repeats:lap}``     a slot; after the colon a form: ``times``, ``ordinal``, ``or`` …,
-                                   or a noun to be counted, *three laps*
+``{color}``, ``{repeats:lap}``     a slot; after the colon a form: ``times``, ``ordinal``, ``or``,
+                                   ``spot`` …, or a noun to be counted, *three laps*
 ``<it color: it>``                 words that point back, after their class and what they stand for
 ``[repeats: lap|laps]``            singular or plural, by the slot that decides
 =================================  ================================================================
@@ -18,7 +18,7 @@ from roboirg.language.phrases import TaggedText
 
 Operation = Literal[
     "same", "rank", "other", "without", "minus", "plus", "double", "half", "earlier", "later",
-    "before", "after", "two before", "two after", "place", "seen",
+    "before", "after", "place", "seen",
 ]  # fmt: skip
 """How a value follows from what a pointer stands for."""
 
@@ -112,6 +112,11 @@ def _parsed(mark: re.Match[str]) -> Part:
     if mark["name"]:
         return Slot(mark["name"], mark["form"])
     return Agreement(mark["controller"], mark["one"], mark["many"])
+
+
+def slots_said(text: Text) -> Iterator[Slot]:
+    """Yield the slots that a sentence says outside of its pointers."""
+    return (part for part in text if isinstance(part, Slot))
 
 
 def pointers_in(text: Text) -> Iterator[Pointer]:
