@@ -34,9 +34,8 @@ Stored = TypeVar("Stored")
 PRONOUNS = {"he": ("he", "him", "his", "his"), "she": ("she", "her", "her", "hers")}
 GIVEN = frozenset(
     {"list", "list.0", "list.1", "list.2", "rank", "reference", "step", "taken"}
-    | {"excluded", "excluded.0", "excluded.1"}
     | {"place", "place.0", "place.1", "clue", "clue.0", "clue.1", "aside.0", "aside.1", "rest"}
-    | {"total"}
+    | {"total", "excluded", "excluded.0", "excluded.1"}
     | PEOPLE
 )
 """Slots that are no fields of the goal."""
