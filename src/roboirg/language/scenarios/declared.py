@@ -20,7 +20,7 @@ _RANKS: Mapping[str, int] = {"former": 1, "latter": 2, "first": 1, "second": 2, 
 """Positions that classes of expressions name."""
 _DIRECTIONS: Mapping[Operation, int] = {"minus": -1, "earlier": -1, "plus": 1, "later": 1}
 """Of a step that is said."""
-_STEPS: Mapping[Operation, int] = {"before": -1, "after": 1, "two before": -2, "two after": 2}
+_STEPS: Mapping[Operation, int] = {"before": -1, "after": 1}
 """Steps that the operation itself names."""
 
 
@@ -87,14 +87,16 @@ def pointed_term(pointer: Pointer, said: SaidValues) -> Term:
     if operation == "other":
         members = said.listed("list")
         return Term("other", members, _taken_rank(members, said))
-    if operation == "without":
-        return Term("without", said.operands("excluded"))
-    if slot == "rest":
-        return Term("without", said.listed("aside"))
+    if operation == "without" or slot == "rest":
+        return Term("without", said.listed("excluded") or said.listed("aside"))
     if operation == "double" or operation == "half":  # noqa: PLR1714 - the type checker narrows it
         return Term(operation, said.operands(slot))
+    operands = said.operands(slot)
+    if not operands and "rank" in said.by_slot:
+        # "It's the second one's turn, so pick it up": a list was named, then a position in it.
+        return Term("rank", said.listed("list"), _rank_of(pointer, said))
     step = _step_of(operation, said)
-    return Term("step" if step else "same", said.operands(slot), step=step)
+    return Term("step" if step else "same", operands, step=step)
 
 
 def _rank_of(pointer: Pointer, said: SaidValues) -> int:

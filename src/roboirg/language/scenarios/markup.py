@@ -18,7 +18,7 @@ from roboirg.language.phrases import TaggedText
 
 Operation = Literal[
     "same", "rank", "other", "without", "minus", "plus", "double", "half", "earlier", "later",
-    "before", "after", "two before", "two after", "place", "seen",
+    "before", "after", "place", "seen",
 ]  # fmt: skip
 """How a value follows from what a pointer stands for."""
 

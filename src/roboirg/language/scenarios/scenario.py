@@ -16,8 +16,8 @@ from roboirg.language.scenarios.markup import Operation, Text
 ScenarioSetting = Literal["direct", "reasoning", "spatial", "direct-rival", "grounded"]
 """The settings that scenarios are written for; contextual takes those of direct."""
 Texts = tuple[str, ...]
-PERSON = ("person", "he", "him", "his")
-"""The slots of a person; those of another one end in ``.2``."""
+PERSON = ("person", "he", "him", "his", "hers")
+"""The slots of a person, ``hers`` for *his* or *hers* alone; those of another one end in ``.2``."""
 PEOPLE = frozenset(f"{slot}{number}" for number in ("", ".2") for slot in PERSON)
 """Those of both."""
 REMARKS = ("former", "latter", "not_former", "not_latter")

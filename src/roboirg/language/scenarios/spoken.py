@@ -131,8 +131,9 @@ def say_chosen(
     for name in scenario.said[1:]:
         said[name] = request.sampler.pick(f"{name} words", scenario.texts[f"say.{name}"])
     lead, remark = _lead(request, chosen)
+    before = speech.phrase(lead, resolved=request.resolved)
     fields = {name: speech.field(name, text, remark) for name, text in said.items()}
-    command = speech.command(fields, lead)
+    command = speech.command(fields, before)
     utterances.append(UtteranceSpec("command", command))
     return InstructionSpec(tuple(utterances), notes, speech.meaning(pointing=fields.keys()))
 
@@ -255,9 +256,8 @@ class Speech:
             settled -= set(pointing)
         return Meaning(dict(self._terms), frozenset(settled))
 
-    def command(self, fields: Mapping[str, Phrase], lead: Text) -> Phrase:
+    def command(self, fields: Mapping[str, Phrase], lead: Phrase) -> Phrase:
         """Return the command with the words for some fields; the others state their values."""
-        before = self.phrase(lead, resolved=self._request.resolved)
         if self._request.wordings is not None:
             skeleton = self._request.command(
                 {name: self._outside(name, words) for name, words in fields.items()}
@@ -265,10 +265,10 @@ class Speech:
         else:
             skeleton = self._skeleton(fields)
         if lead:
-            before = _begun(before, str.upper)
-            ended = before[-1].text.endswith((". ", "! ", "? "))
+            lead = _begun(lead, str.upper)
+            ended = lead[-1].text.endswith((". ", "! ", "? "))
             skeleton = skeleton if ended else _begun(skeleton, str.lower)
-        return (*before, *skeleton)
+        return (*lead, *skeleton)
 
     def _skeleton(self, fields: Mapping[str, Phrase]) -> Phrase:
         wanted = frozenset(value.field for value in self._request.goal_values)
@@ -299,8 +299,10 @@ class Speech:
         return self._request.around(name, tuple(piece for piece in words if piece.text))
 
     def neutral(self, scenario: Scenario) -> Iterator[Phrase]:
-        """Yield remarks: first the scenario's own, then those about anything, for ever."""
-        yield from map(self.phrase, scenario.texts.get("distractors", ()))
+        """Yield remarks for ever: the scenario's own in any order, then those about anything."""
+        own = scenario.texts.get("distractors", ())
+        in_any_order = self._request.sampler.cycle("own distractor", own)
+        yield from map(self.phrase, itertools.islice(in_any_order, len(own)))
         known = general().distractors[self._request.pool]
         yield from map(plain, self._request.sampler.cycle("distractor", known))
 
