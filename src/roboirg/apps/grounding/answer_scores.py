@@ -12,9 +12,10 @@ import numpy as np
 
 from roboirg.core.arms import TOLD
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.versions import Versions
 from roboirg.evaluation.analysis.results.frame import MISSING, Frame, as_column, task_order
 from roboirg.evaluation.analysis.results.option_labels import options_sort_key
-from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun, Versions
+from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
 from roboirg.evaluation.grounding_items.answer_file import Answer

@@ -12,6 +12,7 @@ import msgspec
 
 from roboirg.core.arms import TOLD
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.versions import Versions
 from roboirg.evaluation.records.action_log import action_path
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
 from roboirg.evaluation.records.film import poster_name
@@ -113,28 +114,39 @@ def _read_checked(line: bytes, path: Path, number: int) -> Summary:
 
 
 def _check_versions(runs: Sequence[tuple[Path, Iterable[Summary]]]) -> None:
-    """Refuse records of different versions, as a run does."""
-    first: dict[object, tuple[Path, object]] = {}
-    for folder, entries in runs:
-        for one in entries:
-            for what, value in (
-                (("language version",), one.language_version),
-                (("environment version",), one.environment_version),
-                (("version", "of policy", one.policy), one.policy_version),
-                *(
-                    [(("version", "of the server of", one.policy), one.server_version)]
-                    if one.outcome != "error"
-                    else []
-                ),
-                (("seed", "of", one.task, one.split, one.episode), one.seed),
-            ):
-                there, expected = first.setdefault(what, (folder, value))
-                if value != expected:
-                    raise StoreError(
-                        f"{folder} and {there} cannot be merged: the "
-                        f"{' '.join(map(str, what))} is {value!r} in the first and "
-                        f"{expected!r} in the second."
-                    )
+    """Refuse records of different versions, policies or scenes, as a run does."""
+    known: dict[str, tuple[Path, Versions]] = {}
+    seeds: dict[str, tuple[Path, int]] = {}
+    for folder, results in runs:
+        for result in results:
+            for owner, versions in _by_owner(result).items():
+                there, expected = known.setdefault(owner, (folder, versions))
+                for what, value, other in versions.differences(expected):
+                    raise _unmergeable(folder, there, what + owner, value, other)
+                if expected.server is None:  # an error's, which is not compared
+                    known[owner] = folder, versions
+            scene = f"{result.task} {result.split} {result.episode}"
+            there, seed = seeds.setdefault(scene, (folder, result.seed))
+            if result.seed != seed:
+                raise _unmergeable(folder, there, f"seed of {scene}", result.seed, seed)
+
+
+def _by_owner(result: Summary) -> dict[str, Versions]:
+    """Return the versions of a result, each by the words for what they are versions of."""
+    versions = result.versions
+    server = None if result.outcome == "error" else versions.server
+    return {
+        "": Versions(environment=versions.environment),
+        f" of language {result.options.language}": Versions(language=versions.language),
+        f" of {result.policy}": versions._replace(environment=None, language=None, server=server),
+    }
+
+
+def _unmergeable(folder: Path, there: Path, what: str, value: object, other: object) -> StoreError:
+    return StoreError(
+        f"{folder} and {there} cannot be merged: the {what} is {value} in the first and {other} in "
+        "the second."
+    )
 
 
 def _lines(

@@ -27,6 +27,7 @@ from roboirg.core.error_words import one_line
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
 from roboirg.core.version import __version__
+from roboirg.core.versions import NO_VERSION, Versions
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.play.rollout import PlayJob
@@ -40,6 +41,9 @@ KEY_S = 1.0
 
 _PID_SUFFIX = ".pid"
 """Of empty files named after the processes of a run on a machine."""
+
+_NO_LANGUAGE = Versions(language=NO_VERSION)
+"""Of a machine that lacks one of the languages."""
 
 
 class MachineVersions(NamedTuple):
@@ -64,23 +68,21 @@ class MachineVersions(NamedTuple):
 
     def difference(self, there: MachineVersions) -> str | None:
         """Return how another machine differs, in words; None if it does not."""
-        pairs = [
-            ("roboirg", self.roboirg, there.roboirg),
-            *(
-                (f"its language {one}", version, there.languages.get(one, "none"))
-                for one, version in self.languages.items()
-            ),
-            ("its environment", self.environment, there.environment),
-            *(
-                (mine.spec, mine.version, theirs.version)
-                for mine, theirs in zip(self.policies, there.policies, strict=True)
-                if mine.version != UNKNOWN_VERSION
-            ),
-        ]
-        for what, mine, theirs in pairs:
-            if mine != theirs:
-                return f"{what} has version {theirs} there and {mine} here"
+        found = there._by_owner()
+        for owner, versions in self._by_owner().items():
+            for what, mine, theirs in versions.differences(found.get(owner, _NO_LANGUAGE)):
+                return f"the {what}{owner} is {theirs} there and {mine} here"
         return None
+
+    def _by_owner(self) -> dict[str, Versions]:
+        """Return the versions, each by the words for what they are versions of."""
+        found = {"": Versions(package=self.roboirg, environment=self.environment)}
+        for language, version in self.languages.items():
+            found[f" of language {language}"] = Versions(language=version)
+        for policy in self.policies:
+            if policy.version != UNKNOWN_VERSION:
+                found[f" of {policy.spec}"] = policy.versions
+        return found
 
 
 class HostAddress(NamedTuple):

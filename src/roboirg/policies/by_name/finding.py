@@ -10,6 +10,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import (
     BUILT_IN,
+    CLASS,
     ELSEWHERE,
     PRIVILEGED,
     SCRIPTED,
@@ -18,9 +19,10 @@ from roboirg.core.policy_ref import (
     Place,
     PolicyRef,
 )
+from roboirg.core.versions import POLICY
+from roboirg.policies.by_name.makeup import makeup_of
 from roboirg.policies.by_name.policy_classes import find_class
 from roboirg.policies.by_name.policy_kinds import (
-    CLASS,
     LISTENER,
     LIVE,
     find_kind,
@@ -82,12 +84,14 @@ def read_policy(spec: str, name: str | None = None) -> PolicyRef:
         )
     if is_foreign:
         place: Place = "world" if ref.is_declared else "split" if is_split else "own"
-        return replace(ref, place=place, is_privileged=ref.is_declared or is_split)
-    known = look_up(ref)
-    if find_kind(kind).has_weights:
-        # What acts on the world by its state is next to it, even if it is trained.
-        return replace(known, place="world" if known.is_privileged else "own")
-    return replace(known, place="server" if is_url(spec) else "world")
+        known = replace(ref, is_privileged=ref.is_declared or is_split)
+    else:
+        known = look_up(ref)
+        place = "server" if is_url(spec) else "world"
+        if find_kind(kind).has_weights:
+            # What acts on the world by its state is next to it, even if it is trained.
+            place = "world" if known.is_privileged else "own"
+    return replace(known, place=place, makeup=makeup_of(ref))
 
 
 def policy_of(policy: str | type[Any] | object, name: str | None = None) -> PolicyRef:
@@ -110,7 +114,10 @@ def policy_of(policy: str | type[Any] | object, name: str | None = None) -> Poli
     check_policy(name, given, ("reset", "act"))
     live[name] = given
     ref = split_spec(name, f"{declaration}{LIVE}:{name}")
-    return replace(ref, place="python", is_foreign=True, is_privileged=ref.is_declared)
+    makeup = ((POLICY, f"{declaration}{kind.__module__}:{kind.__qualname__}"),)
+    return replace(
+        ref, place="python", is_foreign=True, is_privileged=ref.is_declared, makeup=makeup
+    )
 
 
 def make_policy(policy: str | PolicyRef, seed: int) -> Policy:

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.field_types import MOST_SECONDS
+from roboirg.util.short_hash import short_hash
 
 Options = TypeVar("Options", bound=BaseModel)
-Seconds = Annotated[float, Field(le=MOST_SECONDS)]
+NOT_COMPARED = "does not make another policy"
+"""In the annotation of an option: with another value it is the same policy, as the option only
+concerns the connection or the price, or is compared as the version. All others are compared."""
+FILE = "a file"
+"""In the annotation of an option: of the file that it names, the content is compared."""
+Seconds = Annotated[float, Field(le=MOST_SECONDS), NOT_COMPARED]
 """A time limit in an option."""
 
 
@@ -42,6 +50,40 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
         given = re.sub(r"//[^/@]*@", "//…@", repr(first["input"]))  # no password of a URL
         end = "" if message.endswith((".", "?")) else "."
         raise InvalidValueError(f"{origin}: option {name} is {given}; {message}{end}") from None
+
+
+def told_apart(options: BaseModel) -> dict[str, str]:
+    """Return the options that are compared and do not have their defaults, each in one spelling."""
+    found: dict[str, str] = {}
+    for name, field in type(options).model_fields.items():
+        value = getattr(options, name)
+        if isinstance(value, BaseModel):
+            found |= told_apart(value)
+        elif value != field.default and NOT_COMPARED not in field.metadata:
+            found[name] = content_of(value) if FILE in field.metadata else _spelled(value)
+    return found
+
+
+def _spelled(value: object) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return str(value) or "empty"
+
+
+def content_of(place: str) -> str:
+    """Return a hash of a file, or of the files in a folder; the text itself if it names neither."""
+    path = Path(place)
+    if path.is_file():
+        files = [path]
+    elif path.is_dir():
+        files = sorted(filter(Path.is_file, path.iterdir()))
+    else:
+        return place
+    contents = b""
+    for file in files:
+        with file.open("rb") as opened:
+            contents += hashlib.file_digest(opened, "sha256").digest()
+    return short_hash(contents)
 
 
 def plain_complaint(message: str) -> str:

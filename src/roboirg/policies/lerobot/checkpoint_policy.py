@@ -16,7 +16,7 @@ import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.policy_ref import UNKNOWN_VERSION
+from roboirg.policies.contract.option_checking import FILE, NOT_COMPARED
 from roboirg.policies.contract.policy_urls import UrlOptions, read_options, split_url
 from roboirg.policies.lerobot.checkpoint_facts import PICTURE, STATE, picture_sizes, read_facts
 from roboirg.util.media import scaled_square
@@ -57,10 +58,10 @@ class LeRobotPolicyOptions(UrlOptions):
     device: str = Field("cpu", min_length=1)
     batch: int | None = Field(None, ge=1)
     execute: int | None = Field(None, ge=1)
-    version: str = Field(UNKNOWN_VERSION, min_length=1)
+    version: Annotated[str, NOT_COMPARED] = Field(UNKNOWN_VERSION, min_length=1)
     prompt_tokens: int | None = Field(None, ge=1)
     prompt_added: int = Field(0, ge=0)
-    tokenizer: str | None = Field(None, min_length=1)
+    tokenizer: Annotated[str | None, FILE] = Field(None, min_length=1)
 
 
 @dataclass
@@ -92,11 +93,12 @@ class LeRobotPolicy:
         metadata: how inputs and outputs are processed, for records.
     """
 
+    options_type: ClassVar[type[LeRobotPolicyOptions]] = LeRobotPolicyOptions
     demonstration_frames: ClassVar[str] = "none"
 
     def __init__(self, url: str, seed: int = 0) -> None:  # noqa: ARG002
         parts = split_url(url)
-        self.options = read_options(parts, LeRobotPolicyOptions)
+        self.options = read_options(parts, self.options_type)
         self.place, self.version = parts.target, self.options.version
         facts = read_facts(parts.target)
         self.cameras = tuple(facts.sizes)

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_ref import PolicyRef
-from roboirg.policies.contract.option_checking import Seconds
+from roboirg.policies.contract.option_checking import FILE, NOT_COMPARED, Seconds
 from roboirg.policies.contract.policy_urls import UrlOptions
 from roboirg.util.web.request_origin import LOOPBACK_NAMES
 
@@ -20,6 +20,8 @@ MIB = 2**20
 
 ActionSpaceName = Annotated[str, AfterValidator(lambda name: find_action_space(name).name)]
 """An option that names an action space."""
+Shared = Annotated[bool, NOT_COMPARED]
+"""Whether several episodes may use a server at the same time."""
 
 
 class Endpoint(NamedTuple):
@@ -61,14 +63,14 @@ class RemoteOptions(UrlOptions):
     timeout: Seconds = Field(120.0, gt=0)
     connect: Seconds = Field(60.0, gt=0)
     wait: Seconds = Field(3600.0, ge=0)
-    shared: bool = False
-    tls: bool = False
-    api_key_env: str | None = Field(None, min_length=1)
-    max_reply_mib: float = Field(16.0, gt=0)
-    version: str | None = Field(None, min_length=1)
+    shared: Shared = False
+    tls: Annotated[bool, NOT_COMPARED] = False
+    api_key_env: Annotated[str | None, NOT_COMPARED] = Field(None, min_length=1)
+    max_reply_mib: Annotated[float, NOT_COMPARED] = Field(16.0, gt=0)
+    version: Annotated[str | None, NOT_COMPARED] = Field(None, min_length=1)
     prompt_tokens: int | None = Field(None, ge=1)
     prompt_added: int = Field(0, ge=0)
-    tokenizer: str | None = Field(None, min_length=1)
+    tokenizer: Annotated[str | None, FILE] = Field(None, min_length=1)
 
     @property
     def headers(self) -> dict[str, str]:

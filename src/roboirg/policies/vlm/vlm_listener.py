@@ -8,7 +8,7 @@ the goal.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, ConfigDict
 from pydantic import Field as Option
@@ -16,6 +16,7 @@ from pydantic import Field as Option
 from roboirg.core.episode import Goal
 from roboirg.core.observations import Demonstration
 from roboirg.policies.builtin.scripted import ScriptedPolicy
+from roboirg.policies.contract.option_checking import FILE
 from roboirg.policies.vlm.goal_schema import GoalSchema, goal_schema
 from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
 from roboirg.policies.vlm.model_content import ChatTurn, Part, summary_clip
@@ -51,7 +52,7 @@ class ListenerOptions(BaseModel):
     frames_every: int = Option(default=8, ge=1)
     pictures: bool = True
     reasoning: bool = False
-    prompts: str | None = None
+    prompts: Annotated[str | None, FILE] = None
 
 
 class VLMListener(ScriptedPolicy):

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from roboirg.core.arms import TOLD
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS, EnvironmentOptions
 from roboirg.core.subgoal_text import BETWEEN_VERSIONS, SCRIPTED_HANDS
+from roboirg.core.versions import POLICY, Versions, differing_names
 from roboirg.core.word_pools import words_label
 from roboirg.evaluation.records.record import Job, Summary
 
@@ -50,25 +51,13 @@ class EvalConditions(NamedTuple):
         return before + self.text(name)
 
 
-class Versions(NamedTuple):
-    """The versions that a result depends on."""
-
-    policy: str
-    language: str
-    environment: int
-
-    @classmethod
-    def of(cls, result: Summary) -> Versions:
-        return cls(result.played_version, result.language_version, result.environment_version)
-
-
 class PolicyRun(NamedTuple):
     """One policy under one set of conditions and versions.
 
     Attributes:
         policy: its name.
         conditions: under which it played.
-        versions: None before it has played.
+        versions: None before it has played; the policy's has that of its server.
         run: name of the run if several runs hold the same episodes, else empty.
         is_privileged: whether the policy read the simulator's state.
         robot: the real robot of a study; None in simulation.
@@ -83,19 +72,17 @@ class PolicyRun(NamedTuple):
 
     @classmethod
     def of(cls, result: Summary, run: str = "") -> PolicyRun:
-        return cls(
-            result.policy,
-            EvalConditions.of(result),
-            Versions.of(result),
-            run,
-            result.privileged,
-            result.robot,
+        versions = result.versions
+        versions = versions._replace(
+            policy=result.played_version, server=None, makeup=versions.known_makeup, typed=None
         )
+        conditions = EvalConditions.of(result)
+        return cls(result.policy, conditions, versions, run, result.privileged, result.robot)
 
     @property
     def language(self) -> str:
         """The version of the language that it heard; empty before it has played."""
-        return "" if self.versions is None else self.versions.language
+        return "" if self.versions is None else str(self.versions.language)
 
     @property
     def marked_policy(self) -> str:
@@ -105,12 +92,12 @@ class PolicyRun(NamedTuple):
     @property
     def has_planner(self) -> bool:
         """Whether it has played as a planner with a policy."""
-        return self.versions is not None and BETWEEN_VERSIONS in self.versions.policy
+        return self.versions is not None and BETWEEN_VERSIONS in str(self.versions.policy)
 
     @property
     def mark(self) -> str:
         """The mark of a privileged policy; empty for the others."""
-        has_hands = self.versions is not None and SCRIPTED_HANDS in self.versions.policy
+        has_hands = self.versions is not None and SCRIPTED_HANDS in str(self.versions.policy)
         return (HANDS if has_hands else PRIVILEGED) * self.is_privileged
 
 
@@ -139,13 +126,20 @@ def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:
 
 
 def _version_labels(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> list[str]:
-    """Return the versions in which a policy run differs from others."""
-    if policy_run.versions is None:
+    """Return what a policy is and its versions, as far as it differs from others in them."""
+    versions = policy_run.versions
+    if versions is None:
         return []
+    played = [run for run in policy_runs if run.versions is not None]
+    # What a policy is matters only among runs of the same policy.
+    same = [run for run in played if run.policy == policy_run.policy]
     found = []
-    for name in Versions._fields:
-        # The version of a policy matters only among runs of the same policy.
-        others = [one for one in policy_runs if name != "policy" or one.policy == policy_run.policy]
-        if len({getattr(one.versions, name) for one in others if one.versions}) > 1:
-            found.append(f"{name} {getattr(policy_run.versions, name)}")
+    makeup = dict(versions.known_makeup)
+    for name in differing_names({run.versions.known_makeup for run in same if run.versions}):
+        label = f"{name} {makeup[name]}" if name in makeup else f"default {name}"
+        found.append(makeup[name] if name == POLICY else label)
+    for name in ("policy", "language", "environment"):
+        others = same if name == "policy" else played
+        if len({getattr(run.versions, name) for run in others}) > 1:
+            found.append(f"{name} {getattr(versions, name)}")
     return found

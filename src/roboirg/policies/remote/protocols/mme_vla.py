@@ -16,7 +16,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Sequence
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from pydantic import Field
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.policies.contract.base import SubgoalFollower
-from roboirg.policies.contract.option_checking import Seconds
+from roboirg.policies.contract.option_checking import NOT_COMPARED, Seconds
 from roboirg.policies.remote.endpoints import MIB, RemoteOptions
 from roboirg.policies.remote.protocols import Protocol
 from roboirg.policies.remote.remote_policy import RemotePolicy
@@ -58,7 +58,7 @@ class MmeVlaOptions(RemoteOptions):
     execute: int = Field(EXECUTED, ge=1)
     history: bool = True
     subgoals: SubgoalField = "grounded"
-    part: int = Field(EXECUTED, ge=1)
+    part: Annotated[int, NOT_COMPARED] = Field(EXECUTED, ge=1)
 
 
 class MmeVlaPolicy(RemotePolicy):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Annotated, Any, Literal, NamedTuple, Protocol
 from urllib.parse import urlsplit
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from roboirg.core.errors import MissingDependencyError
-from roboirg.policies.contract.option_checking import Seconds
+from roboirg.policies.contract.option_checking import NOT_COMPARED, Seconds
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.util.short_hash import short_hash
 
@@ -50,16 +50,16 @@ class ModelOptions(BaseModel):
 
     provider: Provider = "openai"
     model: str = Field(min_length=1)
-    base_url: str | None = None
-    api_key_env: str | None = None
+    base_url: Annotated[str | None, NOT_COMPARED] = None
+    api_key_env: Annotated[str | None, NOT_COMPARED] = None
     timeout_s: Seconds = Field(default=120.0, gt=0)
-    retries: int = Field(default=2, ge=0, le=10)
+    retries: Annotated[int, NOT_COMPARED] = Field(default=2, ge=0, le=10)
     patience_s: Seconds = Field(default=300.0, ge=0)
-    requests_per_minute: float | None = Field(default=None, ge=0.001)
+    requests_per_minute: Annotated[float | None, NOT_COMPARED] = Field(default=None, ge=0.001)
     temperature: float | None = Field(default=0.0, ge=0)
     max_output_tokens: int | None = Field(default=None, ge=1)
-    input_price: float | None = Field(default=None, ge=0)
-    output_price: float | None = Field(default=None, ge=0)
+    input_price: Annotated[float | None, NOT_COMPARED] = Field(default=None, ge=0)
+    output_price: Annotated[float | None, NOT_COMPARED] = Field(default=None, ge=0)
     video: Literal["frames", "mp4"] = "frames"
     clip_frames: int = Field(default=16, ge=1)
     structured: bool = True
@@ -102,16 +102,9 @@ class ModelOptions(BaseModel):
 
     def about(self) -> dict[str, str | float | int | bool | None]:
         """Return, for records, the address and all that may change a reply; never a key."""
-        return {
-            **self.model_dump(
-                mode="json",
-                exclude={
-                    *("base_url", "api_key_env", "timeout_s", "retries", "patience_s"),
-                    *("requests_per_minute", "input_price", "output_price"),
-                },
-            ),
-            "address": self.address(),
-        }
+        fields = type(self).model_fields.items()
+        left_out = {name for name, field in fields if NOT_COMPARED in field.metadata}
+        return {**self.model_dump(mode="json", exclude=left_out), "address": self.address()}
 
     @property
     def has_prices(self) -> bool:
