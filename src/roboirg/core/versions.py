@@ -60,7 +60,8 @@ class Versions(NamedTuple):
             first, second = dict(mine), dict(theirs)
             for name in differing_names([mine, theirs]):
                 values = first.get(name, DEFAULT), second.get(name, DEFAULT)
-                found.append(Mismatch(name, *values))
+                what = name if name == POLICY else f"option {name}"
+                found.append(Mismatch(what, *values))
         for name in ("environment", "language", "policy", "server", "package"):
             here, there = getattr(self, name), getattr(other, name)
             if here != there and here is not None and there is not None:
