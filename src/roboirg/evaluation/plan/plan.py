@@ -280,8 +280,9 @@ class Plan(BaseModel):
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all fields."""
-        return short_hash(self.model_dump_json(context=_HASHED))
+        """Hash of all fields, of policies without what follows from the others."""
+        left_out = {"policies": {"__all__": {"makeup"}}}
+        return short_hash(self.model_dump_json(context=_HASHED, exclude=left_out))
 
     def checked(self) -> Plan:
         """Return this plan if all of it can be played.
