@@ -7,6 +7,7 @@ import functools
 import re
 import typing
 from collections.abc import Iterator
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -25,14 +26,15 @@ from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.record_codec import StoreError
 from roboirg.evaluation.records.store import RecordStore, read_results
 from roboirg.evaluation.run.runner import check_run
+from roboirg.policies import vlm
 from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.builtin.random_policy import RandomPolicy
-from roboirg.policies.by_name.finding import Privileged, policy_of, read_policy
+from roboirg.policies.by_name.finding import Privileged, make_policy, policy_of, read_policy
 from roboirg.policies.by_name.makeup import makeup_of
 from roboirg.policies.by_name.policy_classes import url_classes
 from roboirg.policies.by_name.policy_kinds import split_spec
 from roboirg.policies.contract.option_checking import NOT_COMPARED
-from roboirg.policies.planners import OF_MODELS, PLANNERS, planner_options
+from roboirg.policies.planners import OF_MODELS, PLANNERS, make_planner
 from roboirg.policies.vlm.vlm_listener import ListenerOptions
 
 NAME = "random"
@@ -161,11 +163,20 @@ def test_a_policy_that_moved_or_is_typed_otherwise_is_the_same(
 
 def test_a_checkpoint_with_other_bytes_is_another(tmp_path: Path) -> None:
     file = tmp_path / "model.safetensors"
+    (tmp_path / "config.json").write_text("{}")
     found = set()
     for content in ("weights", "other"):
         file.write_text(content)
         found.add(named(f"lerobot://{tmp_path}").makeup)
     assert len(found) == 2
+
+
+OTHER_TEXTS = {
+    "actions": "ee_pose",
+    "asked": "every+9+steps",
+    "base_url": "http://other:1",
+    "prompts": "{prompts}",
+}
 
 
 def options_of(kind: type[BaseModel]) -> Iterator[tuple[str, FieldInfo]]:
@@ -183,19 +194,18 @@ def changed(name: str, field: FieldInfo) -> str:
         return "no" if field.default else "yes"
     if typing.get_origin(field.annotation) is typing.Literal:
         return next(value for value in typing.get_args(field.annotation) if value != field.default)
-    return {"actions": "ee_pose", "asked": "every+9+steps", "base_url": "http://other:1"}.get(
-        name, "7"
-    )
+    return OTHER_TEXTS.get(name, "7")
 
 
 def registry() -> Iterator[tuple[str, type[BaseModel]]]:
     """Yield a spec of each kind with options that are declared, and their type."""
-    for scheme, policy_class in url_classes().items():
-        yield f"{scheme}://nowhere:1?version=1", policy_class.options_type
+    for scheme in url_classes():
+        spec = f"{scheme}://nowhere:1?version=1"
+        yield spec, type(make_policy(spec, 0).options)
     for kind in PLANNERS:
         given = {"model": {"model": "m"}} if kind in OF_MODELS else {}
         spec = f"planner:{kind}" + ("?model=m" if given else "")
-        yield spec, type(planner_options(kind, given, spec))
+        yield spec, type(make_planner(kind, given, spec).options)
     yield "vlm-listener:openai?model=m", ListenerOptions
 
 
@@ -204,11 +214,15 @@ def test_every_option_of_every_kind_is_seen_everywhere_or_nowhere(
     spec: str, kind: type[BaseModel], tmp_path: Path
 ) -> None:
     before = named(spec)
+    ours = str(resources.files(vlm) / "prompts")
+    prompts = (
+        f"{ours}/{spec.partition(':')[2].partition('?')[0].replace('openai', 'listener')}.toml"
+    )
     for name, field in options_of(kind):
         if name == "provider" and spec.startswith("vlm-listener"):
             continue  # it stands in front of the options
         bare = re.sub(rf"\?{name}=\w+", "", spec)
-        value = changed(name, field)
+        value = changed(name, field).format(prompts=prompts)
         now = named(f"{bare}{'&' if '?' in bare else '?'}{name}={value}")
         is_compared = NOT_COMPARED not in field.metadata
         assert {bool(text) for text in meet(tmp_path, before, now)} == {is_compared}, name

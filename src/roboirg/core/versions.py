@@ -50,6 +50,11 @@ class Versions(NamedTuple):
         """What the policy is, as far as it is known."""
         return self.makeup or self.typed or ()
 
+    @property
+    def of_policy(self) -> Versions:
+        """Those of the policy and its server alone, which words and scenes do not change."""
+        return self._replace(language=None, environment=None)
+
     def differences(self, other: Versions) -> list[Mismatch]:
         """Return all in which two differ: what the policy is first, then versions."""
         mine, theirs = self.makeup, other.makeup
@@ -72,8 +77,8 @@ class Versions(NamedTuple):
 def differing_names(makeups: Collection[Makeup]) -> list[str]:
     """Return the options in which policies differ; only `POLICY` if they are not of one make."""
     known = [dict(makeup) for makeup in makeups]
-    names: dict[str, None] = {}
+    names: set[str] = set()
     for makeup in known:
-        names |= dict.fromkeys(makeup)
-    found = [name for name in names if len({makeup.get(name) for makeup in known}) > 1]
+        names |= makeup.keys()
+    found = [name for name in sorted(names) if len({makeup.get(name) for makeup in known}) > 1]
     return [POLICY] if POLICY in found else found

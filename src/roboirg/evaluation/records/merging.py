@@ -122,30 +122,31 @@ def _check_versions(runs: Sequence[tuple[Path, Iterable[Summary]]]) -> None:
             for owner, versions in _by_owner(result).items():
                 there, expected = known.setdefault(owner, (folder, versions))
                 for what, value, other in versions.differences(expected):
-                    raise _unmergeable(folder, there, what + owner, value, other)
+                    raise _unmergeable([folder, there], what + owner, [value, other])
                 if expected.server is None:  # an error's, which is not compared
                     known[owner] = folder, versions
             scene = f"{result.task} {result.split} {result.episode}"
             there, seed = seeds.setdefault(scene, (folder, result.seed))
             if result.seed != seed:
-                raise _unmergeable(folder, there, f"seed of {scene}", result.seed, seed)
+                raise _unmergeable([folder, there], f"seed of {scene}", [result.seed, seed])
 
 
 def _by_owner(result: Summary) -> dict[str, Versions]:
     """Return the versions of a result, each by the words for what they are versions of."""
     versions = result.versions
-    server = None if result.outcome == "error" else versions.server
+    if result.outcome == "error":
+        versions = versions._replace(server=None)
     return {
         "": Versions(environment=versions.environment),
         f" of language {result.options.language}": Versions(language=versions.language),
-        f" of {result.policy}": versions._replace(environment=None, language=None, server=server),
+        f" of {result.policy}": versions.of_policy,
     }
 
 
-def _unmergeable(folder: Path, there: Path, what: str, value: object, other: object) -> StoreError:
+def _unmergeable(folders: Sequence[Path], what: str, values: Sequence[object]) -> StoreError:
     return StoreError(
-        f"{folder} and {there} cannot be merged: the {what} is {value} in the first and {other} in "
-        "the second."
+        f"{folders[0]} and {folders[1]} cannot be merged: the {what} is {values[0]} in the first "
+        f"and {values[1]} in the second."
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any, NamedTuple
 
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS
-from roboirg.core.versions import DEFAULT, differing_names
+from roboirg.core.versions import POLICY, Makeup
 from roboirg.core.word_pools import words_label
 from roboirg.evaluation.records.record import Summary
 
@@ -51,7 +51,16 @@ _COMMON = (
     ),
     Trait("code", "states of the package's code", "Rates do not tell them apart."),
 )
+
+
+def _makeup_words(makeup: Makeup) -> str | None:
+    """Return what makes a policy, with its options; None if neither is known."""
+    values = [value if name == POLICY else f"{name}={value}" for name, value in makeup]
+    return " ".join(values) or None
+
+
 _OF_POLICY = (
+    Trait("versions.known_makeup", "policies", _APART, _makeup_words),
     Trait("played_version", "versions", _APART),
     *(
         Trait(path, name.replace("_", " "), _APART)
@@ -66,17 +75,8 @@ def mixtures(results: Collection[Summary]) -> list[str]:
     found = [*differing(results, FAIRNESS), *differing(results, _COMMON)]
     for policy in sorted({one.policy for one in results}):
         own = [one for one in results if one.policy == policy]
-        found += _differing_makeups(own, policy)
         found += differing(own, _OF_POLICY, f" of {policy}")
     return found
-
-
-def _differing_makeups(results: Collection[Summary], policy: str) -> Iterator[str]:
-    """Yield a sentence for each option of a policy, or for what makes it, with several values."""
-    makeups = {result.versions.known_makeup for result in results}
-    for name in differing_names(makeups):
-        values = {dict(makeup).get(name, DEFAULT) for makeup in makeups}
-        yield f"Mixed values of {name} of {policy}: {', '.join(sorted(values))}. {_APART}"
 
 
 def differing(

@@ -218,9 +218,7 @@ def policy_differences(record: Summary, told: Mapping[str, Summary]) -> list[Mis
     before = told.get(record.policy)
     if before is None or record.outcome == "error":
         return []
-    # One folder may hold words of several languages, each of a version of its own.
-    versions = record.versions._replace(language=None, environment=None)
-    return before.versions.differences(versions)
+    return before.versions.differences(record.versions.of_policy)
 
 
 def check_same(folder: Path, policy: str, found: Iterable[Mismatch], where: str = "now") -> None:

@@ -6,6 +6,8 @@ policy. Of a kind in a package of others, everything that is typed does.
 
 from __future__ import annotations
 
+from typing import Any
+
 from roboirg.core.policy_ref import (
     BUILT_IN,
     CLASS,
@@ -17,47 +19,47 @@ from roboirg.core.policy_ref import (
     PolicyRef,
 )
 from roboirg.core.versions import POLICY, Makeup
-from roboirg.policies.by_name.policy_classes import CHECKPOINTS, url_classes
+from roboirg.policies.by_name.policy_classes import CHECKPOINTS
 from roboirg.policies.by_name.policy_kinds import (
     LISTENER,
     PLANNER,
     find_kind,
     known_kinds,
-    listener_options,
+    maker_of,
     split_spec,
     system_of,
 )
 from roboirg.policies.contract.option_checking import content_of, told_apart
-from roboirg.policies.contract.policy_urls import is_url, read_options
-from roboirg.policies.planners import planner_options
+from roboirg.policies.contract.policy_urls import is_url
+from roboirg.policies.planners import make_planner
 from roboirg.policies.planners.systems import System
 
 
 def makeup_of(ref: PolicyRef) -> Makeup:
     """Return what a policy is; raises like `roboirg.policies.by_name.finding.read_policy`."""
     system = system_of(ref.kind, ref.target, dict(ref.options))
-    if system is not None and system.planner is None:
-        return makeup_of(split_spec(ref.name, system.policy))
     if system is not None:
-        found = _of_planner(system)
+        if system.planner is None:
+            return makeup_of(split_spec(ref.name, system.policy))
+        found = _of_planner(system, dict(system.planner))
     elif ref.kind in (BUILT_IN, CLASS):
         found = {POLICY: ref.target}
-    elif ref.kind == LISTENER:
-        found = {POLICY: LISTENER, **told_apart(listener_options(ref.target, dict(ref.options)))}
+    elif is_url(ref.body) or ref.kind == LISTENER:
+        found = _of_client(ref)
     else:
-        found = _of_url(ref) if is_url(ref.body) else _of_kind(ref)
+        found = _of_kind(ref)
     maker = found.pop(POLICY)
     if ref.is_declared:
         maker = PRIVILEGED + maker
     return ((POLICY, maker), *sorted(found.items()))
 
 
-def _of_planner(system: System) -> dict[str, str]:
-    options = dict(system.planner or {})
+def _of_planner(system: System, options: dict[str, Any]) -> dict[str, str]:
     kind = str(options.pop("kind", ""))
     found = {POLICY: f"{PLANNER}:{kind}"}
     if ":" not in kind:  # else it is the user's own, which has no options
-        found |= told_apart(planner_options(kind, options, system.name))
+        planner: Any = make_planner(kind, options, f"the planner of system {system.name}")
+        found |= told_apart(planner.options)
     return found | _of_hands(system.policy)
 
 
@@ -72,12 +74,13 @@ def _of_hands(spec: str) -> dict[str, str]:
     return found
 
 
-def _of_url(ref: PolicyRef) -> dict[str, str]:
-    options = read_options(ref, url_classes()[ref.kind].options_type)
+def _of_client(ref: PolicyRef) -> dict[str, str]:
+    """Return what a policy on a server, a checkpoint or a model is, from its checked options."""
+    client: Any = maker_of(ref)(0)
     maker = ref.kind
-    if ref.kind in CHECKPOINTS and options.version == UNKNOWN_VERSION:
+    if ref.kind in CHECKPOINTS and client.version == UNKNOWN_VERSION:
         maker += f"://{content_of(ref.target)}"
-    return {POLICY: maker, **told_apart(options)}
+    return {POLICY: maker, **told_apart(client.options)}
 
 
 def _of_kind(ref: PolicyRef) -> dict[str, str]:

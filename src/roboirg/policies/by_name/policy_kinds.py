@@ -170,14 +170,10 @@ def _of_system(kind: str, _spec: str, target: str, options: Mapping[str, str]) -
 
 
 def _of_listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
-    """Return what makes VLM listeners."""
-    return functools.partial(VLMListener, listener_options(name, options))
-
-
-def listener_options(name: str, options: Mapping[str, str]) -> ListenerOptions:
-    """Return the checked options of a VLM listener; they and its model's stand side by side."""
+    """Return what makes VLM listeners; its options and its model's stand side by side."""
     values = with_options({}, {**options, "provider": name})
-    return check_options(ListenerOptions, values, f"policy {LISTENER}:{name}")
+    checked = check_options(ListenerOptions, values, f"policy {LISTENER}:{name}")
+    return functools.partial(VLMListener, checked)
 
 
 def _of_process(spec: str, name: str, _options: Mapping[str, str]) -> PolicyMaker:

@@ -18,8 +18,8 @@ Options = TypeVar("Options", bound=BaseModel)
 NOT_COMPARED = "does not make another policy"
 """In the annotation of an option: with another value it is the same policy, as the option only
 concerns the connection or the price, or is compared as the version. All others are compared."""
-FILE = "a file"
-"""In the annotation of an option: of the file that it names, the content is compared."""
+CHECKPOINT_CONFIG = "config.json"
+"""In the folder of a checkpoint."""
 Seconds = Annotated[float, Field(le=MOST_SECONDS), NOT_COMPARED]
 """A time limit in an option."""
 
@@ -53,31 +53,33 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
 
 
 def told_apart(options: BaseModel) -> dict[str, str]:
-    """Return the options that are compared and do not have their defaults, each in one spelling."""
+    """Return the options that are compared and do not have their defaults, each in one spelling.
+
+    Of a file that is named, this is its content.
+    """
     found: dict[str, str] = {}
     for name, field in type(options).model_fields.items():
         value = getattr(options, name)
         if isinstance(value, BaseModel):
             found |= told_apart(value)
         elif value != field.default and NOT_COMPARED not in field.metadata:
-            found[name] = content_of(value) if FILE in field.metadata else _spelled(value)
+            found[name] = _spelled(value)
     return found
 
 
 def _spelled(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return str(value) or "empty"
+    return content_of(str(value)) or "empty"
 
 
 def content_of(place: str) -> str:
-    """Return a hash of a file, or of the files in a folder; the text itself if it names neither."""
+    """Return a hash of a file, or of the files of a checkpoint; the text if it names neither."""
     path = Path(place)
-    if path.is_file():
-        files = [path]
-    elif path.is_dir():
-        files = sorted(filter(Path.is_file, path.iterdir()))
-    else:
+    files = [path]
+    if (path / CHECKPOINT_CONFIG).is_file():
+        files = sorted(file for file in path.iterdir() if file.is_file())
+    elif not path.is_file():
         return place
     contents = b""
     for file in files:

@@ -26,7 +26,7 @@ from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.policy_ref import UNKNOWN_VERSION
-from roboirg.policies.contract.option_checking import FILE, NOT_COMPARED
+from roboirg.policies.contract.option_checking import NOT_COMPARED
 from roboirg.policies.contract.policy_urls import UrlOptions, read_options, split_url
 from roboirg.policies.lerobot.checkpoint_facts import PICTURE, STATE, picture_sizes, read_facts
 from roboirg.util.media import scaled_square
@@ -61,7 +61,7 @@ class LeRobotPolicyOptions(UrlOptions):
     version: Annotated[str, NOT_COMPARED] = Field(UNKNOWN_VERSION, min_length=1)
     prompt_tokens: int | None = Field(None, ge=1)
     prompt_added: int = Field(0, ge=0)
-    tokenizer: Annotated[str | None, FILE] = Field(None, min_length=1)
+    tokenizer: str | None = Field(None, min_length=1)
 
 
 @dataclass
@@ -93,12 +93,11 @@ class LeRobotPolicy:
         metadata: how inputs and outputs are processed, for records.
     """
 
-    options_type: ClassVar[type[LeRobotPolicyOptions]] = LeRobotPolicyOptions
     demonstration_frames: ClassVar[str] = "none"
 
     def __init__(self, url: str, seed: int = 0) -> None:  # noqa: ARG002
         parts = split_url(url)
-        self.options = read_options(parts, self.options_type)
+        self.options = read_options(parts, LeRobotPolicyOptions)
         self.place, self.version = parts.target, self.options.version
         facts = read_facts(parts.target)
         self.cameras = tuple(facts.sizes)

@@ -6,8 +6,6 @@ import pkgutil
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import BaseModel
-
 from roboirg.core.errors import check_names
 from roboirg.policies.contract.option_checking import check_options
 from roboirg.policies.planners.planner import Planner
@@ -41,13 +39,8 @@ def make_planner(kind: str, options: Mapping[str, Any], origin: str, seed: int =
         UnknownNameError: there is no such planner, or it has no such option.
         InvalidValueError: an option has an invalid value.
     """
-    checked = planner_options(kind, options, origin)
-    planner: Planner = pkgutil.resolve_name(PLANNERS[kind])(checked, kind, seed)
-    return planner
-
-
-def planner_options(kind: str, options: Mapping[str, Any], origin: str) -> BaseModel:
-    """Return the checked options of a planner; raises like `make_planner`."""
     check_names("planner", [kind], PLANNERS)
-    options_type: type[BaseModel] = pkgutil.resolve_name(PLANNERS[kind]).options_type
-    return check_options(options_type, options, origin)
+    planner_class = pkgutil.resolve_name(PLANNERS[kind])
+    checked = check_options(planner_class.options_type, options, origin)
+    planner: Planner = planner_class(checked, kind, seed)
+    return planner

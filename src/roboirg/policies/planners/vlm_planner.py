@@ -13,7 +13,6 @@ from roboirg.core.environment_options import DemonstrationFrames
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.subgoal_text import split_point
 from roboirg.policies.contract.base import SubgoalEnd
-from roboirg.policies.contract.option_checking import FILE
 from roboirg.policies.planners.planner import EACH_CHUNK, WHEN_DONE, SubgoalOptions
 from roboirg.policies.planners.points import says_finished
 from roboirg.policies.vlm.model_content import ChatTurn, Part, summary_clip
@@ -47,7 +46,7 @@ class PlannerOptions(SubgoalOptions):
     model: ModelOptions
     asked: Asked = EACH_CHUNK
     first_pause: int = Field(default=0, ge=0)
-    prompts: Annotated[str | None, FILE] = None
+    prompts: str | None = None
 
 
 Options = TypeVar("Options", bound=PlannerOptions)

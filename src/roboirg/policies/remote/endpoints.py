@@ -12,7 +12,7 @@ from pydantic import AfterValidator, Field
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_ref import PolicyRef
-from roboirg.policies.contract.option_checking import FILE, NOT_COMPARED, Seconds
+from roboirg.policies.contract.option_checking import NOT_COMPARED, Seconds
 from roboirg.policies.contract.policy_urls import UrlOptions
 from roboirg.util.web.request_origin import LOOPBACK_NAMES
 
@@ -70,7 +70,7 @@ class RemoteOptions(UrlOptions):
     version: Annotated[str | None, NOT_COMPARED] = Field(None, min_length=1)
     prompt_tokens: int | None = Field(None, ge=1)
     prompt_added: int = Field(0, ge=0)
-    tokenizer: Annotated[str | None, FILE] = Field(None, min_length=1)
+    tokenizer: str | None = Field(None, min_length=1)
 
     @property
     def headers(self) -> dict[str, str]:

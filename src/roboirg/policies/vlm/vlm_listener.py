@@ -8,7 +8,7 @@ the goal.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict
 from pydantic import Field as Option
@@ -16,7 +16,6 @@ from pydantic import Field as Option
 from roboirg.core.episode import Goal
 from roboirg.core.observations import Demonstration
 from roboirg.policies.builtin.scripted import ScriptedPolicy
-from roboirg.policies.contract.option_checking import FILE
 from roboirg.policies.vlm.goal_schema import GoalSchema, goal_schema
 from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
 from roboirg.policies.vlm.model_content import ChatTurn, Part, summary_clip
@@ -52,7 +51,7 @@ class ListenerOptions(BaseModel):
     frames_every: int = Option(default=8, ge=1)
     pictures: bool = True
     reasoning: bool = False
-    prompts: Annotated[str | None, FILE] = None
+    prompts: str | None = None
 
 
 class VLMListener(ScriptedPolicy):
