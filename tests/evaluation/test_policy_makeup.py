@@ -214,10 +214,8 @@ def test_every_option_of_every_kind_is_seen_everywhere_or_nowhere(
     spec: str, kind: type[BaseModel], tmp_path: Path
 ) -> None:
     before = named(spec)
-    ours = str(resources.files(vlm) / "prompts")
-    prompts = (
-        f"{ours}/{spec.partition(':')[2].partition('?')[0].replace('openai', 'listener')}.toml"
-    )
+    target = spec.partition(":")[2].partition("?")[0].replace("openai", "listener")
+    prompts = str(resources.files(vlm) / "prompts" / f"{target}.toml")
     for name, field in options_of(kind):
         if name == "provider" and spec.startswith("vlm-listener"):
             continue  # it stands in front of the options
