@@ -70,22 +70,24 @@ def told_apart(options: BaseModel) -> dict[str, str]:
 def _spelled(value: object) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return content_of(str(value)) or "empty"
+    return content_of(value) if isinstance(value, str) else str(value)
 
 
-def content_of(place: str) -> str:
-    """Return a hash of a file, or of the files of a checkpoint; the text if it names neither."""
-    path = Path(place)
-    files = [path]
-    if (path / CHECKPOINT_CONFIG).is_file():
-        files = sorted(file for file in path.iterdir() if file.is_file())
-    elif not path.is_file():
-        return place
-    contents = b""
-    for file in files:
-        with file.open("rb") as opened:
-            contents += hashlib.file_digest(opened, "sha256").digest()
-    return short_hash(contents)
+def content_of(text: str) -> str:
+    """Return a hash of the file or checkpoint that a text names; the text if it names neither."""
+    path = Path(text)
+    try:
+        is_checkpoint = (path / CHECKPOINT_CONFIG).is_file()
+        files = sorted(path.iterdir()) if is_checkpoint else [path]
+        contents = [_hash(file) for file in files if file.is_file()]
+    except OSError:  # too long for a name, or not to be read, which is reported where it is used
+        contents = []
+    return short_hash("".join(contents)) if contents else text or "empty"
+
+
+def _hash(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def plain_complaint(message: str) -> str:
