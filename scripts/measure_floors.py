@@ -10,8 +10,6 @@ only the tables, from that file. Tasks that the language does not speak of are l
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -37,6 +35,7 @@ from roboirg.shortcuts.shortcut_tables import (
     tabulate,
 )
 from roboirg.tasks import all_tasks
+from roboirg.util.csv_text import csv_lines
 
 PAGE = Path(__file__).parent.parent / "docs" / "floors.md"
 SCENES = 400
@@ -67,10 +66,8 @@ def measure(
 
 def file_text(rows: Sequence[ShortcutRow]) -> str:
     """Return the rows as a file that `measured_floors` reads."""
-    file = io.StringIO()
     heads = (*FloorKey._fields, "texts", *stored.NAMES, *(f"{one} goals" for one in stored.NAMES))
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow((*heads, "excess", "error"))
+    lines: list[tuple[object, ...]] = [(*heads, "excess", "error")]
     for row in rows:
         shares = dict(row.shares)
         best = max(SURFACE_RULES, key=lambda name: shares[name].slots or 0)
@@ -80,8 +77,8 @@ def file_text(rows: Sequence[ShortcutRow]) -> str:
             *(shares[name].goals for name in stored.NAMES),
             *(row.excess or ()),
         ]
-        writer.writerow((*row.group, row.count, *(f"{number:.4f}" for number in numbers)))
-    return file.getvalue()
+        lines.append((*row.group, row.count, *(f"{number:.4f}" for number in numbers)))
+    return csv_lines(lines)
 
 
 def tables(floors: Floors) -> str:

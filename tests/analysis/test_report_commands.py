@@ -142,7 +142,7 @@ def test_mixed_render_devices_are_named(run: Path, tmp_path: Path) -> None:
         ("tables RUN --out FILE", "Cannot write"),
         ("figures --out EMPTY", "Figures need a run"),
         ("figures RUN --out EMPTY --which gap", "Did you mean 'gaps'"),
-        ("figures RUN --out FILE --which gaps", "Cannot write to"),
+        ("figures RUN --out FILE --which gaps", "Cannot write "),
         ("figures RUN:listener --out EMPTY --which failures", "nothing to draw for failures"),
         ("figures --published --out EMPTY --which failures", "The paper's tables have nothing to"),
         ("compare RUN nowhere", "There is no run at nowhere;"),

@@ -271,6 +271,12 @@ def test_a_policy_may_have_a_name_of_its_own() -> None:
         make_plan(["mine=listner"])
 
 
+def test_names_follow_one_rule_in_plans_and_records() -> None:
+    for policy in ("-x=oracle", "=cmd|' /C calc'!A0"):
+        with pytest.raises(InvalidValueError, match="name"):
+            make_plan(policy, tasks="PickXtimes", episodes="1")
+
+
 def test_a_name_next_to_all_is_added_and_tasks_may_lack_it() -> None:
     plan = make_plan(
         ["random"], tasks="StopCube,VideoUnmask", settings="grounded,All", episodes="2"

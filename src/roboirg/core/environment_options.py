@@ -7,7 +7,7 @@ from typing import Any, Literal, TypedDict
 
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError, check_names
-from roboirg.core.field_types import Name, Whole, described
+from roboirg.core.field_types import Label, Whole, described
 
 MAX_STEPS = 1300
 """Control steps a policy has, as in RoboMME's published experiments."""
@@ -35,7 +35,7 @@ class EnvironmentOptions:
         default=MAX_STEPS,
         metadata=described("Limit of an episode in control steps, 20 per second."),
     )
-    actions: Name | None = field(
+    actions: Label | None = field(
         default=None,
         metadata=described("Required action space; without one, each policy's own."),
     )
@@ -52,7 +52,7 @@ class EnvironmentOptions:
             "Control steps between two observations; without it, as each policy asks."
         ),
     )
-    meshes: Name = field(
+    meshes: Label = field(
         default=DEFAULT_MESHES, metadata=described("Meshes for rendering: faithful or light.")
     )
 

@@ -15,9 +15,15 @@ CONTROLS = "\\x00-\\x1f\\x7f-\\x9f\\u200e\\u200f\\u202a-\\u202e\\u2066-\\u2069"
 NAME = f"^[^{CONTROLS}]{{0,{MOST_NAME_LETTERS}}}\\Z"
 """A name in a record: text without characters that control a terminal or reorder what is read."""
 
+LABEL = NAME.replace("^", "^(?![=+@-])", 1)
+"""A name that heads a row or column: spreadsheets compute what begins with such a sign."""
+LABEL_RULE = (
+    "at most 1,000 characters, none of = + - @ at the beginning, and without control characters"
+)
 SUBGOAL = f"^[^{CONTROLS}]{{1,{MOST_SUBGOAL_LETTERS}}}\\Z"
 Subgoal = Annotated[str, msgspec.Meta(pattern=SUBGOAL)]
 Name = Annotated[str, msgspec.Meta(pattern=NAME)]
+Label = Annotated[str, msgspec.Meta(pattern=LABEL)]
 Whole = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 """A whole number that tables and NumPy can hold."""
 MOST_SECONDS = 2_147_483

@@ -31,7 +31,7 @@ from roboirg.core.arms import TOLD
 from roboirg.core.delivery import TURNS
 from roboirg.core.environment_options import EnvironmentOptions, check_demonstration_frames
 from roboirg.core.errors import InvalidValueError, check_names
-from roboirg.core.field_types import CONTROLS, NAME
+from roboirg.core.field_types import CONTROLS, LABEL, LABEL_RULE
 from roboirg.core.instruction_options import DEFAULT_FRAME, InstructionOptions, identifying
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.word_pools import POOLS
@@ -295,10 +295,9 @@ class Plan(BaseModel):
         find_settings(self.settings)
         specs: dict[str, str] = {}
         for one in self.policies:
-            if not re.fullmatch(NAME, one.name):
+            if not re.fullmatch(LABEL, one.name):
                 raise InvalidValueError(
-                    f"Policy {one.name[:80]!r} has no valid name for records: at most 1,000 "
-                    "characters, without control characters."
+                    f"Policy {one.name[:80]!r} has no valid name for records: {LABEL_RULE}."
                 )
             if specs.setdefault(one.name, one.spec) != one.spec:
                 raise InvalidValueError(

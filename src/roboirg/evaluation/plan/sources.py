@@ -13,7 +13,7 @@ from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.packs import PACK_SUFFIX, opened_run
 from roboirg.evaluation.records.record import Job, Record, Summary
-from roboirg.evaluation.records.record_codec import StoreError, read_summary
+from roboirg.evaluation.records.record_codec import read_summary
 from roboirg.evaluation.records.store import StoredRun, iterate_records
 from roboirg.util.freed_memory import paused_collection
 
@@ -52,11 +52,8 @@ class Source:
         Raises:
             StoreError: there are none, or a line is not a record of this schema version.
         """
-        try:
-            with paused_collection():
-                return StoredRun(self.folder, read_summary)
-        except StoreError as error:  # of a pack, the temporary folder means nothing
-            raise StoreError(str(error).replace(str(self.folder), str(self.path))) from error
+        with paused_collection():
+            return StoredRun(self.folder, read_summary)
 
     @cached_property
     def results(self) -> tuple[Summary, ...]:

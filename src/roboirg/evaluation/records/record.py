@@ -20,7 +20,7 @@ from roboirg.core.arms import TOLD
 from roboirg.core.delivery import PromptVerdict
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.failures import FailureKind
-from roboirg.core.field_types import MOST_CAUSE_LETTERS, Cause, Name, Subgoal, Whole
+from roboirg.core.field_types import MOST_CAUSE_LETTERS, Cause, Label, Name, Subgoal, Whole
 from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.instruction_options import InstructionOptions, identifying
 from roboirg.core.observations import DemonstrationSource
@@ -86,14 +86,14 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
             policy plays.
     """
 
-    policy: Name
-    task: Name
-    split: Name
+    policy: Label
+    task: Label
+    split: Label
     episode: Whole
     options: InstructionOptions
     policy_seed: Whole = 0
     environment: EnvironmentOptions = EnvironmentOptions()
-    arm: Name = TOLD
+    arm: Label = TOLD
     wordings_file: str | None = None
     ref: PolicyRef | None = None
 
@@ -322,7 +322,7 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
 
     schema_version: Literal[1] = SCHEMA_VERSION
     seed: Whole
-    difficulty: Name
+    difficulty: Label
     outcome: Outcome
     error: ErrorKind | None = None
     cause: Cause | None = None

@@ -47,6 +47,20 @@ def run_file(folder: Path, name: str) -> Path:
     return path
 
 
+def refuse_links(folder: Path) -> None:
+    """Refuse a run's folder with a symbolic link in it, as what is written would land elsewhere.
+
+    Raises:
+        ForeignPathError: there is one. The folder itself may be a link.
+    """
+    for path in folder.rglob("*"):
+        if path.is_symlink():
+            raise ForeignPathError(
+                f"{path} is a symbolic link, and a run writes nothing through links; put a file or "
+                "folder in its place, or make the folder of the run itself the link."
+            )
+
+
 def _is_below(path: Path, folder: Path) -> bool:
     try:
         found = path.resolve()

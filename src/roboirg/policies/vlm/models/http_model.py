@@ -19,6 +19,7 @@ from roboirg.core.errors import (
     PolicyTimeoutError,
 )
 from roboirg.core.extras import extra_needed
+from roboirg.core.handed_keys import without_keys
 from roboirg.core.waiting import waiting
 from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
 from roboirg.util.proxies import proxy_of
@@ -86,7 +87,7 @@ class HttpModel(ABC):
                 response, content = found.result(timeout=self.options.timeout_s)
             if response.status_code == HTTPStatus.OK:
                 text, *tokens = self.read(json.loads(content))
-                return ModelReply(str(text), *map(int, tokens))
+                return ModelReply(without_keys(str(text)), *map(int, tokens))
         except (TimeoutError, httpx.TimeoutException):
             raise PolicyTimeoutError(
                 f"{self._name} did not answer within {self.options.timeout_s:g} s; raise "
@@ -130,7 +131,7 @@ class HttpModel(ABC):
             found.set_exception(error)
 
     def _quote(self, words: object) -> str:
-        return " ".join(str(words).replace(self.key, "…").split())[:MAX_ERROR_LENGTH]
+        return " ".join(without_keys(str(words)).split())[:MAX_ERROR_LENGTH]
 
 
 def given(**entries: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from collections.abc import Mapping
@@ -11,6 +12,7 @@ from urllib.parse import urlsplit
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from roboirg.core.errors import MissingDependencyError
+from roboirg.core.handed_keys import remember_key
 from roboirg.policies.contract.option_checking import Seconds
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.util.short_hash import short_hash
@@ -77,6 +79,11 @@ class ModelOptions(BaseModel):
                 "key into an environment variable and name that in api_key_env"
             )
         return url
+
+    def model_post_init(self, _context: object) -> None:
+        """Remember the key, if there is one, before stored replies are read."""
+        with contextlib.suppress(MissingDependencyError):
+            remember_key(self.key())
 
     def key(self) -> str:
         """Return the key, or `NO_KEY` if none is needed.

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.core.errors import BudgetError
+from roboirg.core.handed_keys import without_keys
 from roboirg.core.waiting import waiting
 from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
 from roboirg.util.media import Clip, Picture
@@ -91,7 +92,7 @@ class ReplyStore:
     def replies(self) -> dict[str, ModelReply]:
         """Return the stored replies to the next call, by the digest of what was sent.
 
-        There are none in a run that passes them over.
+        There are none in a run that passes them over. Earlier versions stored keys in them.
         """
         if self.settings.anew:
             return {}
@@ -100,7 +101,7 @@ class ReplyStore:
             "WHERE episode = ? AND call = ?",
             (self.episode, self.calls),
         )
-        return {sent: ModelReply(*reply) for sent, *reply in rows}
+        return {sent: ModelReply(without_keys(text), *tokens) for sent, text, *tokens in rows}
 
     def keep(self, sent: str, reply: ModelReply, cost_usd: float) -> None:
         """Store the reply to the next call; when this returns, it is on disk."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
+from collections.abc import Sequence
 
 from roboirg.evaluation.analysis.tables.table import (
     ERROR_MARK,
@@ -15,6 +14,7 @@ from roboirg.evaluation.analysis.tables.table import (
     Row,
     Table,
 )
+from roboirg.util.csv_text import csv_lines
 
 HEAD = (
     "table",
@@ -46,13 +46,11 @@ _MARK_NAMES = {ERROR_MARK: "errors", MISSING_MARK: "missing", PARTIAL_MARK: "par
 
 def csv_text(table: Table) -> str:
     """Return every entry of a table with its counts and the interval of its rate."""
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(HEAD)
+    lines: list[Sequence[object]] = [HEAD]
     for row in table.rows:
         for column, entry in zip(table.columns, row.entries, strict=True):
-            writer.writerow(_line(table, row, column, entry))
-    return file.getvalue()
+            lines.append(_line(table, row, column, entry))
+    return csv_lines(lines)
 
 
 def json_text(table: Table) -> str:
