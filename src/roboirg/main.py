@@ -155,10 +155,11 @@ def main() -> None:
         code = INTERRUPTED
     except Exception as error:
         message = describe_missing(error)
-        if message is None and is_of_others(error) and not sys.flags.dev_mode:
-            message = f"{printable(one_line(error))}; PYTHONDEVMODE=1 shows the traceback."
-        if message is None and isinstance(error, OSError):
-            message = _describe_refused(error)
+        if message is None and not sys.flags.dev_mode:
+            if is_of_others(error):
+                message = f"{printable(one_line(error))}; PYTHONDEVMODE=1 shows the traceback."
+            elif isinstance(error, OSError):
+                message = _describe_refused(error)
         if message is None:
             raise
         typer.echo(f"roboirg: {message}", err=True)

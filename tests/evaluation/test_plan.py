@@ -243,7 +243,7 @@ def test_jobs_are_ordered_and_named_uniquely() -> None:
         ({"tries": 10**22}, r"tries is 10{22}; it must be at most 1000000000"),
         ({"policy_seeds": 10**22}, r"'10{22}' is not a valid policy seed"),
         ({"max_cost": math.inf}, r"max_cost is inf; it must be a finite number"),
-        ({"cluster": {"memory_gb": 1e300}}, r"memory_gb is 1e\+300; it must be at most 1000000"),
+        ({"cluster": {"memory_gb": 1e300}}, r"memory_gb is 1e\+300; it must be at most 1000000000"),
         ({"max_steps": True}, r"max_steps is 'True'; it must be a whole number"),
         ({"environment": {"max_steps": np.True_}}, r"max_steps is 'True'"),
         ({"policy_timeout_s": True}, r"policy_timeout_s is 'True'; it must be a number"),

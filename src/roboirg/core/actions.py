@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from roboirg.core.errors import InvalidActionError, check_names
 
 ARM_JOINTS = 7
-_NO_NUMBERS = bool, np.bool_, NoneType, Decimal, np.ma.core.MaskedConstant
 POSE_SIZE = 6
 """x, y, z, roll, pitch, yaw."""
 
@@ -74,6 +73,8 @@ WAYPOINT = ActionSpace(
 )
 """The same pose, reached by a straight move of many steps; then the gripper closes or opens."""
 
+_NO_NUMBERS = bool, np.bool_, NoneType, Decimal, np.ma.core.MaskedConstant
+"""What stands in lists of others for a number, and is none."""
 NO_POINT = -1.0
 CHOICE = ActionSpace(
     "choice",

@@ -84,14 +84,17 @@ class _PlanLoader(yaml.SafeLoader):
 
     def compose_scalar_node(self, anchor: dict[str, yaml.Node]) -> yaml.ScalarNode:
         node = super().compose_scalar_node(anchor)
-        text, kind = node.value, node.tag.rpartition(":")[2]
+        text = node.value
+        kind = node.tag.rpartition(":")[2]
         if kind == "bool":
             node.tag = _TEXT
-        is_number = kind in ("int", "float", "timestamp")
-        if (is_number and not _PLAIN_NUMBER.fullmatch(text)) or (kind == "null" and not text):
+        is_odd = kind in ("int", "float", "timestamp") and not _PLAIN_NUMBER.fullmatch(text)
+        is_empty = kind == "null" and not text
+        if is_odd or is_empty:
+            line = node.start_mark.line + 1
             raise InvalidValueError(
-                f"line {node.start_mark.line + 1} has {text or 'no value'}; write a plain number "
-                "such as 10 or 0.5, or a text in quotes, or leave the key out"
+                f"line {line} has {text[:40] or 'no value'}; write a plain number such as 10 or "
+                "0.5, or a text in quotes, or leave the key out"
             )
         return node
 

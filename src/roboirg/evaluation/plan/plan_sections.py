@@ -21,9 +21,6 @@ RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure
 """Kinds of errors that may not occur again when the episode is retried."""
 
 
-_MOST_GB = 1e6
-
-
 def _names_if_any(kind: str, given: object) -> tuple[str, ...]:
     """Return names of a kind; none for an empty list, which 0 and an empty text are not."""
     is_empty = isinstance(given, list | tuple) and not given
@@ -133,7 +130,7 @@ class WorkerNeeds:
 
     cpus: Annotated[float, Field(gt=0)] = 1.0
     gpus: Annotated[float, Field(ge=0)] = 0.0
-    memory_gb: Annotated[float, Field(ge=0, le=_MOST_GB)] = 0.0
+    memory_gb: Annotated[float, Field(ge=0, le=MOST_COUNT)] = 0.0
     labels: Mapping[str, str] = field(default_factory=dict)
     variables: tuple[str, ...] = ()
     working_dir: str | None = None

@@ -30,7 +30,7 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
         InvalidValueError: an option is missing or has an invalid value.
     """
     try:
-        return kind.model_validate(flags_as_words(dict(values)))
+        return kind.model_validate(flags_as_words(values))
     except ValidationError as error:
         # What stands there and means nothing explains best what is missing.
         first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
