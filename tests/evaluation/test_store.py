@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import errno
 import functools
+import math
 import os
 import resource
 import subprocess
@@ -18,6 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.records.line_file import LOCK_FILE
 from roboirg.evaluation.records.record import EventRecord, Record
@@ -183,6 +185,21 @@ def test_a_line_that_is_no_record_is_told_with_its_number(
     for read in (read_records, read_results, read_index):
         with pytest.raises(StoreError, match=sentence):
             read(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [{"steps": 2**63}, {"seed": -(2**63) - 1}, {"duration_s": math.nan},
+     {"usage": {"cost_usd": math.inf}}, {"environment": EnvironmentOptions(max_steps=10**22)}],
+    ids=str,
+)  # fmt: skip
+def test_what_could_not_be_read_again_is_not_written(
+    tmp_path: Path, fields: dict[str, Any]
+) -> None:
+    record = replace(some_records()[0], **fields)
+    with RecordStore(tmp_path) as store, pytest.raises(StoreError, match=r"is not a record"):
+        store.append(record)
+    assert (tmp_path / RECORDS_FILE).read_bytes() == b""
 
 
 def test_the_newest_record_of_a_job_wins(tmp_path: Path) -> None:

@@ -142,7 +142,7 @@ def test_wrong_specs_are_explained(spec, error, words):
         ("actions", 7, "no action space 7"),
         ("demonstration_frames", "some", "demonstration_frames is 'some'; it must be 'all', 'no"),
         ("demonstration_frames", 0, "demonstration_frames is 0"),
-        ("observe_every", -1, "observe_every is -1; it must be None or a whole number"),
+        ("observe_every", -1, "observe_every is -1; it must be a whole number from 1"),
         ("observe_every", True, "observe_every is True"),
         ("depth", 1, "depth is 1; it must be True or False"),
         ("calibration", "yes", "calibration is 'yes'; it must be True or False"),

@@ -364,7 +364,7 @@ def test_an_excess_has_its_signs_and_its_ends_in_order(value, text):
         (("--split", "tset"), "tset"),
         (("--tasks", "StopCube", "--settings", "spatial"), "nothing to score"),
         (("--split", "none"), "nothing to score"),
-        (("--seeds", "-1"), "number of random seeds is -1"),
+        (("--seeds", "-1"), "seeds is -1; it must be a whole number from 0"),
         (("--learned", "--split", "val"), "choose --split test"),
         (("--plan", plan_file(distractors=0)), "distractors"),
     ],

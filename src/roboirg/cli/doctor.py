@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+import typer
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
@@ -104,7 +105,7 @@ def report(checks: Sequence[Check]) -> str:
 def run_doctor(render_s: int = 0) -> int:
     """Print the report and return the exit code: 0 if every check passed, otherwise 1."""
     checks = run_checks(render_s)
-    sys.stdout.write(report(checks) + "\n")
+    typer.echo(report(checks))
     return 0 if all(check.ok for check in checks) else 1
 
 

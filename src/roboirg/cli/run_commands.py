@@ -82,6 +82,7 @@ def run(
     from roboirg.evaluation.plan.sources import Source
     from roboirg.evaluation.play.prompt_shares import prompt_shares, warning_lines
     from roboirg.evaluation.play.video_writer import check_video_support
+    from roboirg.evaluation.records.run_files import run_folder
     from roboirg.evaluation.run.runner import check_run
 
     add_working_directory(last=True)
@@ -92,7 +93,7 @@ def run(
     if out is None:
         raise InvalidValueError("No folder given; name one with --out, such as runs/first.")
     # Absolute: a policy in this process may change the working directory.
-    folder = folder_of(out).absolute()
+    folder = run_folder(out).absolute()
     chosen = _executor(made, executor, workers)
     if made.video != "off":
         check_video_support()
@@ -105,17 +106,6 @@ def run(
     summary = play(made, folder, chosen, retry=retry_errors)
     print_tables_of(Source(folder))
     report_problems(summary, folder)
-
-
-def folder_of(text: str) -> Path:
-    """Return the path of a folder.
-
-    Raises:
-        InvalidValueError: the text is empty.
-    """
-    if not text.strip():
-        raise InvalidValueError("The name of the run's folder is empty.")
-    return Path(text)
 
 
 def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummary:

@@ -12,7 +12,7 @@ import numpy as np
 from rich.table import Table
 
 from roboirg.core.episode import Episode, Split
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.field_types import check_whole
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions
@@ -189,8 +189,7 @@ def score_texts(
     learning: int | None = None,
 ) -> Iterator[Scored]:
     """Yield every instruction with its scores, task by task; arguments as of `shortcut_rows`."""
-    if seeds < 0:
-        raise InvalidValueError(f"The number of random seeds is {seeds}; it must be at least 0.")
+    check_whole("seeds", seeds, least=0)
     for task in tasks:
         tested = [*split_episodes((task,), splits), *_random(task, 0, seeds)]
         for setting in (one for one in settings if one in settings_of(get_task(task))):

@@ -23,7 +23,7 @@ def replacing(path: Path) -> Iterator[Path]:
     old or the new content, never a part, and the content is on the disk before the name is. A
     folder that is missing is made.
     """
-    part = path.with_name(f".{path.name}.{secrets.token_hex(8)}{PART}")
+    part = path.parent / f".{path.name}.{secrets.token_hex(8)}{PART}"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield part

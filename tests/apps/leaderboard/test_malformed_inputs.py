@@ -411,7 +411,7 @@ PLAN_FILES: Mapping[str, tuple[str, str]] = {
     "Python object": ("tasks: !!python/object/apply:os.abort []\n", "not valid YAML"),
     "deep nesting": ("tasks: " + "[" * 20_000, "nested too deeply"),
     "number of 10,000 digits": ("max_steps: " + "9" * 10_000, "not valid YAML"),
-    "date that cannot be": ("split: 2020-99-99", "not valid YAML"),
+    "date that cannot be": ("split: 2020-99-99", "line 1 has 2020-99-99"),
     "key twice": ("tasks: all\ntasks: all\n", "again"),
     "list as key": ("? [tasks]\n: all\n", "not valid YAML"),
 }

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from roboirg.core.errors import RoboIRGError
+from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.plain_text import printable
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.short_hash import short_hash
@@ -24,6 +24,18 @@ MOST_PLAN_BYTES = 64_000_000
 
 class ForeignPathError(RoboIRGError):
     """A path is that of no file of the run's folder."""
+
+
+def run_folder(path: str | Path) -> Path:
+    """Return the path of a run's folder, which need not exist.
+
+    Raises:
+        InvalidValueError: its name is empty, or has NUL.
+    """
+    text = str(path)
+    if not text.strip() or "\0" in text:
+        raise InvalidValueError(f"The run's folder is {text!r}; it must be a path like runs/first.")
+    return Path(path)
 
 
 def run_file(folder: Path, name: str) -> Path:

@@ -48,7 +48,7 @@ class ModelOptions(BaseModel):
         sampling_fps: frames per second at which Google samples a clip; None for its default, 1.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     provider: Provider = "openai"
     model: str = Field(min_length=1)
