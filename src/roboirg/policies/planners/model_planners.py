@@ -21,7 +21,7 @@ from roboirg.policies.planners.vlm_planner import (
 )
 from roboirg.policies.vlm.model_content import ChatTurn, Part
 from roboirg.policies.vlm.models import ModelQuery
-from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
+from roboirg.util.reply_reading import UnparsableReplyError, json_object, text_of, whole_number
 from roboirg.util.media import VIDEO_RATE, Clip, Picture, Pixels, contact_sheets, evenly_spaced
 
 TEXT: Mapping[str, Any] = {"type": "string"}
@@ -217,10 +217,15 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
             raise UnparsableReplyError(
                 "The field 'keyframe_positions' has to be a list of numbers."
             )
-        if any(type(one) is not int or not 1 <= one <= count for one in positions):
-            raise UnparsableReplyError(f"Positions of frames are whole numbers from 1 to {count}.")
         steps = tuple(self._recent)
-        frames = self.frames | {steps[one - 1]: self._recent[steps[one - 1]] for one in positions}
+        frames = dict(self.frames)
+        for position in map(whole_number, positions):
+            if position is None or not 1 <= position <= count:
+                raise UnparsableReplyError(
+                    f"Positions of frames are whole numbers from 1 to {count}."
+                )
+            step = steps[position - 1]
+            frames[step] = self._recent[step]
         kept = merge_keyframes(frames, self.options.near)[-(self.options.most or len(frames)) :]
         self.frames = {step: frames[step] for step in kept}
         return subgoal
@@ -273,7 +278,7 @@ class StatelessPlanner(VLMPlanner[StatelessOptions]):
 
     def take(self, text: str) -> str:
         """Return the subgoal in the last line of the reply; the policy reports what comes of it."""
-        lines = [line for line in text.splitlines() if line.strip()]
+        lines = list(filter(normalize_subgoal, text.splitlines()))  # none of signs alone
         subgoal = parse_points(lines[-1] if lines else "")
         return FINISHED if self.finishes(subgoal) else subgoal
 

@@ -16,7 +16,7 @@ from roboirg.core.episode import Goal
 from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import split_episodes
-from roboirg.util.json_reply import UnparsableReplyError, json_object
+from roboirg.util.reply_reading import UnparsableReplyError, json_object, whole_number
 
 Answer = Mapping[str, Any]
 """JSON values by field: numbers, words and lists of words."""
@@ -40,9 +40,14 @@ class Field:
     values: tuple[str | int, ...]
     lengths: tuple[int, int] | None = None
 
+    @property
+    def is_number(self) -> bool:
+        """Whether the values are whole numbers."""
+        return isinstance(self.values[0], int)
+
     def schema(self) -> dict[str, Any]:
         """Return the JSON schema of the field."""
-        kind = "integer" if isinstance(self.values[0], int) else "string"
+        kind = "integer" if self.is_number else "string"
         one: dict[str, Any] = {"type": kind, "enum": list(self.values)}
         if self.lengths is None:
             return one
@@ -103,7 +108,7 @@ class GoalSchema:
         for field in self.fields:
             if field.name not in reply:
                 raise UnparsableReplyError(f"The field {field.name!r} is missing.")
-            answer[field.name] = _normalize(reply[field.name])
+            answer[field.name] = _normalize(reply[field.name], field.is_number)
         goal = self.goals.get(_canonical(answer))
         if goal is not None:
             return goal
@@ -151,11 +156,14 @@ def _field(name: str, values: list[Any]) -> Field:
     return Field(name, kind, tuple(sorted(set(values))), lengths)
 
 
-def _normalize(value: object) -> object:
-    """Return a value with its words in lower case and stripped."""
-    if isinstance(value, str):
-        return value.strip().lower()
-    return [_normalize(item) for item in value] if isinstance(value, list) else value
+def _normalize(value: object, is_number: bool) -> object:
+    """Return a value with its words in lower case and stripped; 3.0 and "3" become 3."""
+    if isinstance(value, list):
+        return [_normalize(item, is_number) for item in value]
+    number = whole_number(value) if is_number else None
+    if number is not None:
+        return number
+    return value.strip().lower() if isinstance(value, str) else value
 
 
 def _canonical(answer: Answer) -> str:

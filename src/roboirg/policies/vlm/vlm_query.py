@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
@@ -10,12 +11,14 @@ from dataclasses import dataclass, field
 from string import Template
 from typing import TypeVar
 
-from roboirg.core.errors import ModelBusyError, PolicyConnectionError
+from roboirg.core.errors import ModelBusyError, PolicyConnectionError, PolicyReplyError
+from roboirg.core.plain_text import clip_text
 from roboirg.core.waiting import waiting
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, ModelReply, make_model
+from roboirg.policies.vlm.models.model import MOST_TOKENS
 from roboirg.policies.vlm.models.reply_store import ReplyStore, current_store, digest
-from roboirg.util.json_reply import UnparsableReplyError
+from roboirg.util.reply_reading import UnparsableReplyError, answer_of
 
 Value = TypeVar("Value")
 
@@ -24,6 +27,7 @@ SILENCE = "(no answer)"
 TRIES = 2
 FIRST_PAUSE_S = 1.0
 LONGEST_PAUSE_S = 60.0
+MAX_COUNT_LENGTH = 20
 ALWAYS = ("calls", "input_tokens", "output_tokens", "unparsed", "cost_usd")
 """Counts that stand in records even if they are 0; the cost only if prices are known."""
 
@@ -48,20 +52,21 @@ class VLMQuery:
         self.start()
 
     def ask(self, query: ModelQuery, parse: Callable[[str], Value]) -> Value | None:
-        """Return the parsed reply; None if `parse` rejects two replies.
+        """Return the parsed answer of the reply; None if `parse` rejects two.
 
         Raises:
             PolicyConnectionError: the service cannot be reached or is overloaded.
             PolicyTimeoutError: there was no reply in time.
-            PolicyReplyError: the service replied with an error or with something else.
+            PolicyReplyError: the service replied with an error or with something else, or reports
+                tokens that cannot be.
             BudgetError: the run has spent what it may.
         """
         for _ in range(TRIES):
-            reply = self._request(query)
+            answer = answer_of(self._request(query).text)
             try:
-                return parse(reply.text)
+                return parse(answer)
             except UnparsableReplyError as error:
-                rejected = ChatTurn("model", (reply.text or SILENCE,))
+                rejected = ChatTurn("model", (answer or SILENCE,))
                 retry = ChatTurn("user", (self.again.substitute(why=str(error)),))
                 query = query._replace(turns=(*query.turns, rejected, retry))
         self._counts["unparsed"] += 1
@@ -75,6 +80,7 @@ class VLMQuery:
     def usage(self) -> dict[str, float]:
         """Return calls, tokens and queries without a usable reply; the cost if prices are known.
 
+        Tokens and cost are NaN if the service did not report those of every reply.
         What was ``stored`` by an earlier try cost nothing again; ``anew`` is what was stored with
         something else sent, as by another machine; ``answered_s`` the time that its answers took,
         and ``waited_s`` that in queues and while it was busy.
@@ -95,11 +101,15 @@ class VLMQuery:
     def _request(self, query: ModelQuery) -> ModelReply:
         self._counts["calls"] += 1
         reply = self._find_or_send(query)
-        self._counts["input_tokens"] += reply.input_tokens
-        self._counts["output_tokens"] += reply.output_tokens
+        self._add("input_tokens", reply.input_tokens)
+        self._add("output_tokens", reply.output_tokens)
         if self.options.has_prices:
-            self._counts["cost_usd"] += self.options.cost_usd(reply)
+            self._add("cost_usd", self.options.cost_usd(reply))
         return reply
+
+    def _add(self, name: str, amount: float | None) -> None:
+        """Add to a count; what is unknown makes the sum unknown."""
+        self._counts[name] += math.nan if amount is None else amount
 
     def _find_or_send(self, query: ModelQuery) -> ModelReply:
         """Return the run's reply to a query; a new one is stored before anything sees it."""
@@ -118,6 +128,14 @@ class VLMQuery:
         store.calls += 1
         return reply
 
+    def _check_tokens(self, reply: ModelReply) -> None:
+        count = reply.impossible_count
+        if count is not None:
+            shown = clip_text(str(count), MAX_COUNT_LENGTH)
+            raise PolicyReplyError(
+                f"Model {self._service} reports {shown} tokens; a reply has 0 to {MOST_TOKENS:,}."
+            )
+
     def _send(self, query: ModelQuery, store: ReplyStore | None) -> ModelReply:
         """Send a query, again while the service is busy or, a few times, cannot be reached."""
         model = self._model = self._model or self.connect(self.options)
@@ -129,7 +147,9 @@ class VLMQuery:
                     store.wait_for_turn(self._service, self.options.requests_per_minute)
             try:
                 with self._timed("answered_s"):
-                    return model.answer(query)
+                    reply = model.answer(query)
+                self._check_tokens(reply)
+                return reply
             except PolicyConnectionError as error:
                 is_busy = isinstance(error, ModelBusyError)
                 unreachable += not is_busy

@@ -5,13 +5,15 @@ from __future__ import annotations
 import base64
 import json
 import math
+from collections.abc import Mapping
 from typing import Any
 from urllib.parse import quote
 
 from roboirg.policies.vlm.model_content import Part
-from roboirg.policies.vlm.models.http_model import HttpModel, given
+from roboirg.policies.vlm.models.http_model import HttpModel, given, reported_usage
 from roboirg.policies.vlm.models.model import ModelQuery, ModelReply
 from roboirg.util.media import Picture, encode_png
+from roboirg.util.reply_reading import whole_number, with_thoughts
 
 
 class GoogleModel(HttpModel):
@@ -48,13 +50,22 @@ class GoogleModel(HttpModel):
         return f"{url}:generateContent", headers, json.dumps(body).encode()
 
     def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
-        """Return the text of the first candidate; thoughts are left out but counted as output."""
+        """Return the text of the first candidate and its thoughts, which count as output."""
         first = (reply.get("candidates") or [{}])[0]
-        parts = first.get("content", {}).get("parts", [])
-        text = "".join(part.get("text", "") for part in parts if not part.get("thought"))
-        usage = reply.get("usageMetadata", {})
-        output = usage.get("candidatesTokenCount", 0) + usage.get("thoughtsTokenCount", 0)
-        return ModelReply(text, usage.get("promptTokenCount", 0), output)
+        answer = ""
+        thoughts = []
+        for part in first.get("content", {}).get("parts", []):
+            text = part.get("text", "")
+            if part.get("thought"):
+                thoughts.append(text)
+            else:
+                answer += text
+        usage = reported_usage(reply, "usageMetadata")
+        return ModelReply(
+            with_thoughts(answer, thoughts),
+            whole_number(usage.get("promptTokenCount")),
+            _output_tokens(usage),
+        )
 
     def _part(self, part: Part) -> dict[str, Any]:
         if isinstance(part, str):
@@ -66,6 +77,18 @@ class GoogleModel(HttpModel):
             inlineData=_blob(part.file, "video/mp4"),
             videoMetadata=None if fps is None else {"fps": fps},
         )
+
+
+def _output_tokens(usage: Mapping[str, Any]) -> int | None:
+    """Return the tokens of answer and thoughts; None if they are unknown.
+
+    The service leaves out what is 0.
+    """
+    answer = whole_number(usage.get("candidatesTokenCount", 0))
+    thoughts = whole_number(usage.get("thoughtsTokenCount", 0))
+    if not usage or answer is None or thoughts is None:
+        return None
+    return answer + thoughts
 
 
 def _blob(content: bytes, kind: str) -> dict[str, str]:

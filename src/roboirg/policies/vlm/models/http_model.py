@@ -65,9 +65,9 @@ class HttpModel(ABC):
 
     @abstractmethod
     def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
-        """Return the text and the tokens of a reply in JSON.
+        """Return a reply in JSON as ours; token counts that are no whole numbers are unknown.
 
-        It may raise any error of a missing or wrong value.
+        It may raise any error of a missing or wrong text.
         """
 
     def answer(self, query: ModelQuery) -> ModelReply:
@@ -85,8 +85,7 @@ class HttpModel(ABC):
                 ).start()
                 response, content = found.result(timeout=self.options.timeout_s)
             if response.status_code == HTTPStatus.OK:
-                text, *tokens = self.read(json.loads(content))
-                return ModelReply(str(text), *map(int, tokens))
+                return self.read(json.loads(content))
         except (TimeoutError, httpx.TimeoutException):
             raise PolicyTimeoutError(
                 f"{self._name} did not answer within {self.options.timeout_s:g} s; raise "
@@ -136,6 +135,12 @@ class HttpModel(ABC):
 def given(**entries: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
     """Return the entries that are not None."""
     return {name: value for name, value in entries.items() if value is not None}
+
+
+def reported_usage(reply: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """Return the token counts of a reply in JSON; none if there is something else."""
+    usage = reply.get(name)
+    return usage if isinstance(usage, dict) else {}
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:

@@ -21,6 +21,8 @@ KEY_VARIABLES: Mapping[Provider, str] = {"openai": "OPENAI_API_KEY", "google": "
 """Environment variables with the keys of the providers' own services, by default."""
 NO_KEY = "none"
 """Sent as the key to a server that needs none."""
+MOST_TOKENS = 100_000_000
+"""Of one query or reply: ten times the longest context of any model, which is ten million tokens."""
 
 
 class ModelOptions(BaseModel):
@@ -118,10 +120,17 @@ class ModelOptions(BaseModel):
         """Whether the cost of replies is known."""
         return (self.input_price, self.output_price) != (None, None)
 
-    def cost_usd(self, reply: ModelReply) -> float:
-        """Return what a reply costs; 0 without prices."""
+    def cost_usd(self, reply: ModelReply) -> float | None:
+        """Return what a reply costs: 0 without prices, None if tokens with a price are unknown."""
+        cost = 0.0
         paid = ((reply.input_tokens, self.input_price), (reply.output_tokens, self.output_price))
-        return sum(tokens * (price or 0.0) for tokens, price in paid) / 1_000_000
+        for tokens, price in paid:
+            if not price:
+                continue
+            if tokens is None:
+                return None
+            cost += tokens * price
+        return cost / 1_000_000
 
 
 class ModelQuery(NamedTuple):
@@ -139,11 +148,25 @@ class ModelQuery(NamedTuple):
 
 
 class ModelReply(NamedTuple):
-    """A model's reply, possibly empty, and its tokens."""
+    """A model's reply.
+
+    Attributes:
+        text: what it said, possibly nothing; thoughts may be in it as `with_thoughts` marks them.
+        input_tokens: of the query; None if the service does not report it.
+        output_tokens: of the reply and its thoughts; None if the service does not report it.
+    """
 
     text: str
-    input_tokens: int = 0
-    output_tokens: int = 0
+    input_tokens: int | None = None
+    output_tokens: int | None = None
+
+    @property
+    def impossible_count(self) -> int | None:
+        """A number of tokens that no reply can have; None if there is none."""
+        for count in (self.input_tokens, self.output_tokens):
+            if count is not None and not 0 <= count <= MOST_TOKENS:
+                return count
+        return None
 
 
 class Model(Protocol):

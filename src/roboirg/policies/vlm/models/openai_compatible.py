@@ -8,9 +8,15 @@ from collections.abc import Iterator
 from typing import Any
 
 from roboirg.policies.vlm.model_content import ChatTurn, Part
-from roboirg.policies.vlm.models.http_model import HttpModel, given
+from roboirg.policies.vlm.models.http_model import HttpModel, given, reported_usage
 from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
 from roboirg.util.media import Picture, encode_png, sample_evenly
+from roboirg.util.reply_reading import whole_number, with_thoughts
+
+_ANSWERS = frozenset({"text", "output_text"})
+"""Types of parts that are answers; all others are thoughts, or nothing that can be read."""
+_THOUGHTS = ("reasoning_content", "reasoning")
+"""Fields of a message in which servers put thoughts."""
 
 
 class OpenAIModel(HttpModel):
@@ -34,11 +40,25 @@ class OpenAIModel(HttpModel):
         return url, {"Authorization": f"Bearer {self.key}"}, text.encode()
 
     def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
-        """Return the text of the first choice."""
-        text, usage = reply["choices"][0]["message"].get("content"), reply.get("usage")
-        if usage is None:
-            return ModelReply(text or "")
-        return ModelReply(text or "", usage["prompt_tokens"], usage["completion_tokens"])
+        """Return the text of the first choice, which may come in parts, and its thoughts."""
+        message = reply["choices"][0]["message"]
+        content = message.get("content") or ""
+        parts = [content] if isinstance(content, str) else content
+        thoughts = [message[name] for name in _THOUGHTS if message.get(name)]
+        answer = ""
+        for part in parts:
+            if isinstance(part, str):
+                answer += part
+            elif part["type"] in _ANSWERS:
+                answer += part["text"]
+            else:
+                thoughts.append(part)
+        usage = reported_usage(reply, "usage")
+        return ModelReply(
+            with_thoughts(answer, thoughts),
+            whole_number(usage.get("prompt_tokens")),
+            whole_number(usage.get("completion_tokens")),
+        )
 
 
 def chat_messages(query: ModelQuery, options: ModelOptions) -> list[dict[str, Any]]:

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.core.errors import BudgetError
+from roboirg.core.plain_text import counted
 from roboirg.core.waiting import waiting
 from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
 from roboirg.util.media import Clip, Picture
@@ -34,6 +35,10 @@ CREATE TABLE IF NOT EXISTS replies (
     PRIMARY KEY (episode, call, sent)
 ) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS services (name TEXT PRIMARY KEY, next_at REAL) WITHOUT ROWID;
+"""
+
+_SPENT = """
+SELECT total(cost_usd), count(*) - count(CASE WHEN cost_usd >= 0 THEN 1 END) FROM replies
 """
 
 _POSTPONE = """
@@ -100,10 +105,19 @@ class ReplyStore:
             "WHERE episode = ? AND call = ?",
             (self.episode, self.calls),
         )
-        return {sent: ModelReply(*reply) for sent, *reply in rows}
+        replies = {}
+        for sent, *fields in rows:
+            reply = ModelReply(*fields)
+            if reply.impossible_count is not None:  # stored when such counts were accepted
+                reply = ModelReply(reply.text)
+            replies[sent] = reply
+        return replies
 
-    def keep(self, sent: str, reply: ModelReply, cost_usd: float) -> None:
-        """Store the reply to the next call; when this returns, it is on disk."""
+    def keep(self, sent: str, reply: ModelReply, cost_usd: float | None) -> None:
+        """Store the reply to the next call; when this returns, it is on disk.
+
+        The cost is None if it is unknown.
+        """
         self._database.execute(
             "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?, ?, ?, ?)",
             (self.episode, self.calls, sent, *reply, cost_usd),
@@ -113,7 +127,7 @@ class ReplyStore:
         """Raise if the run may not ask a model.
 
         Raises:
-            BudgetError: it has spent what it may, or what the model costs is not known.
+            BudgetError: it has spent what it may, or what the model costs or has cost is unknown.
         """
         most = self.settings.max_cost_usd
         if most is None:
@@ -123,7 +137,13 @@ class ReplyStore:
                 f"--max-cost needs the prices of model {model.model!r}; give input_price and "
                 "output_price, in US dollars per million tokens."
             )
-        spent = float(self._database.execute("SELECT total(cost_usd) FROM replies").fetchone()[0])
+        spent, unknown = self._database.execute(_SPENT).fetchone()
+        if unknown:
+            raise BudgetError(
+                f"--max-cost cannot be kept: what {counted(unknown, 'reply', 'replies')} cost is "
+                f"unknown, as the service of model {model.model!r} did not report the tokens; run "
+                "the same command without --max-cost to go on."
+            )
         if spent >= most:
             raise BudgetError(
                 f"The models have cost {spent:.2f} of at most {most:.2f} US dollars; run the same "
