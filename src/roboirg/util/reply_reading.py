@@ -8,51 +8,55 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-_THOUGHTS_BEGIN = re.compile(
-    r"<(?:think|thinking|thought|thoughts|reasoning)>|\[THINK\]|◁think▷"
-    r"|<\|channel\|>(?:analysis|commentary)\b",
-    re.IGNORECASE,
-)
+import msgspec
+
 _THOUGHTS_END = re.compile(
-    r"</(?:think|thinking|thought|thoughts|reasoning)>|\[/THINK\]|◁/think▷"
-    r"|<\|channel\|>final<\|message\|>",
-    re.IGNORECASE,
+    r"(?i)</(?:think|thinking|thought|thoughts|reasoning)>|\[/THINK\]|◁/think▷"
+    r"|<\|channel\|>final<\|message\|>"
 )
-_END_TOKENS = re.compile(r"(?:(?:<\|(?:im_end|endoftext|end|return|eot_id)\|>|</s>)\s*)+$")
+_ANSWER_ENDS = re.compile(
+    r"(?i)<(?:think|thinking|thought|thoughts|reasoning)>|\[THINK\]|◁think▷"
+    r"|<\|channel\|>(?:analysis|commentary)\b"
+    r"|<\|(?:im_end|endoftext|end|return|eot_id)\|>|</s>"
+)
+"""Where thoughts begin, or a token at the end of a reply."""
 
-_OBJECT_BEGINS = re.compile(r"""\{(?=\s*(?:["'}]|\w+\s*:|$))|\[(?=\s*\{)""")
-"""*{this}* is no object; an object may be malformed."""
+_OBJECT_BEGINS = re.compile(r"""\{(?=\s*(?:["'}]|$))|\[(?=\s*\{)""")
+"""*{this}* is none; *{'this': 1}* is a malformed one."""
 
-_LETTER = r"(?P<letter>[A-D])(?![\w'’-])"
-_NO_ARTICLE = r"(?!(?<=a)[ \t]+(?!(?:and|as|because|is|since)\b)(?-i:[a-z]))"
-"""*A cube* names no choice, while *A because …* does."""
-_LINE_BEGINS = r"^[^\w\n]*(?:(?:choice|option)\b[^\w\n]*)?"
-_ALONE = rf"{_LINE_BEGINS}{_LETTER}[^\w\n]*$"
-_AFTER_ANSWER = (
-    r"\b(?:answer|(?:best|correct|final|my|right)\s+(?:choice|option|one))\b"
-    r"(?:[^\w.?!]+(?:be|choice|correct|is|letter|must|option|right|should|the|would)\b)*"
-    rf"[^\w.?!]*{_LETTER}{_NO_ARTICLE}"
+_DECISIVE = re.compile(
+    r"""(?imx)
+    (?:
+        (?P<line>^[^\w\n]*(?:(?:choice|option)\b[^\w\n]*)?)
+        | \b(?:answer|(?:best|correct|final|my|right)\s+(?:choice|option|one))\b
+          (?:[^\w.?!]+(?:be|choice|correct|is|letter|must|option|right|should|the|would)\b)*
+          [^\w.?!]*
+        | \\boxed\{(?:\\\w+\{)?[^\w}]*
+    )
+    (?P<letter>[A-D])(?![\w'’-])
+    (?(line)
+        [^\w\n]*$
+        # *A cube* names no choice, while *A because …* does; *A or B* names two.
+        | (?!(?<=a)[ \t]+(?!(?:and|as|because|is|since)\b)(?-i:[a-z]))
+          (?!\W*(?:,|/|&|\b(?:or|and)\b)\W*[A-D]\b)
+    )
+    """
 )
-_BOXED = rf"\\boxed\{{(?:\\\w+\{{)?[^\w}}]*{_LETTER}{_NO_ARTICLE}"
-_DECISIVE = tuple(
-    re.compile(pattern, re.IGNORECASE | re.MULTILINE)
-    for pattern in (_ALONE, _AFTER_ANSWER, _BOXED)
+"""A letter alone on its line, after *answer* and the like, or in a box."""
+_SUGGESTED = re.compile(
+    r"""(?imx)
+    (?: ^[^\w\n]*(?:(?:choice|option)\b[^\w\n]*)? | \*\*[(\[]? )
+    (?P<letter>[A-D])
+    (?=
+        [.:)\]*] | \s*[(–—] | [ \t]+- | [ \t]+(?-i:[A-Z][a-z])
+        | ,?[ \t]+(?:as|because|since|is[ ](?:correct|my|right|the))\b
+    )
+    """
 )
-_FOLLOWED = (
-    r"(?=[.:)\]*]|\s*[(–—]|[ \t]+-|[ \t]+(?-i:[A-Z][a-z])"
-    r"|,?[ \t]+(?:as|because|since|is (?:correct|my|right|the))\b)"
-)
-_BEGINS_LINE = rf"{_LINE_BEGINS}{_LETTER}{_FOLLOWED}"
-_BOLD = rf"\*\*[(\[]?{_LETTER}(?=[.:)\]*])"
-_SUGGESTED = tuple(
-    re.compile(pattern, re.IGNORECASE | re.MULTILINE) for pattern in (_BEGINS_LINE, _BOLD)
-)
-_LETTER_FIELDS = ("choice", "answer", "letter")
-
-_DIGITS = re.compile(r"\s*-?[0-9]{1,18}\s*")
+"""A letter at the beginning of a line, or in bold."""
 
 
 class UnparsableReplyError(Exception):
@@ -64,27 +68,21 @@ def with_thoughts(answer: str, thoughts: Sequence[Any]) -> str:
 
     Args:
         answer: what the model said.
-        thoughts: what its service reports apart from that: texts, or any JSON.
+        thoughts: JSON values in which its service reports thoughts.
     """
     if not thoughts:
         return answer
-    texts = []
-    for thought in thoughts:
-        text = thought if isinstance(thought, str) else json.dumps(thought, ensure_ascii=False)
-        texts.append(text)
-    joined = "\n".join(texts)
-    return f"<think>{joined}</think>\n{answer}"
+    return f"<think>{json.dumps(thoughts, ensure_ascii=False)}</think>\n{answer}"
 
 
 def answer_of(text: str) -> str:
     """Return a reply without the thoughts in it, and without the tokens at its end.
 
-    What follows the last end of thoughts is the answer, up to thoughts that break off. The first
-    tag may be missing, as some services put it into the prompt.
+    What follows the last end of thoughts is the answer, up to thoughts that break off. The tag at
+    their beginning may be missing, as some services put it into the prompt.
     """
     after_thoughts = _THOUGHTS_END.split(text)[-1]
-    answer = _THOUGHTS_BEGIN.split(after_thoughts)[0]
-    return _END_TOKENS.sub("", answer).strip()
+    return _ANSWER_ENDS.split(after_thoughts)[0].strip()
 
 
 def json_object(text: str) -> dict[str, Any]:
@@ -93,27 +91,21 @@ def json_object(text: str) -> dict[str, Any]:
     It may be the only item of a list.
 
     Raises:
-        UnparsableReplyError: there is none, the last one breaks off or is malformed, or it is one
-            of several in a list.
+        UnparsableReplyError: there is none, one is malformed, or the last ones are a list.
     """
     found = last_json(text)
-    if found is None:
-        raise UnparsableReplyError("The reply holds no JSON object.")
-    if isinstance(found, dict):
-        return found
-    if len(found) > 1:
-        raise UnparsableReplyError("The reply holds several JSON objects in a list.")
-    only: dict[str, Any] = found[0]
-    return only
+    if isinstance(found, list) and len(found) == 1:
+        found = found[0]
+    if not isinstance(found, dict):
+        raise UnparsableReplyError("The reply holds no JSON object, or several in a list.")
+    return found
 
 
-def last_json(text: str) -> dict[str, Any] | list[Any] | None:
-    """Return the last JSON object in a reply, or the last list that begins with an object.
-
-    None if there is none, or if the last one is malformed: an earlier one must not stand for it.
+def last_json(text: str) -> Any:  # noqa: ANN401 - JSON
+    """Return the last JSON object in a reply, or the last list of objects; None without any.
 
     Raises:
-        UnparsableReplyError: the last one breaks off or cannot be read.
+        UnparsableReplyError: an object breaks off or is malformed, so that none is sure to be last.
     """
     answer = answer_of(text)
     decoder = json.JSONDecoder(strict=False)  # texts may have line breaks
@@ -122,60 +114,41 @@ def last_json(text: str) -> dict[str, Any] | list[Any] | None:
     while begin is not None:
         try:
             found, end = decoder.raw_decode(answer, begin.start())
-        except json.JSONDecodeError as error:
-            is_in_text = error.msg.startswith("Unterminated string")
-            if is_in_text or error.pos >= len(answer):
-                raise UnparsableReplyError("The last JSON object breaks off.") from None
-            found = None
-            end = begin.end()
-        except (ValueError, RecursionError):  # a number of thousands of digits; too deep
-            raise UnparsableReplyError("The JSON object cannot be read.") from None
+        except (ValueError, RecursionError):
+            raise UnparsableReplyError("A JSON object breaks off or is malformed.") from None
         begin = _OBJECT_BEGINS.search(answer, end)
     return found
 
 
-def chosen_letter(text: str) -> str:
-    """Return the letter from A to D that a reply chooses, in upper case.
+def chosen_letter(text: str, letters: str) -> str:
+    """Return the letter that a reply chooses, in upper case.
 
     A field of a JSON object decides, else the letters alone on their lines, after *answer* and in
     boxes, else those that begin a line or are set in bold.
 
     Raises:
-        UnparsableReplyError: it names no letter, or several different ones.
+        UnparsableReplyError: it names none of the letters from A to D, several different ones, or
+            one that is not among `letters`.
     """
     found = last_json(text)
     answer = answer_of(text)
     if isinstance(found, dict):
-        for name in _LETTER_FIELDS:
-            if isinstance(found.get(name), str):
-                answer = found[name]
-                break
-    letters = _letters(_DECISIVE, answer) or _letters(_SUGGESTED, answer)
-    if not letters:
-        raise UnparsableReplyError("The reply names no letter.")
-    if len(letters) > 1:
-        raise UnparsableReplyError("The reply names several different letters.")
-    return letters.pop()
-
-
-def _letters(patterns: Iterable[re.Pattern[str]], text: str) -> set[str]:
-    """Return the different letters that the patterns find, in upper case."""
-    letters = set()
-    for pattern in patterns:
-        for match in pattern.finditer(text):
-            letters.add(match["letter"].upper())
-    return letters
+        answer = str(found.get("choice", found.get("answer", answer)))
+    for pattern in (_DECISIVE, _SUGGESTED):
+        named = {match["letter"].upper() for match in pattern.finditer(answer)}
+        if named:
+            break
+    if len(named) != 1 or not named <= set(letters):
+        raise UnparsableReplyError("The reply has to name one of the letters.")
+    return named.pop()
 
 
 def whole_number(value: object) -> int | None:
     """Return a JSON value that is a whole number, also 3.0 and "3"; None for any other."""
-    if isinstance(value, bool):
+    try:
+        return msgspec.convert(value, int, strict=False)
+    except msgspec.ValidationError:
         return None
-    if isinstance(value, str) and _DIGITS.fullmatch(value):
-        return int(value)
-    if isinstance(value, float) and value.is_integer():
-        return int(value)
-    return value if isinstance(value, int) else None
 
 
 def text_of(reply: dict[str, Any], name: str) -> str:

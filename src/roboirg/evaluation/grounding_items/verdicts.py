@@ -19,6 +19,7 @@ from roboirg.evaluation.grounding_items.grounding_item import (
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.util.reply_reading import UnparsableReplyError, chosen_letter, last_json
 
+
 class Pixel(msgspec.Struct, frozen=True):
     """A place in a picture: `x` columns from the left, `y` rows from the top."""
 
@@ -92,10 +93,8 @@ def _judge_slots(item: GroundingItem, reply: str) -> ReplyVerdict:
 
 def _judge_choice(item: GroundingItem, reply: str) -> ReplyVerdict:
     try:
-        letter = chosen_letter(reply)
+        letter = chosen_letter(reply, LETTERS[: len(item.choices)])
     except UnparsableReplyError:
-        return ReplyVerdict(False, None, {})
-    if letter not in LETTERS[: len(item.choices)]:
         return ReplyVerdict(False, None, {})
     return ReplyVerdict(letter == item.choice, letter, {})
 

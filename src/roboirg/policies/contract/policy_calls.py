@@ -120,8 +120,9 @@ def _checked(metadata: object, *, is_ours: bool) -> dict[str, JsonValue]:
 
 
 def policy_usage(policy: Policy) -> dict[str, float]:
-    """Return the costs that a policy reports; left out are NaN, which is unknown, and those below 0
-    or beyond reason.
+    """Return the costs that a policy reports; those below 0 or beyond reason are left out.
+
+    So are those that are unknown, which is NaN.
 
     Raises:
         InvalidValueError: there are too many, a name is not a short text, or a cost no number.

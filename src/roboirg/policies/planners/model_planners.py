@@ -19,10 +19,11 @@ from roboirg.policies.planners.vlm_planner import (
     PlannerOptions,
     VLMPlanner,
 )
+from roboirg.policies.vlm.goal_schema import object_schema
 from roboirg.policies.vlm.model_content import ChatTurn, Part
 from roboirg.policies.vlm.models import ModelQuery
-from roboirg.util.reply_reading import UnparsableReplyError, json_object, text_of, whole_number
 from roboirg.util.media import VIDEO_RATE, Clip, Picture, Pixels, contact_sheets, evenly_spaced
+from roboirg.util.reply_reading import UnparsableReplyError, json_object, text_of, whole_number
 
 TEXT: Mapping[str, Any] = {"type": "string"}
 """Schema of a field with words."""
@@ -122,12 +123,12 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
     def query(self, observation: Observation) -> ModelQuery:
         """Add a turn with the frames since the last one."""
         self._frames = self._frames or [front_picture(observation)]
-        schema = _schema(description=TEXT, subgoal=TEXT)
+        fields = {"description": TEXT, "subgoal": TEXT}
         if not self._turns:
-            schema = _schema(subgoal_sequence=_list_of(TEXT), subgoal=TEXT)
+            fields = {"subgoal_sequence": _list_of(TEXT), "subgoal": TEXT}
         self._turn = ChatTurn("user", tuple(self._parts("next" if self._turns else "first")))
         system = self.fill("system", **self.forms())
-        return ModelQuery(system, (*self._turns, self._turn), schema)
+        return ModelQuery(system, (*self._turns, self._turn), object_schema(fields))
 
     def take(self, text: str) -> str:
         """Return the subgoal, the last one if all is done; keep the turn and its reply."""
@@ -205,8 +206,8 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
     def query(self, observation: Observation) -> ModelQuery:  # noqa: ARG002
         """Show the demonstration, the task, the key frames and the recent frames."""
         position = {"type": "integer", "enum": list(range(1, len(self._recent) + 1))}
-        schema = _schema(current_subtask=TEXT, keyframe_positions=_list_of(position))
-        return self.single(self._parts(), schema)
+        fields = {"current_subtask": TEXT, "keyframe_positions": _list_of(position)}
+        return self.single(self._parts(), object_schema(fields))
 
     def take(self, text: str) -> str:
         """Return the subgoal; add the chosen frames, which are counted from 1."""
@@ -278,7 +279,7 @@ class StatelessPlanner(VLMPlanner[StatelessOptions]):
 
     def take(self, text: str) -> str:
         """Return the subgoal in the last line of the reply; the policy reports what comes of it."""
-        lines = list(filter(normalize_subgoal, text.splitlines()))  # none of signs alone
+        lines = [line for line in text.splitlines() if normalize_subgoal(line)]
         subgoal = parse_points(lines[-1] if lines else "")
         return FINISHED if self.finishes(subgoal) else subgoal
 
@@ -311,16 +312,6 @@ def _sheets(frames: Pixels, most: int, every: int) -> Iterator[Picture]:
 
 def _list_of(item: Mapping[str, Any]) -> dict[str, Any]:
     return {"type": "array", "items": item}
-
-
-def _schema(**fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the JSON schema of an object with these fields."""
-    return {
-        "type": "object",
-        "properties": fields,
-        "required": list(fields),
-        "additionalProperties": False,
-    }
 
 
 def merge_keyframes(steps: Iterable[int], near: int = MAX_GAP) -> tuple[int, ...]:

@@ -90,12 +90,7 @@ class GoalSchema:
         if reasoning is not None:
             properties["reasoning"] = {"type": "string", "description": reasoning}
         properties |= {field.name: field.schema() for field in self.fields}
-        return {
-            "type": "object",
-            "properties": properties,
-            "required": list(properties),
-            "additionalProperties": False,
-        }
+        return object_schema(properties)
 
     def read(self, text: str) -> Goal:
         """Return the goal that a reply names.
@@ -120,6 +115,16 @@ class GoalSchema:
                     f"its values are {', '.join(map(str, field.values))}."
                 )
         raise UnparsableReplyError("These values cannot be meant together.")
+
+
+def object_schema(fields: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the JSON schema of an object with these fields, each with its schema, and no other."""
+    return {
+        "type": "object",
+        "properties": dict(fields),
+        "required": list(fields),
+        "additionalProperties": False,
+    }
 
 
 @functools.cache
@@ -160,10 +165,10 @@ def _normalize(value: object, is_number: bool) -> object:
     """Return a value with its words in lower case and stripped; 3.0 and "3" become 3."""
     if isinstance(value, list):
         return [_normalize(item, is_number) for item in value]
+    if isinstance(value, str):
+        value = value.strip().lower()
     number = whole_number(value) if is_number else None
-    if number is not None:
-        return number
-    return value.strip().lower() if isinstance(value, str) else value
+    return value if number is None else number
 
 
 def _canonical(answer: Answer) -> str:

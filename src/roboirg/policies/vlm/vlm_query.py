@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
@@ -85,11 +84,11 @@ class VLMQuery:
         something else sent, as by another machine; ``answered_s`` the time that its answers took,
         and ``waited_s`` that in queues and while it was busy.
         """
-        found = {
-            name: round(count, 3) if name.endswith("_s") else count
-            for name, count in self._counts.items()
-        }
-        return {name: count for name, count in found.items() if count or name in ALWAYS}
+        usage = {}
+        for name, count in self._counts.items():
+            if count or name in ALWAYS:
+                usage[name] = round(count, 3) if name.endswith("_s") else count
+        return usage
 
     @contextlib.contextmanager
     def _timed(self, name: str) -> Iterator[None]:
@@ -101,15 +100,11 @@ class VLMQuery:
     def _request(self, query: ModelQuery) -> ModelReply:
         self._counts["calls"] += 1
         reply = self._find_or_send(query)
-        self._add("input_tokens", reply.input_tokens)
-        self._add("output_tokens", reply.output_tokens)
+        self._counts["input_tokens"] += reply.input_tokens
+        self._counts["output_tokens"] += reply.output_tokens
         if self.options.has_prices:
-            self._add("cost_usd", self.options.cost_usd(reply))
+            self._counts["cost_usd"] += self.options.cost_usd(reply)
         return reply
-
-    def _add(self, name: str, amount: float | None) -> None:
-        """Add to a count; what is unknown makes the sum unknown."""
-        self._counts[name] += math.nan if amount is None else amount
 
     def _find_or_send(self, query: ModelQuery) -> ModelReply:
         """Return the run's reply to a query; a new one is stored before anything sees it."""
@@ -129,12 +124,14 @@ class VLMQuery:
         return reply
 
     def _check_tokens(self, reply: ModelReply) -> None:
-        count = reply.impossible_count
-        if count is not None:
-            shown = clip_text(str(count), MAX_COUNT_LENGTH)
-            raise PolicyReplyError(
-                f"Model {self._service} reports {shown} tokens; a reply has 0 to {MOST_TOKENS:,}."
-            )
+        """Raise an error if a count of tokens cannot be true."""
+        for count in (reply.input_tokens, reply.output_tokens):
+            if count < 0 or count > MOST_TOKENS:
+                shown = clip_text(str(count), MAX_COUNT_LENGTH)
+                raise PolicyReplyError(
+                    f"Model {self._service} reports {shown} tokens; there can be 0 to "
+                    f"{MOST_TOKENS:,}."
+                )
 
     def _send(self, query: ModelQuery, store: ReplyStore | None) -> ModelReply:
         """Send a query, again while the service is busy or, a few times, cannot be reached."""

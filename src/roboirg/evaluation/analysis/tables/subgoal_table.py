@@ -39,11 +39,8 @@ _UNKNOWN_IF_ABSENT = ("input_tokens", "output_tokens", "cost_usd")
 
 def _usage(record: Record) -> tuple[tuple[str, float], ...]:
     """Return the usage of a record, with NaN for what is unknown of the models that it asked."""
-    usage = dict(record.usage)
-    if "calls" in usage:
-        for name in _UNKNOWN_IF_ABSENT:
-            usage.setdefault(name, math.nan)
-    return tuple(usage.items())
+    unknown = dict.fromkeys(_UNKNOWN_IF_ABSENT, math.nan) if "calls" in record.usage else {}
+    return tuple({**unknown, **record.usage}.items())
 
 
 _READ: Mapping[str, Callable[[Record], object]] = {

@@ -5,15 +5,14 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections.abc import Mapping
 from typing import Any
 from urllib.parse import quote
 
 from roboirg.policies.vlm.model_content import Part
-from roboirg.policies.vlm.models.http_model import HttpModel, given, reported_usage
+from roboirg.policies.vlm.models.http_model import HttpModel, given, reported_count
 from roboirg.policies.vlm.models.model import ModelQuery, ModelReply
 from roboirg.util.media import Picture, encode_png
-from roboirg.util.reply_reading import whole_number, with_thoughts
+from roboirg.util.reply_reading import with_thoughts
 
 
 class GoogleModel(HttpModel):
@@ -52,20 +51,15 @@ class GoogleModel(HttpModel):
     def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
         """Return the text of the first candidate and its thoughts, which count as output."""
         first = (reply.get("candidates") or [{}])[0]
-        answer = ""
-        thoughts = []
-        for part in first.get("content", {}).get("parts", []):
-            text = part.get("text", "")
-            if part.get("thought"):
-                thoughts.append(text)
-            else:
-                answer += text
-        usage = reported_usage(reply, "usageMetadata")
-        return ModelReply(
-            with_thoughts(answer, thoughts),
-            whole_number(usage.get("promptTokenCount")),
-            _output_tokens(usage),
-        )
+        parts = first.get("content", {}).get("parts", [])
+        answer = "".join(part.get("text", "") for part in parts if not part.get("thought"))
+        thoughts = [part for part in parts if part.get("thought")]
+        # The service leaves out what is 0.
+        usage = reply.get("usageMetadata")
+        output_tokens = reported_count(usage, "candidatesTokenCount", absent=0)
+        output_tokens += reported_count(usage, "thoughtsTokenCount", absent=0)
+        text = with_thoughts(answer, thoughts)
+        return ModelReply(text, reported_count(usage, "promptTokenCount"), output_tokens)
 
     def _part(self, part: Part) -> dict[str, Any]:
         if isinstance(part, str):
@@ -77,18 +71,6 @@ class GoogleModel(HttpModel):
             inlineData=_blob(part.file, "video/mp4"),
             videoMetadata=None if fps is None else {"fps": fps},
         )
-
-
-def _output_tokens(usage: Mapping[str, Any]) -> int | None:
-    """Return the tokens of answer and thoughts; None if they are unknown.
-
-    The service leaves out what is 0.
-    """
-    answer = whole_number(usage.get("candidatesTokenCount", 0))
-    thoughts = whole_number(usage.get("thoughtsTokenCount", 0))
-    if not usage or answer is None or thoughts is None:
-        return None
-    return answer + thoughts
 
 
 def _blob(content: bytes, kind: str) -> dict[str, str]:

@@ -22,6 +22,7 @@ from roboirg.core.extras import extra_needed
 from roboirg.core.waiting import waiting
 from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
 from roboirg.util.proxies import proxy_of
+from roboirg.util.reply_reading import whole_number
 
 with extra_needed("Models need httpx", "vlm"):
     import httpx
@@ -137,10 +138,16 @@ def given(**entries: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
     return {name: value for name, value in entries.items() if value is not None}
 
 
-def reported_usage(reply: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """Return the token counts of a reply in JSON; none if there is something else."""
-    usage = reply.get(name)
-    return usage if isinstance(usage, dict) else {}
+def reported_count(usage: object, name: str, absent: int | None = None) -> float:
+    """Return a count of tokens from what a service reports; NaN if it is unknown.
+
+    Args:
+        usage: the counts by name, or anything else.
+        name: of the count.
+        absent: the count if there is none of that name.
+    """
+    number = whole_number(usage.get(name, absent)) if isinstance(usage, dict) else None
+    return math.nan if number is None else number
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple, Protocol
@@ -22,7 +23,7 @@ KEY_VARIABLES: Mapping[Provider, str] = {"openai": "OPENAI_API_KEY", "google": "
 NO_KEY = "none"
 """Sent as the key to a server that needs none."""
 MOST_TOKENS = 100_000_000
-"""Of one query or reply: ten times the longest context of any model, which is ten million tokens."""
+"""Of one query or reply: ten times the longest context of a model, ten million tokens."""
 
 
 class ModelOptions(BaseModel):
@@ -120,17 +121,10 @@ class ModelOptions(BaseModel):
         """Whether the cost of replies is known."""
         return (self.input_price, self.output_price) != (None, None)
 
-    def cost_usd(self, reply: ModelReply) -> float | None:
-        """Return what a reply costs: 0 without prices, None if tokens with a price are unknown."""
-        cost = 0.0
+    def cost_usd(self, reply: ModelReply) -> float:
+        """Return what a reply costs: 0 without prices, NaN if tokens with a price are unknown."""
         paid = ((reply.input_tokens, self.input_price), (reply.output_tokens, self.output_price))
-        for tokens, price in paid:
-            if not price:
-                continue
-            if tokens is None:
-                return None
-            cost += tokens * price
-        return cost / 1_000_000
+        return sum(tokens * price for tokens, price in paid if price) / 1_000_000
 
 
 class ModelQuery(NamedTuple):
@@ -152,21 +146,13 @@ class ModelReply(NamedTuple):
 
     Attributes:
         text: what it said, possibly nothing; thoughts may be in it as `with_thoughts` marks them.
-        input_tokens: of the query; None if the service does not report it.
-        output_tokens: of the reply and its thoughts; None if the service does not report it.
+        input_tokens: of the query; NaN if it is unknown.
+        output_tokens: of the reply and its thoughts; NaN if it is unknown.
     """
 
     text: str
-    input_tokens: int | None = None
-    output_tokens: int | None = None
-
-    @property
-    def impossible_count(self) -> int | None:
-        """A number of tokens that no reply can have; None if there is none."""
-        for count in (self.input_tokens, self.output_tokens):
-            if count is not None and not 0 <= count <= MOST_TOKENS:
-                return count
-        return None
+    input_tokens: float = math.nan
+    output_tokens: float = math.nan
 
 
 class Model(Protocol):

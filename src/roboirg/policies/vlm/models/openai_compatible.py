@@ -8,15 +8,13 @@ from collections.abc import Iterator
 from typing import Any
 
 from roboirg.policies.vlm.model_content import ChatTurn, Part
-from roboirg.policies.vlm.models.http_model import HttpModel, given, reported_usage
+from roboirg.policies.vlm.models.http_model import HttpModel, given, reported_count
 from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
 from roboirg.util.media import Picture, encode_png, sample_evenly
-from roboirg.util.reply_reading import whole_number, with_thoughts
+from roboirg.util.reply_reading import with_thoughts
 
 _ANSWERS = frozenset({"text", "output_text"})
 """Types of parts that are answers; all others are thoughts, or nothing that can be read."""
-_THOUGHTS = ("reasoning_content", "reasoning")
-"""Fields of a message in which servers put thoughts."""
 
 
 class OpenAIModel(HttpModel):
@@ -42,22 +40,19 @@ class OpenAIModel(HttpModel):
     def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
         """Return the text of the first choice, which may come in parts, and its thoughts."""
         message = reply["choices"][0]["message"]
-        content = message.get("content") or ""
-        parts = [content] if isinstance(content, str) else content
-        thoughts = [message[name] for name in _THOUGHTS if message.get(name)]
-        answer = ""
-        for part in parts:
-            if isinstance(part, str):
-                answer += part
-            elif part["type"] in _ANSWERS:
-                answer += part["text"]
-            else:
-                thoughts.append(part)
-        usage = reported_usage(reply, "usage")
+        parts = message.get("content") or ""
+        if isinstance(parts, str):
+            parts = [{"type": "text", "text": parts}]
+        answer = "".join(part["text"] for part in parts if part["type"] in _ANSWERS)
+        thoughts = [part for part in parts if part["type"] not in _ANSWERS]
+        said_apart = message.get("reasoning_content") or message.get("reasoning")
+        if said_apart:
+            thoughts.append(said_apart)
+        usage = reply.get("usage")
         return ModelReply(
             with_thoughts(answer, thoughts),
-            whole_number(usage.get("prompt_tokens")),
-            whole_number(usage.get("completion_tokens")),
+            reported_count(usage, "prompt_tokens"),
+            reported_count(usage, "completion_tokens"),
         )
 
 

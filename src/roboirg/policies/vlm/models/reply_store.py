@@ -22,7 +22,7 @@ from typing import NamedTuple
 from roboirg.core.errors import BudgetError
 from roboirg.core.plain_text import counted
 from roboirg.core.waiting import waiting
-from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
+from roboirg.policies.vlm.models.model import MOST_TOKENS, ModelOptions, ModelQuery, ModelReply
 from roboirg.util.media import Clip, Picture
 
 REPLIES_FILE = "models.sqlite"
@@ -37,6 +37,14 @@ CREATE TABLE IF NOT EXISTS replies (
 CREATE TABLE IF NOT EXISTS services (name TEXT PRIMARY KEY, next_at REAL) WITHOUT ROWID;
 """
 
+# Older stores may hold counts and costs that cannot be, which are unknown.
+_REPLIES = """
+SELECT
+    sent, text,
+    CASE WHEN input_tokens BETWEEN 0 AND :most THEN input_tokens ELSE 'nan' END,
+    CASE WHEN output_tokens BETWEEN 0 AND :most THEN output_tokens ELSE 'nan' END
+FROM replies WHERE episode = :episode AND call = :call
+"""
 _SPENT = """
 SELECT total(cost_usd), count(*) - count(CASE WHEN cost_usd >= 0 THEN 1 END) FROM replies
 """
@@ -101,22 +109,14 @@ class ReplyStore:
         if self.settings.anew:
             return {}
         rows = self._database.execute(
-            "SELECT sent, text, input_tokens, output_tokens FROM replies "
-            "WHERE episode = ? AND call = ?",
-            (self.episode, self.calls),
+            _REPLIES, {"episode": self.episode, "call": self.calls, "most": MOST_TOKENS}
         )
-        replies = {}
-        for sent, *fields in rows:
-            reply = ModelReply(*fields)
-            if reply.impossible_count is not None:  # stored when such counts were accepted
-                reply = ModelReply(reply.text)
-            replies[sent] = reply
-        return replies
+        return {sent: ModelReply(text, *map(float, tokens)) for sent, text, *tokens in rows}
 
-    def keep(self, sent: str, reply: ModelReply, cost_usd: float | None) -> None:
+    def keep(self, sent: str, reply: ModelReply, cost_usd: float) -> None:
         """Store the reply to the next call; when this returns, it is on disk.
 
-        The cost is None if it is unknown.
+        SQLite stores NULL for NaN, which is unknown.
         """
         self._database.execute(
             "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?, ?, ?, ?)",
