@@ -79,8 +79,8 @@ def _notes(scores: Sequence[GroundingScore]) -> Iterator[str]:
     for score in scores:
         name = f"{score.name}, {QUESTIONS[score.kind]}"
         if score.unparsed:
-            replies = counted(score.unparsed, "reply", "replies")
-            yield f"{name}: {replies} without an answer, counted as wrong."
+            replies = counted(score.unparsed, "unreadable reply", "unreadable replies")
+            yield f"{name}: {replies}, counted as wrong."
         if score.missing:
             items = counted(score.missing, "item")
             yield f"{name}: {items} not answered and left out of the rates."

@@ -395,7 +395,7 @@ class Record(Summary, kw_only=True, forbid_unknown_fields=True):  # type: ignore
             them, as with a real robot and in older records.
         subgoals: what a planner named, in order.
         usage: what models queried by the policy cost: ``calls``, ``input_tokens``,
-            ``output_tokens``, ``cost_usd``.
+            ``output_tokens``, ``cost_usd``; those that are unknown are missing.
         timings: wall-clock seconds by phase: ``policy_load``, ``policy_act``, ``env_step``, ….
         video_error: why the requested video could not be written, or None.
         details: traceback of an error, or None.

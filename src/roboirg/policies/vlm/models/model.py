@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple, Protocol
@@ -23,6 +24,8 @@ KEY_VARIABLES: Mapping[Provider, str] = {"openai": "OPENAI_API_KEY", "google": "
 """Environment variables with the keys of the providers' own services, by default."""
 NO_KEY = "none"
 """Sent as the key to a server that needs none."""
+MOST_TOKENS = 100_000_000
+"""Of one query or reply: ten times the longest context of a model, ten million tokens."""
 
 
 class ModelOptions(BaseModel):
@@ -126,9 +129,9 @@ class ModelOptions(BaseModel):
         return (self.input_price, self.output_price) != (None, None)
 
     def cost_usd(self, reply: ModelReply) -> float:
-        """Return what a reply costs; 0 without prices."""
+        """Return what a reply costs: 0 without prices, NaN if tokens with a price are unknown."""
         paid = ((reply.input_tokens, self.input_price), (reply.output_tokens, self.output_price))
-        return sum(tokens * (price or 0.0) for tokens, price in paid) / 1_000_000
+        return sum(tokens * price for tokens, price in paid if price) / 1_000_000
 
 
 class ModelQuery(NamedTuple):
@@ -146,11 +149,17 @@ class ModelQuery(NamedTuple):
 
 
 class ModelReply(NamedTuple):
-    """A model's reply, possibly empty, and its tokens."""
+    """A model's reply.
+
+    Attributes:
+        text: what it said, possibly nothing; thoughts may be in it as `with_thoughts` marks them.
+        input_tokens: of the query; NaN if it is unknown.
+        output_tokens: of the reply and its thoughts; NaN if it is unknown.
+    """
 
     text: str
-    input_tokens: int = 0
-    output_tokens: int = 0
+    input_tokens: float = math.nan
+    output_tokens: float = math.nan
 
 
 class Model(Protocol):
