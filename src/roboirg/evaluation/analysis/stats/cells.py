@@ -47,8 +47,8 @@ class Counts(NamedTuple):
     missing: int = 0
 
     @property
-    def rate(self) -> Fraction | None:
-        """Successes by trials; None without a verdict."""
+    def pooled_rate(self) -> Fraction | None:
+        """Successes by trials, also of several tasks; None without a verdict."""
         return Fraction(self.successes, self.trials) if self.trials else None
 
     @property
@@ -89,7 +89,7 @@ class Cell:
     @property
     def rate(self) -> Fraction | None:
         """Success rate, the mean over policy seeds; None without a verdict."""
-        return self.counts.rate
+        return self.counts.pooled_rate
 
     def by_episode(self) -> dict[int, dict[int, bool]]:
         """Return the verdicts of each episode by policy seed."""

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from decimal import ROUND_HALF_UP, Decimal
 from fractions import Fraction
 
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.intervals import TOO_FEW, Interval
 from roboirg.evaluation.analysis.stats.paired_tests import Gap
 
 NOT_APPLICABLE = "–"
@@ -48,9 +48,9 @@ def points(gap: float, decimals: int = 0) -> str:
 
 
 def interval_note(interval: Interval | None) -> str:
-    """Return the ends of a gap's interval in brackets, after a blank; empty without one."""
+    """Return the ends of a gap's interval in brackets, after a blank, or why it has none."""
     if interval is None:
-        return ""
+        return f" ({TOO_FEW})"
     low, high = (points(end, 1) for end in interval)
     return f" (95 % interval {low} to {high})"
 
