@@ -24,6 +24,7 @@ from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import NOTHING, ByTask, Cell, Cells
 from roboirg.evaluation.analysis.stats.measure import measure_groups
+from roboirg.evaluation.analysis.stats.rates import missing_interval_notes
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.table_kinds import PAPER_TABLES, row_order, stages_text
 from roboirg.evaluation.analysis.tables.table_notes import where_played
@@ -72,6 +73,7 @@ def draw_next_to_reference(which: RateTable, content: RunData, published: bool) 
         for one, rates in own.items()
     ]
     notes = [SIZE_NOTE, where_played([one.conditions for one in own])] if own else []
+    notes += missing_interval_notes([rate.interval for row in rows for rate in row.rates.values()])
     if paper:
         episodes, seeds = TRIALS[which]
         rows += [RateRow(f"published, n = {episodes} × {seeds}", {}), *paper]

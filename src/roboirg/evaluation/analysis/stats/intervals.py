@@ -24,7 +24,7 @@ SEED = 20_240_607
 DRAWS = 4000
 """Bootstrap resamples; the ends of an interval then vary by about 3 % of its length."""
 TOO_FEW = "too few episodes for an interval"
-"""The reason why a number has no interval: fewer than two episodes for each task."""
+"""The reason why a number has none: not more episodes than tasks."""
 _ROUNDING = 1e-9
 """Ends of an interval that are closer are equal."""
 

@@ -7,7 +7,7 @@ means of the unrounded rates differ in the last digit in six of them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from decimal import ROUND_HALF_UP, Decimal
 from fractions import Fraction
 
@@ -53,6 +53,15 @@ def interval_note(interval: Interval | None) -> str:
         return f" ({TOO_FEW})"
     low, high = (points(end, 1) for end in interval)
     return f" (95 % interval {low} to {high})"
+
+
+def missing_interval_notes(intervals: Collection[Interval | None]) -> list[str]:
+    """Return a sentence on the intervals that are missing in a table; nothing if none is."""
+    if None not in intervals:
+        return []
+    return [
+        "Where an interval is missing, there are too few episodes: it takes more episodes than tasks."
+    ]
 
 
 def p_text(p_value: float) -> str:

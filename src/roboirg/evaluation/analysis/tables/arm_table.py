@@ -25,6 +25,7 @@ from roboirg.evaluation.analysis.stats.rates import (
     NOT_APPLICABLE,
     gap_words,
     interval_note,
+    missing_interval_notes,
     p_text,
     points,
 )
@@ -34,7 +35,8 @@ from roboirg.evaluation.analysis.tables.table import Row, Table, named_columns
 _NOTE = (
     "Each figure compares two rates on the same scenes, as means over tasks, in percent with 95 "
     f"% intervals. {MEANING} Chance is the success of pursuing a random goal of the scene without "
-    "words. Differences are in points; p-values are corrected over all rows of the policy. "
+    "words. Differences are in points; p-values are after Holm's correction over all rows of the "
+    "policy. "
     "Scenes without an arm are left out of its figures."
 )
 
@@ -66,7 +68,7 @@ def make_arm_table(data: RunData) -> Table:
             )
             for one in found
         ),
-        notes=(_NOTE,),
+        notes=(_NOTE, *missing_interval_notes([one.gap.interval for one in found if one.gap])),
     )
 
 
@@ -86,7 +88,7 @@ def language_use_sentences(first: Frame, second: Frame, names: tuple[str, str]) 
             yield (
                 f"Language use, {options_label(one.key[0])}: {names[0]} less {names[1]} "
                 f"{points(gap.value, 1)} points{interval_note(gap.interval)}, "
-                f"{p_text(one.p_holm)}, {gap.episodes} scenes."
+                f"{p_text(one.p_holm)} after Holm's correction, {gap.episodes} scenes."
             )
 
 

@@ -42,6 +42,7 @@ from roboirg.evaluation.analysis.stats.measure import (
 from roboirg.evaluation.analysis.stats.rates import (
     NOT_APPLICABLE,
     gap_words,
+    missing_interval_notes,
     percent,
     whole_percent,
 )
@@ -71,7 +72,7 @@ CELL = ("run", "options", "scope")
 _FORMS_NOTE = (
     "The same episodes in the implicit form and in the resolved one, which names the goal: trials "
     "solved in both, in one alone, in neither. The difference, the mean over tasks, and its "
-    "interval are in points; p-values are corrected over all rows of the policy."
+    "interval are in points; p-values are after Holm's correction over all rows of the policy."
 )
 _KINDS_NOTE = " ".join(
     f"{kind.capitalize()}: {means}." for kind, means in failures.FAILURE_KINDS.items()
@@ -90,8 +91,8 @@ _SHARES_NOTE = (
 )
 _BREAKDOWN_NOTE = (
     "Success in percent, the gap to explicit on the same episodes in points, its interval, and "
-    "its p-value corrected over all rows of the policy. Rates are means over the tasks that "
-    "have such instructions, so two rows may differ in their tasks, too."
+    "its p-value after Holm's correction over all rows of the policy. Rates are means over the "
+    "tasks that have such instructions, so two rows may differ in their tasks, too."
 )
 _HEARD_NOTE = (
     "Cut: the policy's model reads fewer tokens than the prompt needs, so the end of the prompt, "
@@ -125,9 +126,10 @@ def make_forms_table(data: RunData) -> Table:
             setting_sort_key(one.key.options.setting),
         )
     )  # fmt: skip
-    rows = []
+    rows, intervals = [], []
     for one in with_holm(found, lambda key: key.policy_run):
         if (gap := one.gap) is not None:
+            intervals.append(gap.interval)
             of = gap.overlap
             counts = (of.trials, of.both, of.only_second, of.only_first, of.neither)
             words = (*map(str, counts), *gap_words(gap, one.p_holm))
@@ -146,7 +148,7 @@ def make_forms_table(data: RunData) -> Table:
             "95 % interval", "p",
         ),
         rows=tuple(rows),
-        notes=(_FORMS_NOTE,),
+        notes=(_FORMS_NOTE, *missing_interval_notes(intervals)),
     )  # fmt: skip
 
 
@@ -180,6 +182,8 @@ def make_failure_table(data: RunData, *, means: bool = False) -> Table:
     }
     if all(success.rate == 1 for success, *_ in found.values()):
         raise InvalidValueError("No episode of the runs failed.")
+    gaps = [success.gap for success, *_ in found.values()]
+    notes = missing_interval_notes([gap.interval for gap in gaps if gap])
     return Table(
         key="failures",
         title="How episodes ended, and what the gap to explicit consists of",
@@ -192,7 +196,7 @@ def make_failure_table(data: RunData, *, means: bool = False) -> Table:
         rows=tuple(
             Row(group, scope, _ends(*found[key])) for key, group, scope in _in_order(found, data)
         ),
-        notes=(_RATES_NOTE, f"{_KINDS_NOTE} {_SHARES_NOTE}"),
+        notes=(_RATES_NOTE, f"{_KINDS_NOTE} {_SHARES_NOTE}", *notes),
     )  # fmt: skip
 
 
@@ -315,6 +319,7 @@ def make_breakdown_table(
     notes = [f"{_BREAKDOWN_NOTE} {breakdown.note}"]
     if any(one.gap is None and one.key.options != reference_of(one.key.options) for one in found):
         notes.append(f"{NOT_APPLICABLE} without explicit on the same episodes.")
+    notes += missing_interval_notes([one.gap.interval for one in found if one.gap])
     if left_out:
         notes.append(incomplete_note(left_out))
     return Table(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from roboirg.core.errors import check_names
@@ -18,19 +18,28 @@ class Format(NamedTuple):
 
     Attributes:
         suffix: of files in the format.
-        draw: returns a table as text that ends in a newline.
+        draw: returns a table as text that ends in a newline; of a format for programs, several
+            tables as one document.
+        is_for_programs: whether its texts have no notes.
     """
 
     suffix: str
-    draw: Callable[[Table], str]
+    draw: Callable[..., str]
+    is_for_programs: bool = False
+
+    def draw_all(self, tables: Sequence[Table]) -> str:
+        """Return several tables as one text."""
+        if self.is_for_programs:
+            return self.draw(*tables)
+        return "\n".join(map(self.draw, tables))
 
 
 FORMATS: Mapping[str, Format] = {
     "terminal": Format(".txt", plain),
     "markdown": Format(".md", markdown),
     "latex": Format(".tex", latex),
-    "csv": Format(".csv", csv_text),
-    "json": Format(".json", json_text),
+    "csv": Format(".csv", csv_text, is_for_programs=True),
+    "json": Format(".json", json_text, is_for_programs=True),
 }
 
 

@@ -44,22 +44,30 @@ HEAD = (
 _MARK_NAMES = {ERROR_MARK: "errors", MISSING_MARK: "missing", PARTIAL_MARK: "partial"}
 
 
-def csv_text(table: Table) -> str:
-    """Return every entry of a table with its counts and the interval of its rate."""
+_ASCII = str.maketrans({"−": "-", "±": None})
+"""For programs, which read −0.5 and ±0.0 as no numbers."""
+
+
+def csv_text(*tables: Table) -> str:
+    """Return every entry of some tables with its counts and the interval of its rate."""
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(HEAD)
-    for row in table.rows:
-        for column, entry in zip(table.columns, row.entries, strict=True):
-            writer.writerow(_line(table, row, column, entry))
-    return file.getvalue()
+    for table in tables:
+        for row in table.rows:
+            for column, entry in zip(table.columns, row.entries, strict=True):
+                writer.writerow(_line(table, row, column, entry))
+    return file.getvalue().translate(_ASCII)
 
 
-def json_text(table: Table) -> str:
-    """Return a list with an object for each row: what is printed, by heading."""
-    rows = [(*table.labels(row), *(entry.text for entry in row.entries)) for row in table.rows]
-    found = [dict(zip(table.headings, row, strict=True)) for row in rows]
-    return json.dumps(found, ensure_ascii=False, indent=1) + "\n"
+def json_text(*tables: Table) -> str:
+    """Return a list with an object for each row: its table, and what is printed, by heading."""
+    found = []
+    for table in tables:
+        for row in table.rows:
+            texts = (*table.labels(row), *(entry.text for entry in row.entries))
+            found.append({"table": table.key, **dict(zip(table.headings, texts, strict=True))})
+    return json.dumps(found, ensure_ascii=False, indent=1).translate(_ASCII) + "\n"
 
 
 def _line(table: Table, row: Row, column: Column, entry: Entry) -> list[object]:
