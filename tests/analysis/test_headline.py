@@ -96,6 +96,15 @@ def test_the_mean_over_settings_of_the_means_over_their_tasks(result) -> None:
     assert headline_of(lost).gap == 0.25  # though nothing was won without implicit reference
 
 
+def test_few_episodes_of_a_setting_that_are_all_lost_have_no_interval(result) -> None:
+    """Some resamples have none of the five, all others have the same gap: its width would be 0."""
+    tried = {"explicit": [1] * 20, "reasoning": [0] * 20, "spatial": [0] * 5}
+    lost = [
+        one for each in tried.items() for one in played(result, "PickXtimes", each[0], *each[1])
+    ]
+    assert (headline_of(lost).gap, headline_of(lost).interval) == (-1, None)
+
+
 def test_settings_share_their_episodes(result) -> None:
     """Two settings with equal verdicts say no more than one: the interval is as wide."""
     both, alone = (headline_of(enough(result), one) for one in (SETTINGS, SETTINGS[1:]))

@@ -104,7 +104,9 @@ def test_a_rate_is_over_both_forms_only_if_the_call_names_them(played: pd.DataFr
     """Implicit ones are won, resolved ones lost: 50 % is no success of either."""
     resolved = played.assign(form="resolved", outcome="failure", instruction_options="resolved")
     frame = pd.concat([played, resolved])
-    with pytest.raises(InvalidValueError, match="have the form implicit and resolved: add 'form'"):
+    with pytest.raises(
+        InvalidValueError, match=r"values of form \(implicit, resolved\): add 'form'"
+    ):
         roboirg.measure(frame, ["policy", "setting"])
     by_form = roboirg.measure(frame, ["policy", "setting", "form"])
     assert {(one.key[-1], one.rate) for one in by_form} == {("implicit", 1), ("resolved", 0)}
@@ -119,7 +121,10 @@ def test_a_rate_is_over_both_forms_only_if_the_call_names_them(played: pd.DataFr
         ({"by": ["policy"], "family": ["task"]}, "The column 'task' is not in by: policy."),
         ({"by": ["policy"], "against": {"setting": "direct"}}, "'setting' is not in by"),
         ({"by": ["setting"], "against": {"setting": "drect"}}, "no row with the setting 'drect'"),
-        ({"by": ["setting"]}, "have the policy forgetful and listener: add 'policy' to by"),
+        (
+            {"by": ["setting"]},
+            r"over several values of policy \(forgetful, listener\): add 'policy' to by",
+        ),
         ({"by": ["policy", "setting"]}, "Several rows of a group are about"),
     ],
 )

@@ -197,7 +197,8 @@ def tables(
     elif format == "terminal":
         print_tables(found, Console())
     else:
-        typer.echo(output.draw_all(found), nl=False)
+        texts = [output.draw(*found)] if output.is_for_programs else map(output.draw, found)
+        typer.echo("\n".join(texts), nl=False)
 
 
 def compare(

@@ -9,12 +9,8 @@ from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.results.frame import as_column
 from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS
-from roboirg.evaluation.analysis.stats.intervals import Interval
-from roboirg.evaluation.analysis.stats.rates import (
-    NOT_APPLICABLE,
-    gap_words,
-    missing_interval_notes,
-)
+from roboirg.evaluation.analysis.stats.intervals import TOO_FEW, Interval
+from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, gap_words
 from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
 from roboirg.evaluation.analysis.tables.table import Row, Table, named_columns
 from roboirg.evaluation.grounding_items.grounding_item import GroundingItem
@@ -29,9 +25,6 @@ QUESTIONS = {"slots": "slots", "choice": "choices", "points": "points"}
 def score_table(scores: Iterable[GroundingScore]) -> Table:
     """Return a table with a row for each model, kind of question and set of options."""
     scores = tuple(scores)
-    found = [(score, score_rows(score)) for score in scores]
-    judged = [row.summary for _, rows in found for row in rows if row.summary.tasks]
-    missing = missing_interval_notes([summary.interval for summary in judged])
     return Table(
         key="grounding",
         title="Grounding",
@@ -43,10 +36,10 @@ def score_table(scores: Iterable[GroundingScore]) -> Table:
                 options_label(row.summary.key.options),
                 _words(row),
             )
-            for score, rows in found
-            for row in rows
+            for score in scores
+            for row in score_rows(score)
         ),
-        notes=(*_notes(scores), *missing),
+        notes=tuple(_notes(scores)),
     )
 
 
@@ -98,7 +91,7 @@ def _percent(rate: float | None) -> str:
 
 
 def _interval(interval: Interval | None) -> str:
-    return NOT_APPLICABLE if interval is None else " to ".join(map(_percent, interval))
+    return TOO_FEW if interval is None else " to ".join(map(_percent, interval))
 
 
 _LABELS: Mapping[str, Callable[[GroundingItem], Sequence[str]]] = {

@@ -106,12 +106,15 @@ class Results:
         Runs of a policy under several conditions or in several versions have labels of their own.
         """
         data = self._data.told
-        rates: dict[tuple[str, str], float] = {}
-        for key, one in data.summaries.items():
-            if key.scope == ALL_TASKS and one.rate is not None:
-                label = data.frame.names[key.policy_run].removesuffix(key.policy_run.mark)
-                rates[label, options_label(key.options)] = float(one.rate)
-        return rates
+        names = data.frame.names
+        return {
+            (
+                names[key.policy_run].removesuffix(key.policy_run.mark),
+                options_label(key.options),
+            ): float(one.rate)
+            for key, one in data.summaries.items()
+            if key.scope == ALL_TASKS and one.rate is not None
+        }
 
     def table(
         self,

@@ -24,7 +24,6 @@ from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import NOTHING, ByTask, Cell, Cells
 from roboirg.evaluation.analysis.stats.measure import measure_groups
-from roboirg.evaluation.analysis.stats.rates import missing_interval_notes
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.table_kinds import PAPER_TABLES, row_order, stages_text
 from roboirg.evaluation.analysis.tables.table_notes import where_played
@@ -33,7 +32,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
-SIZE_NOTE = "n: episodes per task and setting, × policy seeds if there are several."
+SIZE_NOTE = (
+    "n: episodes per task and setting, × policy seeds if there are several; where no band is "
+    "drawn, too few episodes."
+)
 PUBLISHED_NOTE = "published: the same tasks, the paper's instructions and simulator."
 WORDS: Mapping[RateTable, tuple[str, str, str]] = {
     "main": ("success", "success with explicit instructions", "with implicit ones"),
@@ -73,7 +75,6 @@ def draw_next_to_reference(which: RateTable, content: RunData, published: bool) 
         for one, rates in own.items()
     ]
     notes = [SIZE_NOTE, where_played([one.conditions for one in own])] if own else []
-    notes += missing_interval_notes([rate.interval for row in rows for rate in row.rates.values()])
     if paper:
         episodes, seeds = TRIALS[which]
         rows += [RateRow(f"published, n = {episodes} × {seeds}", {}), *paper]

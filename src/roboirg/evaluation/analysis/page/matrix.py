@@ -14,9 +14,9 @@ from roboirg.evaluation.analysis.results.frame import suite, task_order
 from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
-from roboirg.evaluation.analysis.stats.intervals import TOO_FEW, Interval
+from roboirg.evaluation.analysis.stats.intervals import TOO_FEW
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
-from roboirg.evaluation.analysis.stats.rates import p_text, points, whole_percent
+from roboirg.evaluation.analysis.stats.rates import interval_note, p_text, points, whole_percent
 
 
 def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
@@ -132,7 +132,7 @@ def _gap_notes(one: Measured[ScopeKey]) -> list[str]:
             tested = "not tested" if one.p_holm is None else f"{p_text(one.p_holm)} (Holm)"
             lines.append(
                 f"{gap} on the same {counted(one.gap.episodes, 'episode')}"
-                f"{_ends(one.gap.interval)}, {tested}"
+                f"{interval_note(one.gap.interval)}, {tested}"
             )
         elif one.gap.value:
             lines.append(f"{gap}, which has no success")
@@ -141,12 +141,6 @@ def _gap_notes(one: Measured[ScopeKey]) -> list[str]:
     if one.second_gap is not None:
         lines.append(
             f"{points(one.second_gap.value)} points to the resolved form"
-            f"{_ends(one.second_gap.interval)}"
+            f"{interval_note(one.second_gap.interval)}"
         )
     return lines
-
-
-def _ends(interval: Interval | None) -> str:
-    if interval is None:
-        return f" ({TOO_FEW})"
-    return f" ({points(interval.low)} to {points(interval.high)})"

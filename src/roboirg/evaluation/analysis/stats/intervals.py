@@ -23,8 +23,8 @@ SEED = 20_240_607
 """Of all bootstraps that are shown; the same records give the same numbers."""
 DRAWS = 4000
 """Bootstrap resamples; the ends of an interval then vary by about 3 % of its length."""
-TOO_FEW = "too few episodes for an interval"
-"""The reason why a number has none: not more episodes than tasks."""
+TOO_FEW = "too few episodes"
+"""Printed in place of an interval: it takes more episodes than tasks."""
 _ROUNDING = 1e-9
 """Ends of an interval that are closer are equal."""
 

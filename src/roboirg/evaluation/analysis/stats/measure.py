@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -22,7 +22,6 @@ from roboirg.evaluation.analysis.stats.cells import (
     Cells,
     Columns,
     Counts,
-    Key,
     cell_interval,
     clustered_interval,
     gather,
@@ -116,10 +115,10 @@ def measure(
     """
     changed = against or {}
     _check(frame, by, changed, family, pool)
-    apart = [name for name in KEPT_APART if name in frame and name not in by]
-    columns = dict.fromkeys((*by, *TRIAL_OF, *apart, *pool))
-    rows = {name: [_known(value) for value in frame[name]] for name in columns}
-    _check_apart(rows, by, [name for name in apart if name not in pool])
+    apart = [name for name in KEPT_APART if name in frame and name not in (*by, *pool)]
+    names = (*by, *apart, *pool, *TRIAL_OF)
+    rows = {name: [_known(value) for value in frame[name]] for name in names}
+    _check_apart(rows, by, apart)
     # What is pooled distinguishes trials of an episode, as the policy seed does.
     rows["policy_seed"] = list(zip(*(rows[name] for name in ("policy_seed", *pool)), strict=True))
     groups = gather(rows, by)
@@ -145,20 +144,17 @@ def _known(value: object) -> object:
 
 
 def _check_apart(
-    rows: Mapping[str, Sequence[object]], by: Sequence[str], apart: Sequence[str]
+    rows: Mapping[str, Sequence[object]], by: Sequence[str], apart: Iterable[str]
 ) -> None:
     """Check that in some columns all rows of a group have the same value."""
-    firsts: dict[Key, int] = {}
-    for row in range(len(rows["task"])):
-        key = tuple(rows[name][row] for name in by)
-        first = firsts.setdefault(key, row)
-        mixed = [name for name in apart if rows[name][row] != rows[name][first]]
-        if mixed:
-            name, group = mixed[0], ", ".join(map(str, key))
+    for name in apart:
+        found = set(zip(*(rows[column] for column in (*by, name)), strict=True))
+        groups = {values[:-1] for values in found}
+        if len(found) > len(groups):
+            known = ", ".join(sorted(map(str, set(rows[name]))))
             raise InvalidValueError(
-                f"Rows of one group ({group}) have the {name} {rows[name][first]} and "
-                f"{rows[name][row]}: add {name!r} to by, choose the rows of one, or take the rate "
-                f"over all with pool={mixed}."
+                f"A rate would be over several values of {name} ({known}): add {name!r} to by, "
+                f"choose the rows of one value, or name {name!r} in pool."
             )
 
 

@@ -7,7 +7,7 @@ means of the unrounded rates differ in the last digit in six of them.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from decimal import ROUND_HALF_UP, Decimal
 from fractions import Fraction
 
@@ -55,15 +55,6 @@ def interval_note(interval: Interval | None) -> str:
     return f" (95 % interval {low} to {high})"
 
 
-def missing_interval_notes(intervals: Collection[Interval | None]) -> list[str]:
-    """Return a sentence on the intervals that are missing in a table; nothing if none is."""
-    if None not in intervals:
-        return []
-    return [
-        "Where an interval is missing, there are too few episodes: it takes more episodes than tasks."
-    ]
-
-
 def p_text(p_value: float) -> str:
     """Return a p-value with its sign: ``p = 0.012``, ``p < 0.001``."""
     return f"p < {_SMALLEST_P}" if p_value < _SMALLEST_P else f"p = {p_value:.3f}"
@@ -71,14 +62,14 @@ def p_text(p_value: float) -> str:
 
 def gap_words(gap: Gap | None, p_value: float | None) -> tuple[str, str, str]:
     """Return a gap in points, its interval, and its corrected p-value; dashes without one."""
-    ends = None if gap is None else gap.interval
-    return (
-        NOT_APPLICABLE if gap is None else points(gap.value, 1),
-        NOT_APPLICABLE if ends is None else " to ".join(points(end, 1) for end in ends),
-        NOT_APPLICABLE
-        if p_value is None
-        else p_text(p_value).removeprefix("p ").removeprefix("= "),
-    )
+    if gap is None:
+        return NOT_APPLICABLE, NOT_APPLICABLE, NOT_APPLICABLE
+    ends, p_words = TOO_FEW, NOT_APPLICABLE
+    if gap.interval is not None:
+        ends = " to ".join(points(end, 1) for end in gap.interval)
+    if p_value is not None:
+        p_words = p_text(p_value).removeprefix("p ").removeprefix("= ")
+    return points(gap.value, 1), ends, p_words
 
 
 def _rounded(value: Fraction) -> Decimal:

@@ -19,13 +19,12 @@ from roboirg.evaluation.analysis.stats.arm_figures import (
 )
 from roboirg.evaluation.analysis.stats.cells import ByTask
 from roboirg.evaluation.analysis.stats.chance import silent_chance
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.intervals import TOO_FEW, Interval
 from roboirg.evaluation.analysis.stats.measure import mean_rate, measure_groups
 from roboirg.evaluation.analysis.stats.rates import (
     NOT_APPLICABLE,
     gap_words,
     interval_note,
-    missing_interval_notes,
     p_text,
     points,
 )
@@ -68,7 +67,7 @@ def make_arm_table(data: RunData) -> Table:
             )
             for one in found
         ),
-        notes=(_NOTE, *missing_interval_notes([one.gap.interval for one in found if one.gap])),
+        notes=(_NOTE,),
     )
 
 
@@ -108,5 +107,7 @@ def _words(one: ArmFigure) -> Sequence[str]:
 
 
 def _rate_text(cells: ByTask, interval: Interval | None) -> str:
-    ends = "" if interval is None else f" ({100 * interval.low:.1f} to {100 * interval.high:.1f})"
-    return f"{100 * float(mean_rate(cells) or 0):.1f}{ends}"
+    ends = TOO_FEW
+    if interval is not None:
+        ends = f"{100 * interval.low:.1f} to {100 * interval.high:.1f}"
+    return f"{100 * float(mean_rate(cells) or 0):.1f} ({ends})"

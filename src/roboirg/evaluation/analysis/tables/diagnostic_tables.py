@@ -42,7 +42,6 @@ from roboirg.evaluation.analysis.stats.measure import (
 from roboirg.evaluation.analysis.stats.rates import (
     NOT_APPLICABLE,
     gap_words,
-    missing_interval_notes,
     percent,
     whole_percent,
 )
@@ -126,10 +125,9 @@ def make_forms_table(data: RunData) -> Table:
             setting_sort_key(one.key.options.setting),
         )
     )  # fmt: skip
-    rows, intervals = [], []
+    rows = []
     for one in with_holm(found, lambda key: key.policy_run):
         if (gap := one.gap) is not None:
-            intervals.append(gap.interval)
             of = gap.overlap
             counts = (of.trials, of.both, of.only_second, of.only_first, of.neither)
             words = (*map(str, counts), *gap_words(gap, one.p_holm))
@@ -148,7 +146,7 @@ def make_forms_table(data: RunData) -> Table:
             "95 % interval", "p",
         ),
         rows=tuple(rows),
-        notes=(_FORMS_NOTE, *missing_interval_notes(intervals)),
+        notes=(_FORMS_NOTE,),
     )  # fmt: skip
 
 
@@ -182,8 +180,6 @@ def make_failure_table(data: RunData, *, means: bool = False) -> Table:
     }
     if all(success.rate == 1 for success, *_ in found.values()):
         raise InvalidValueError("No episode of the runs failed.")
-    gaps = [success.gap for success, *_ in found.values()]
-    notes = missing_interval_notes([gap.interval for gap in gaps if gap])
     return Table(
         key="failures",
         title="How episodes ended, and what the gap to explicit consists of",
@@ -196,7 +192,7 @@ def make_failure_table(data: RunData, *, means: bool = False) -> Table:
         rows=tuple(
             Row(group, scope, _ends(*found[key])) for key, group, scope in _in_order(found, data)
         ),
-        notes=(_RATES_NOTE, f"{_KINDS_NOTE} {_SHARES_NOTE}", *notes),
+        notes=(_RATES_NOTE, f"{_KINDS_NOTE} {_SHARES_NOTE}"),
     )  # fmt: skip
 
 
@@ -319,7 +315,6 @@ def make_breakdown_table(
     notes = [f"{_BREAKDOWN_NOTE} {breakdown.note}"]
     if any(one.gap is None and one.key.options != reference_of(one.key.options) for one in found):
         notes.append(f"{NOT_APPLICABLE} without explicit on the same episodes.")
-    notes += missing_interval_notes([one.gap.interval for one in found if one.gap])
     if left_out:
         notes.append(incomplete_note(left_out))
     return Table(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from roboirg.core.errors import check_names
@@ -10,7 +10,6 @@ from roboirg.evaluation.analysis.tables.rendering.csv_lines import csv_text, jso
 from roboirg.evaluation.analysis.tables.rendering.latex import latex
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.analysis.tables.rendering.terminal import plain
-from roboirg.evaluation.analysis.tables.table import Table
 
 
 class Format(NamedTuple):
@@ -26,12 +25,6 @@ class Format(NamedTuple):
     suffix: str
     draw: Callable[..., str]
     is_for_programs: bool = False
-
-    def draw_all(self, tables: Sequence[Table]) -> str:
-        """Return several tables as one text."""
-        if self.is_for_programs:
-            return self.draw(*tables)
-        return "\n".join(map(self.draw, tables))
 
 
 FORMATS: Mapping[str, Format] = {
