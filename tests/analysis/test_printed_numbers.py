@@ -141,6 +141,25 @@ def test_no_rate_is_over_two_forms_arms_policies_words_or_worlds(
         assert {one.rate for one in roboirg.measure(frame, by)} <= {0, 1}
 
 
+def test_all_tasks_are_one_mean_in_the_terminal_on_the_page_and_in_python() -> None:
+    """Nine of ten are won in one task and one of two in the other: 70 %, not ten of twelve."""
+    results = [make_result("success" if episode else "failure", episode) for episode in range(10)]
+    results += [
+        make_result("success" if episode else "failure", episode, task="BinFill", policy_seed=1)
+        for episode in range(2)
+    ]
+    frame = make_frame([("", results)])
+    data = RunData(frame)
+    (table,) = make_run_tables(frame)
+    assert table.rows[-1].name == ALL_TASKS
+    assert [*numbers(table)][-1] == 70
+    (whole,) = (one for key, one in data.summaries.items() if key.scope == ALL_TASKS)
+    assert cell_notes(whole, "")[1].startswith("70 % success, mean of 2 tasks")
+    holder = Results(Path())
+    holder.__dict__["_data"] = data
+    assert holder.rates() == {("listener", "explicit"): 0.7}
+
+
 def intervals(one: Measured) -> Iterator[Interval | None]:
     yield from (one.interval, one.other_interval)
     for gap in (one.gap, one.second_gap):
