@@ -102,7 +102,11 @@ def _by_setting(floors: Floors) -> str:
         cells = (f"{_percent(one, name)} ({_percent(test, name)})" for name in stored.NAMES)
         excess = excess_text(one.excess, len(keys))
         lines.append(f"| `{key.setting}` | {one.count:,} | {' | '.join(cells)} | {excess} |")
-    return "\n".join(lines)
+    note = (
+        "Over chance: points above the larger of chance and majority, with 95 % intervals, "
+        f"Bonferroni-adjusted for {counted(len(keys), 'row')}."
+    )
+    return "\n".join([*lines, "", note])
 
 
 def _by_task(floors: Floors) -> str:
@@ -144,7 +148,7 @@ def _claims(floors: Floors) -> str:
     exceed = f"{len(above) or 'none'} {'exceeds' if len(above) < 2 else 'exceed'}"  # noqa: PLR2004
     return (
         f"Words alone are at most {100 * MARGIN:.0f} points above chance in "
-        f"{names or 'no setting'}, over all tasks. After correction for the "
+        f"{names or 'no setting'}, over all tasks. After Bonferroni adjustment for the "
         f"{counted(len(tested), 'slot')} of their tasks, on random scenes and on the test split, "
         f"{exceed} this threshold{listed}."
     )

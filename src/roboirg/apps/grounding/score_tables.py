@@ -9,7 +9,7 @@ from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.results.frame import as_column
 from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.intervals import TOO_FEW, Interval
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, gap_words
 from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
 from roboirg.evaluation.analysis.tables.table import Row, Table, named_columns
@@ -91,7 +91,7 @@ def _percent(rate: float | None) -> str:
 
 
 def _interval(interval: Interval | None) -> str:
-    return NOT_APPLICABLE if interval is None else " to ".join(map(_percent, interval))
+    return TOO_FEW if interval is None else " to ".join(map(_percent, interval))
 
 
 _LABELS: Mapping[str, Callable[[GroundingItem], Sequence[str]]] = {
