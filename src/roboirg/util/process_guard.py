@@ -11,12 +11,16 @@ import signal
 import socket
 import sys
 import time
+from collections import defaultdict
+from collections.abc import Callable
 from pathlib import Path
 
 from roboirg.util.freed_memory import keep_freed_memory
 
 _TERM_S = 0.5
 """How long what an interpreter has started may take to exit before it is killed."""
+_TERM_PAUSE_S, _KILL_PAUSE_S = 0.01, 0.001
+"""Between two signals to it."""
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 
 
@@ -86,39 +90,68 @@ def _guard(number: int) -> None:
 
 
 def _reap(child: int) -> int | None:
-    """Take leave of all dead children; return how one of them ended, None if it has not."""
-    code = None
-    with contextlib.suppress(ChildProcessError):
-        while (found := os.waitpid(-1, os.WNOHANG))[0]:
-            if found[0] == child:
-                code = os.waitstatus_to_exitcode(found[1])
-    return code
+    """Take leave of dead children; return how one of them ended, None if it has not.
+
+    Raises:
+        ChildProcessError: there is no child any more, dead or alive.
+    """
+    while True:
+        pid, status = os.waitpid(-1, os.WNOHANG)
+        if pid == child:
+            return os.waitstatus_to_exitcode(status)
+        if pid == 0:
+            return None
 
 
 def _end_descendants(child: int) -> None:
     """End all that a dead child has started, until nothing is left."""
     # First SIGTERM: Python's resource trackers are among them, and have to clean up.
-    number, until = signal.SIGTERM, time.monotonic() + _TERM_S
+    number, pause_s = signal.SIGTERM, _TERM_PAUSE_S
+    until = time.monotonic() + _TERM_S
     with contextlib.suppress(OSError):
         os.killpg(child, number)
-    while found := descendants(os.getpid()):
-        for pid in found:
-            with contextlib.suppress(OSError):
-                os.kill(pid, number)
-        time.sleep(0.01)
-        _reap(child)
-        if time.monotonic() > until:
-            number = signal.SIGKILL
+    # What loses its parent becomes a child of this process, so without children nothing is left.
+    with contextlib.suppress(ChildProcessError):
+        while True:
+            for pid in descendants(os.getpid()):
+                with contextlib.suppress(OSError):
+                    os.kill(pid, number)
+            time.sleep(pause_s)
+            _reap(child)
+            if time.monotonic() > until:
+                number, pause_s = signal.SIGKILL, _KILL_PAUSE_S
 
 
 def descendants(pid: int) -> list[int]:
     """Return the processes that a process has started, and theirs, the oldest generation first."""
-    children: dict[int, list[int]] = {}
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):  # it has ended meanwhile
-            parent = int(path.read_text().rpartition(")")[2].split()[1])
-            children.setdefault(parent, []).append(int(path.parent.name))
+    children_of: Callable[[int], list[int]] = _listed_children
+    if not Path("/proc/thread-self/children").exists():  # a kernel without CONFIG_PROC_CHILDREN
+        children_of = _children_of_all().__getitem__
     found = [pid]
-    for one in found:
-        found += children.get(one, [])
+    for process in found:
+        found += children_of(process)
     return found[1:]
+
+
+def _listed_children(pid: int) -> list[int]:
+    """Return the children of a process as the kernel lists them.
+
+    This is fast enough for a chain of processes, each of which starts the next one and exits.
+    """
+    children: list[int] = []
+    with contextlib.suppress(OSError):  # it has ended meanwhile
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            with contextlib.suppress(OSError):
+                children += map(int, (thread / "children").read_bytes().split())
+    return children
+
+
+def _children_of_all() -> defaultdict[int, list[int]]:
+    """Return the children of every process."""
+    children = defaultdict(list)
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError, ValueError):  # it has ended meanwhile
+            # A process's name may hold any bytes; numbers follow its last parenthesis.
+            _state, parent, *_ = path.read_bytes().rpartition(b")")[2].split()
+            children[int(parent)].append(int(path.parent.name))
+    return children

@@ -118,6 +118,7 @@ class HostPool:
                     elif request.method == "kill":
                         child.kill()
                     elif request.method == "check":
+                        send(line, child.longest_wait_s(request.limit_s))
                         child.check(request.limit_s)
         finally:
             self._leave(child)

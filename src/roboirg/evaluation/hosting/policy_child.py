@@ -9,6 +9,7 @@ import os
 import select
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import threading
@@ -18,7 +19,14 @@ from collections.abc import Mapping
 from multiprocessing.connection import wait
 from tempfile import TemporaryFile
 
-from roboirg.evaluation.hosting.messages import MAX_OUTPUT, HostRequest, Loss, ask, take_output
+from roboirg.evaluation.hosting.messages import (
+    DRAW_S,
+    MAX_OUTPUT,
+    HostRequest,
+    Loss,
+    ask,
+    take_output,
+)
 from roboirg.tasks.splits.private_splits import SALT_VARIABLE
 from roboirg.util.child_process import GRACE_S, ChildExit, without_interrupts
 from roboirg.util.process_guard import descendants
@@ -53,7 +61,7 @@ class PolicyChild:
     """
 
     def __init__(self, variables: Mapping[str, str]) -> None:
-        self.worlds = 0
+        self.worlds = self._most_worlds = 0
         self._fault: str | None = None
         self._asking, self._answered = threading.Lock(), 0.0
         self._has_started = self._was_ended = False
@@ -66,6 +74,9 @@ class PolicyChild:
         weakref.finalize(self, os.close, self._output)
         fcntl.fcntl(self._output, fcntl.F_SETFL, os.O_APPEND)
         self._line, theirs = socket.socketpair()
+        # One that reads nothing must not keep its supervisor.
+        limit = struct.pack("ll", int(GRACE_S), 0)
+        self._line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
         weakref.finalize(self, self._line.close)  # not before: another thread may wait for it
         environment = {**os.environ, **variables}
         environment.pop(SALT_VARIABLE, None)
@@ -89,8 +100,22 @@ class PolicyChild:
             passed: its end of the line.
             batch: most episodes that are asked about together.
         """
+        self._most_worlds = max(self._most_worlds, self.worlds)
         with contextlib.suppress(OSError):
             ask(self._line, HostRequest("open", batch=batch), passed)
+
+    def longest_wait_s(self, limit_s: float) -> float | None:
+        """Return how long a call may wait for its turn; None if the process has died.
+
+        The process carries out the call that has waited longest, so that at most one of each world
+        comes before; a world may have to draw in it.
+
+        Args:
+            limit_s: how long a call may take.
+        """
+        if self.is_over:
+            return None
+        return self._most_worlds * (max(limit_s, GRACE_S) + DRAW_S)
 
     def check(self, limit_s: float) -> None:
         """Kill it unless it is between two calls, or dead, at some time before the limit."""
@@ -132,10 +157,13 @@ class PolicyChild:
         return Loss("infrastructure" if ended.was_killed else "policy", words, output, was_ended)
 
     def kill(self) -> None:
-        """Let the guard kill all; if something has stopped it, kill it and them."""
+        """Let the guard kill all; if something stops it, kill them, let it go on, and kill it."""
         self._was_ended = True
-        self._guard.terminate()
-        if self._wait(GUARD_S) is None:
+        for _ in range(2):
+            self._guard.terminate()
+            self._guard.send_signal(signal.SIGCONT)
+            if self._wait(GUARD_S) is not None:
+                return
             for pid in descendants(self._guard.pid):
                 with contextlib.suppress(OSError):
                     os.kill(pid, signal.SIGKILL)
