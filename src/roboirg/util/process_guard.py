@@ -11,15 +11,13 @@ import signal
 import socket
 import sys
 import time
-from collections import defaultdict
-from collections.abc import Callable
 from pathlib import Path
 
 from roboirg.util.freed_memory import keep_freed_memory
 
 _TERM_S = 0.5
 """How long what an interpreter has started may take to exit before it is killed."""
-_TERM_PAUSE_S, _KILL_PAUSE_S = 0.01, 0.001
+_PAUSE_S = 0.001
 """Between two signals to it."""
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 
@@ -106,52 +104,30 @@ def _reap(child: int) -> int | None:
 def _end_descendants(child: int) -> None:
     """End all that a dead child has started, until nothing is left."""
     # First SIGTERM: Python's resource trackers are among them, and have to clean up.
-    number, pause_s = signal.SIGTERM, _TERM_PAUSE_S
-    until = time.monotonic() + _TERM_S
+    number, until = signal.SIGTERM, time.monotonic() + _TERM_S
     with contextlib.suppress(OSError):
         os.killpg(child, number)
-    # What loses its parent becomes a child of this process, so without children nothing is left.
+    # What loses its parent becomes a child of this process: without children nothing is left.
     with contextlib.suppress(ChildProcessError):
         while True:
             for pid in descendants(os.getpid()):
                 with contextlib.suppress(OSError):
                     os.kill(pid, number)
-            time.sleep(pause_s)
+            time.sleep(_PAUSE_S)
             _reap(child)
             if time.monotonic() > until:
-                number, pause_s = signal.SIGKILL, _KILL_PAUSE_S
+                number = signal.SIGKILL
 
 
 def descendants(pid: int) -> list[int]:
-    """Return the processes that a process has started, and theirs, the oldest generation first."""
-    children_of: Callable[[int], list[int]] = _listed_children
-    if not Path("/proc/thread-self/children").exists():  # a kernel without CONFIG_PROC_CHILDREN
-        children_of = _children_of_all().__getitem__
+    """Return the processes that a process has started, and theirs, the oldest generation first.
+
+    The kernel lists the children of each, so nothing is read that a process could have written, and
+    it is fast enough for a chain of processes, each of which starts the next one and exits.
+    """
     found = [pid]
     for process in found:
-        found += children_of(process)
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            for thread in Path(f"/proc/{process}/task").iterdir():
+                found += map(int, (thread / "children").read_bytes().split())
     return found[1:]
-
-
-def _listed_children(pid: int) -> list[int]:
-    """Return the children of a process as the kernel lists them.
-
-    This is fast enough for a chain of processes, each of which starts the next one and exits.
-    """
-    children: list[int] = []
-    with contextlib.suppress(OSError):  # it has ended meanwhile
-        for thread in Path(f"/proc/{pid}/task").iterdir():
-            with contextlib.suppress(OSError):
-                children += map(int, (thread / "children").read_bytes().split())
-    return children
-
-
-def _children_of_all() -> defaultdict[int, list[int]]:
-    """Return the children of every process."""
-    children = defaultdict(list)
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError, ValueError):  # it has ended meanwhile
-            # A process's name may hold any bytes; numbers follow its last parenthesis.
-            _state, parent, *_ = path.read_bytes().rpartition(b")")[2].split()
-            children[int(parent)].append(int(path.parent.name))
-    return children

@@ -42,10 +42,10 @@ _LINE_BUFFER = 2**20
 _MOST_JOINED = 8 * 2**20
 """Bytes that are copied to be sent at once, which wakes the receiver once."""
 
-TimeLeft = Callable[[], float | None]
-"""Returns the seconds that the next piece of a message may take; None for any.
+TimeLeft = Callable[[], float]
+"""Returns the seconds that the next piece of a message may take.
 
-Raises `TimeoutError` when the time for the whole message is over."""
+It raises `TimeoutError` when the time for the whole message is over."""
 
 Text = Annotated[str, Meta(max_length=MAX_TEXT)]
 Names = Annotated[tuple[Text, ...], Meta(max_length=64)]

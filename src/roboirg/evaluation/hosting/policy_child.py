@@ -9,7 +9,6 @@ import os
 import select
 import signal
 import socket
-import struct
 import subprocess
 import sys
 import threading
@@ -27,7 +26,6 @@ from roboirg.evaluation.hosting.messages import (
     ask,
     take_output,
 )
-from roboirg.tasks.splits.private_splits import SALT_VARIABLE
 from roboirg.util.child_process import GRACE_S, ChildExit, without_interrupts
 from roboirg.util.process_guard import descendants
 
@@ -49,18 +47,17 @@ PERIOD_S = 0.25
 class PolicyChild:
     """A policy process in an interpreter that knows nothing of this one, and the line to it.
 
-    The script and command line of this process are kept from it, and so is a private split's salt.
-    A guard between the two ends, with the process, all that it has started. The kernel ends both
-    with the thread that starts them.
+    The script and command line of this process are kept from it. A guard between the two ends, with
+    the process, all that it has started. The kernel ends both with the thread that starts them.
 
     Args:
-        variables: environment variables next to those of this process.
+        environment: its environment variables.
 
     Attributes:
         worlds: how many it serves.
     """
 
-    def __init__(self, variables: Mapping[str, str]) -> None:
+    def __init__(self, environment: Mapping[str, str]) -> None:
         self.worlds = self._most_worlds = 0
         self._fault: str | None = None
         self._asking, self._answered = threading.Lock(), 0.0
@@ -74,12 +71,8 @@ class PolicyChild:
         weakref.finalize(self, os.close, self._output)
         fcntl.fcntl(self._output, fcntl.F_SETFL, os.O_APPEND)
         self._line, theirs = socket.socketpair()
-        # One that reads nothing must not keep its supervisor.
-        limit = struct.pack("ll", int(GRACE_S), 0)
-        self._line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
+        self._line.settimeout(GRACE_S)  # for one that reads nothing
         weakref.finalize(self, self._line.close)  # not before: another thread may wait for it
-        environment = {**os.environ, **variables}
-        environment.pop(SALT_VARIABLE, None)
         with theirs, without_interrupts():
             number = theirs.fileno()
             arguments = (str(number), str(os.getpid()), _MODULE, json.dumps(sys.path))
@@ -104,35 +97,38 @@ class PolicyChild:
         with contextlib.suppress(OSError):
             ask(self._line, HostRequest("open", batch=batch), passed)
 
-    def longest_wait_s(self, limit_s: float) -> float | None:
-        """Return how long a call may wait for its turn; None if the process has died.
-
-        The process carries out the call that has waited longest, so that at most one of each world
-        comes before; a world may have to draw in it.
+    def check(self, limit_s: float) -> float | None:
+        """Kill it unless it is between two calls at some time before the limit.
 
         Args:
             limit_s: how long a call may take.
-        """
-        if self.is_over:
-            return None
-        return self._most_worlds * (max(limit_s, GRACE_S) + DRAW_S)
 
-    def check(self, limit_s: float) -> None:
-        """Kill it unless it is between two calls, or dead, at some time before the limit."""
+        Returns:
+            How long a call may wait for its turn in all: the process carries out the one that has
+            waited longest, so at most one of each world comes before, in which that may have to
+            draw. None if the process is over.
+        """
+        if self._answers(limit_s):
+            return self._most_worlds * (limit_s + DRAW_S)
+        if not self.is_over:
+            self._fault = f"the process began no call within {limit_s:g} s"
+            self.kill()
+        return None
+
+    def _answers(self, limit_s: float) -> bool:
+        """Return whether it answers within the limit that it is between two calls."""
         asked = time.monotonic()
         with self._asking, contextlib.suppress(OSError):
             if self._answered > asked:  # to another world, meanwhile
-                return
-            with contextlib.suppress(BlockingIOError):  # what it has said unasked is no answer
-                self._has_started |= bool(self._line.recv(MAX_OUTPUT, socket.MSG_DONTWAIT))
+                return True
+            if wait([self._line], 0.0):  # what it has said unasked is no answer
+                self._has_started |= bool(self._line.recv(MAX_OUTPUT))
             ask(self._line, HostRequest("check"))
             patience_s = limit_s + MARGIN_S if self._has_started else max(limit_s, GRACE_S)
             if wait([self._line], patience_s) and self._line.recv(1):
                 self._answered = time.monotonic()
-                return
-        if not self.is_over:
-            self._fault = f"the process began no call within {limit_s:g} s"
-            self.kill()
+                return True
+        return False
 
     @property
     def is_over(self) -> bool:
@@ -157,13 +153,11 @@ class PolicyChild:
         return Loss("infrastructure" if ended.was_killed else "policy", words, output, was_ended)
 
     def kill(self) -> None:
-        """Let the guard kill all; if something stops it, kill them, let it go on, and kill it."""
+        """Let the guard kill all, even one that was stopped; if it does not, kill it and them."""
         self._was_ended = True
-        for _ in range(2):
-            self._guard.terminate()
-            self._guard.send_signal(signal.SIGCONT)
-            if self._wait(GUARD_S) is not None:
-                return
+        self._guard.terminate()
+        self._guard.send_signal(signal.SIGCONT)
+        if self._wait(GUARD_S) is None:
             for pid in descendants(self._guard.pid):
                 with contextlib.suppress(OSError):
                     os.kill(pid, signal.SIGKILL)

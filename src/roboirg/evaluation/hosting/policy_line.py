@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 import msgspec
 
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.field_types import MOST_SECONDS
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.waiting import waiting
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
@@ -78,9 +79,10 @@ class PolicyLine:
         *,
         alone: bool = False,
     ) -> None:
-        self._hosts, self._limit_s, self._alone = hosts, limit_s, alone
+        self._hosts, self._alone = hosts, alone
+        self._limit_s = limit_s or MOST_SECONDS
         self.output = b""
-        self._sent_at = self._check_at = self._until = 0.0
+        self._sent_at = self._until = 0.0
         self._line, theirs = new_line()
         with theirs, _supervised():
             ask(hosts, HostRequest("open", policy), theirs)
@@ -106,10 +108,8 @@ class PolicyLine:
         except TimeoutError:
             words = f"the {phase} did not return within {self._limit_s:g} s"
             if begun is None:  # an honest process begins the call that has waited longest
-                begun = Begun()
-                waited_s = time.monotonic() - self._sent_at
-                words = f"the process did not begin the {phase} within {waited_s:.0f} s"
-            raise self._lost(begun, phase, ("timeout", words)) from None
+                words = f"the process did not begin the {phase}, though it was its turn"
+            raise self._lost(begun or Begun(), phase, ("timeout", words)) from None
         except (EOFError, OSError):
             raise self._lost(begun, phase) from None
         except (KeyboardInterrupt, SystemExit):  # the call goes on, so none can follow
@@ -142,40 +142,34 @@ class PolicyLine:
     def _begin(self, call: Call) -> Begun:
         """Send a call and wait for its turn."""
         self._sent_at = time.monotonic()
-        self._check_at = self._sent_at + (self._limit_s or 0.0)
+        self._until = self._sent_at + self._limit_s
         with waiting("its turn in the policy's process", is_queue=True):
-            send(self._line, call, self._time_to_check)
-            begun = read_child(receive(self._line, MAX_BEGUN, self._time_to_check))
+            send(self._line, call, self._turn_left)
+            begun = read_child(receive(self._line, MAX_BEGUN, self._turn_left))
         if not isinstance(begun, Begun) or (begun.together and self._alone):
             raise ValueError("a message that was not asked for")
         return begun
 
-    def _time_to_check(self) -> float | None:
-        """Return the seconds until the process is checked again; check it if it is time.
+    def _turn_left(self) -> float:
+        """Return the seconds for which a call may wait on; let the supervisor check the process.
 
         Raises:
             EOFError: the process is over.
             TimeoutError: the call has waited too long for its turn.
         """
-        if self._limit_s is None:
-            return None
-        now = time.monotonic()
-        if now >= self._check_at:
-            with _supervised():
-                ask(self._hosts, HostRequest("check", limit_s=self._limit_s))
-                most_s = msgspec.msgpack.decode(receive(self._hosts), type=float | None)
+        if time.monotonic() >= self._until:
+            ask(self._hosts, HostRequest("check", limit_s=self._limit_s))
+            most_s = msgspec.msgpack.decode(receive(self._hosts), type=float | None)
             if most_s is None:
                 raise EOFError
-            if now - self._sent_at > most_s:
-                raise TimeoutError
-            self._check_at = now + self._limit_s
-        return self._check_at - now
+            self._until = min(time.monotonic() + self._limit_s, self._sent_at + most_s)
+        return self._time_left()
 
     def _outcome(self, answer: Answer | None) -> Outcome:
         """Return the outcome of a call that has begun; meanwhile answer questions."""
-        self._until = time.monotonic() + (self._limit_s or 0.0)
+        self._until = time.monotonic() + self._limit_s
         for _ in range(MOST_QUESTIONS + 1):
-            reply = read_child(receive(self._line, MAX_MESSAGE, self._time_to_return))
+            reply = read_child(receive(self._line, MAX_MESSAGE, self._time_left))
             if isinstance(reply, Outcome):
                 return reply
             if answer is None or not isinstance(reply, Question):
@@ -183,17 +177,15 @@ class PolicyLine:
             asked_at = time.monotonic()
             answered = answer(reply)
             self._until += time.monotonic() - asked_at  # drawing is not the policy's time
-            send(self._line, answered, self._time_to_return)
+            send(self._line, answered, self._time_left)
         raise ValueError("it asked for the video again and again")
 
-    def _time_to_return(self) -> float | None:
-        """Return the seconds that the call under way has left.
+    def _time_left(self) -> float:
+        """Return the seconds until the limit.
 
         Raises:
             TimeoutError: there are none.
         """
-        if self._limit_s is None:
-            return None
         left_s = self._until - time.monotonic()
         if left_s <= 0:
             raise TimeoutError

@@ -78,6 +78,11 @@ class ModelOptions(BaseModel):
             )
         return url
 
+    @property
+    def key_variable(self) -> str | None:
+        """The environment variable with the key; None if none is needed."""
+        return self.api_key_env or (None if self.base_url else KEY_VARIABLES.get(self.provider))
+
     def key(self) -> str:
         """Return the key, or `NO_KEY` if none is needed.
 
@@ -85,7 +90,7 @@ class ModelOptions(BaseModel):
             MissingDependencyError: the environment variable is not set; a run stops, as it could
                 play no episode.
         """
-        variable = self.api_key_env or (None if self.base_url else KEY_VARIABLES[self.provider])
+        variable = self.key_variable
         if variable is None:
             return NO_KEY
         key = os.environ.get(variable, "").strip()
