@@ -63,7 +63,7 @@ class Hosting:
         default=(),
         metadata=described(
             "Environment variables with secrets, such as HF_TOKEN, that policies in processes of "
-            "their own get; others with KEY, TOKEN, SECRET, PASSWORD, … in their names they do not."
+            "their own get."
         ),
     )
     policy_timeout_s: TimeLimit = field(
