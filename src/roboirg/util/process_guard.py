@@ -17,8 +17,6 @@ from roboirg.util.freed_memory import keep_freed_memory
 
 _TERM_S = 0.5
 """How long what an interpreter has started may take to exit before it is killed."""
-_PAUSE_S = 0.001
-"""Between two signals to it."""
 _PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
 
 
@@ -104,7 +102,7 @@ def _reap(child: int) -> int | None:
 def _end_descendants(child: int) -> None:
     """End all that a dead child has started, until nothing is left."""
     # First SIGTERM: Python's resource trackers are among them, and have to clean up.
-    number, until = signal.SIGTERM, time.monotonic() + _TERM_S
+    number, pause_s, until = signal.SIGTERM, 0.01, time.monotonic() + _TERM_S
     with contextlib.suppress(OSError):
         os.killpg(child, number)
     # What loses its parent becomes a child of this process: without children nothing is left.
@@ -113,10 +111,10 @@ def _end_descendants(child: int) -> None:
             for pid in descendants(os.getpid()):
                 with contextlib.suppress(OSError):
                     os.kill(pid, number)
-            time.sleep(_PAUSE_S)
+            time.sleep(pause_s)
             _reap(child)
             if time.monotonic() > until:
-                number = signal.SIGKILL
+                number, pause_s = signal.SIGKILL, 0.001
 
 
 def descendants(pid: int) -> list[int]:

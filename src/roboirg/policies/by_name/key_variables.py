@@ -58,13 +58,15 @@ def forget_secrets(policy: str, named: str) -> None:
         named: variables that it may have, separated by commas.
 
     Raises:
-        InvalidValueError: one of them is not set, or there is no such policy.
+        InvalidValueError: one of them is not set.
     """
-    names, ref = named.replace(",", " ").split(), read_policy(policy)
+    names = named.replace(",", " ").split()
     check_variables(names, "the policy")
-    if ref.is_foreign:
-        for name in os.environ.keys() - environment_for(ref, names).keys():
-            del os.environ[name]
+    with contextlib.suppress(InvalidValueError):  # there is no such policy, as the command reports
+        ref = read_policy(policy)
+        if ref.is_foreign:
+            for name in os.environ.keys() - environment_for(ref, names).keys():
+                del os.environ[name]
 
 
 def key_variables(ref: PolicyRef) -> set[str | None]:
