@@ -211,7 +211,11 @@ def _run_python(*arguments: str, limit_s: int = FRAME_TIMEOUT) -> tuple[bool, st
             timeout=limit_s,
         )
     except subprocess.TimeoutExpired as error:
-        output = error.stdout.decode() if isinstance(error.stdout, bytes) else error.stdout or ""
+        output = (
+            error.stdout.decode(errors="replace")
+            if isinstance(error.stdout, bytes)
+            else error.stdout or ""
+        )
         return False, output, f"no end within {limit_s} s"
     code = child.returncode
     if code < 0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -202,7 +203,9 @@ def _executor(plan: Plan, name: str, workers: int | None) -> Executor:
         from roboirg.evaluation.run.ray_cluster import RayCluster
 
         address = os.environ.get("RAY_ADDRESS")
-        return RayCluster(workers, address, plan.attempts.episode_timeout_s, plan.cluster)
+        variables = plan.cluster.variables + plan.hosting.policy_env
+        needs = replace(plan.cluster, variables=variables)
+        return RayCluster(workers, address, plan.attempts.episode_timeout_s, needs)
     from roboirg.evaluation.run.executor import choose_executor
 
     return choose_executor(workers, plan.attempts.episode_timeout_s)

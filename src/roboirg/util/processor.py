@@ -50,7 +50,7 @@ def processor_features() -> str:
 def _fields() -> dict[str, str]:
     """Return what Linux says of the first processor; empty elsewhere."""
     try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return {}
     return {line.partition(":")[0].strip(): line.partition(":")[2].strip() for line in lines[::-1]}

@@ -62,6 +62,7 @@ from roboirg.language.settings import (
 )
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.by_name.finding import read_policy
+from roboirg.policies.by_name.key_variables import check_variables
 from roboirg.policies.contract.option_checking import flags_as_words
 from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.private_splits import MissingSaltError, is_private
@@ -277,8 +278,9 @@ class Plan(BaseModel):
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all fields."""
-        return short_hash(self.model_dump_json(context=_HASHED))
+        """Hash of all fields but the names of variables, which change no episode."""
+        left_out = {"hosting": {"policy_env"}}
+        return short_hash(self.model_dump_json(context=_HASHED, exclude=left_out))
 
     def checked(self) -> Plan:
         """Return this plan if all of it can be played.
@@ -323,9 +325,10 @@ class Plan(BaseModel):
                 f"There is nothing to play: {', '.join(self.settings)} cannot express any of "
                 "these episodes."
             )
-        device = next(iter(self.hosting.devices), None)
+        check_variables(self.hosting.policy_env, "policies")
         limit = self.hosting.policy_timeout_s
-        opened = [open_policy(one, limit, device) for one in self.policies]
+        settings = replace(self.hosting, policy_process="own").settings
+        opened = [open_policy(policy, limit, settings) for policy in self.policies]
         return self.model_copy(update={"policies": tuple(opened)})
 
     def jobs(self, played: Iterable[Summary] = ()) -> tuple[Job, ...]:

@@ -66,6 +66,13 @@ class Hosting:
             "GPU."
         ),
     )
+    policy_env: Annotated[tuple[str, ...], names_of("environment variable")] = field(
+        default=(),
+        metadata=described(
+            "Environment variables with secrets, such as HF_TOKEN, that policies in processes of "
+            "their own get."
+        ),
+    )
     policy_timeout_s: TimeLimit = field(
         default=600.0, metadata=described("Time limit of one call of a policy, seconds.")
     )
@@ -75,7 +82,7 @@ class Hosting:
         """The same for the hosts; None if policies run in the world's process."""
         if self.policy_process == "shared":
             return None
-        return HostSettings(self.batch, self.devices)
+        return HostSettings(self.batch, self.devices, self.policy_env)
 
 
 @dataclass(frozen=True, slots=True)

@@ -173,7 +173,7 @@ class AppendFile:
 
     def _take_lock(self) -> None:
         if not take_lock(self._lock, self._folder / LOCK_FILE):
-            owner = os.pread(self._lock, 32, 0).decode().strip() or "unknown"
+            owner = os.pread(self._lock, 32, 0).decode("ascii", "replace").strip() or "unknown"
             raise StoreError(
                 f"{self._folder} is being written by another run (process {owner}); "
                 f"wait for it, stop it, or choose another --out."

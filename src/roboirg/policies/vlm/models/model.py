@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 import os
@@ -85,8 +84,12 @@ class ModelOptions(BaseModel):
 
     def model_post_init(self, _context: object) -> None:
         """Remember the key, if there is one, before stored replies are read."""
-        with contextlib.suppress(MissingDependencyError):
-            remember_key(self.key())
+        remember_key(os.environ.get(self.key_variable or ""))
+
+    @property
+    def key_variable(self) -> str | None:
+        """The environment variable with the key; None if none is needed."""
+        return self.api_key_env or (None if self.base_url else KEY_VARIABLES.get(self.provider))
 
     def key(self) -> str:
         """Return the key, or `NO_KEY` if none is needed.
@@ -95,7 +98,7 @@ class ModelOptions(BaseModel):
             MissingDependencyError: the environment variable is not set; a run stops, as it could
                 play no episode.
         """
-        variable = self.api_key_env or (None if self.base_url else KEY_VARIABLES[self.provider])
+        variable = self.key_variable
         if variable is None:
             return NO_KEY
         key = os.environ.get(variable, "").strip()
