@@ -1,6 +1,7 @@
 # The daily commands. `make` alone lists them.
 
 PYTHON := .venv/bin/python
+CFFCONVERT := build/citation/bin/cffconvert
 
 .DEFAULT_GOAL := help
 .PHONY: help setup dev learn style types test fast-tests test-slow test-all test-learn every-test net integrations lint docs demo play card clean
@@ -17,12 +18,18 @@ dev: ## the same, and what tests, lint and documentation need
 learn: setup ## roboirg learn from this checkout, with PyTorch
 	$(PYTHON) -m pip install --quiet --editable packages/learn
 
-lint: style ## ruff and mypy
+lint: style ## ruff, mypy and cffconvert
 	$(PYTHON) -m mypy
 
-style: dev
+style: dev $(CFFCONVERT)
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
+	$(CFFCONVERT) --validate
+
+# Needs an older jsonschema than the packages of .venv.
+$(CFFCONVERT): | dev
+	$(PYTHON) -m venv build/citation
+	build/citation/bin/pip install --quiet --disable-pip-version-check cffconvert==2.0.0
 
 # More workers than cores, as many tests wait for processes; each has 0.5 GiB. What the tests of a
 # file make for all of them is made once. conftest.py has the order of the files;

@@ -129,14 +129,22 @@ def _() -> str:
     return says("docs/tasks.md", *names)
 
 
+PAPER_AUTHORS = [
+    "Akelijiang, Aernaer",
+    "Li, Jiannan",
+    "Chen, Zhineng",
+    "Chen, Jingjing",
+    "Zhu, Bin",
+]
+
+
 @item("cite", "paper and RoboMME with their authors, and the project page, are cited everywhere")
 def _() -> str:
     cff = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     paper, robomme = cff["preferred-citation"], cff["references"][0]
-    same(
-        [one["family-names"] for one in paper["authors"]],
-        ["Akelijiang", "Li", "Chen", "Chen", "Zhu"],
-    )
+    authors = [f"{author['family-names']}, {author['given-names']}" for author in paper["authors"]]
+    same(authors, PAPER_AUTHORS)
+    says("README.md", " and ".join(authors), "Aernaer Akelijiang, Jiannan Li")
     same([len(robomme["authors"]), robomme["authors"][0]["family-names"]], [9, "Dai"])
     numbers = "arXiv:2609.34384", "arXiv:2603.04639"
     same(tuple(one["identifiers"][0]["value"] for one in (paper, robomme)), numbers)

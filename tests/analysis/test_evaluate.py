@@ -163,8 +163,21 @@ def test_options_are_those_of_a_plan(unplayed: None, tmp_path: Path) -> None:
     for wrong, right in {"max_stps": "max_steps", "worker": "workers", "task": "tasks"}.items():
         with pytest.raises(UnknownNameError, match=f"{wrong}.*mean '{right}'"):
             roboirg.evaluate("oracle", **{wrong: 3}, **QUICK)
-    with pytest.raises(InvalidValueError, match="workers is '2'; it must be a whole number"):
-        roboirg.evaluate("oracle", **{**QUICK, "workers": "2"})
+    for workers in ("2", True, 2.0, 10**22):
+        with pytest.raises(InvalidValueError, match=f"workers is {workers!r}; it must be a whole"):
+            roboirg.evaluate("oracle", **{**QUICK, "workers": workers})
+
+
+@pytest.mark.parametrize("name", ["", " ", "runs/\0"])
+def test_a_folder_that_is_none_is_refused_and_nothing_is_written(
+    unplayed: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InvalidValueError, match=r"The run's folder is '.*'; it must be a path"):
+        roboirg.evaluate("oracle", out=name, **QUICK)
+    with pytest.raises(InvalidValueError, match=r"The run's folder is '.*'; it must be a path"):
+        roboirg.results(name)
+    assert not list(tmp_path.iterdir())
 
 
 def test_without_pandas_the_rest_works(

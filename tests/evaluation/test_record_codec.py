@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import msgspec
+import pytest
 from evaluation_fakes import FakePlay, small_plan
 from msgspec.structs import replace
 
@@ -28,12 +29,16 @@ def write(folder: Path, *lines: bytes) -> Path:
     return folder
 
 
-def test_a_damaged_line_loses_only_its_episode(tmp_path: Path) -> None:
+def test_a_damaged_line_loses_only_its_episode_and_is_reported(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
     lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
     write(tmp_path, *lines[:2], lines[2][:40] + b"\x00\xff\n", *lines[3:])
     with RecordStore(tmp_path) as store:
-        assert (len(store.stored), store.damaged, store.torn) == (7, (3,), b"")
+        assert (len(store.stored), store.torn) == (7, b"")
+    (warning,) = caplog.messages
+    assert warning.startswith(f"{tmp_path / RECORDS_FILE} has 1 damaged line, the first is line 3;")
     summary = run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
     assert summary.played == 1
     records, index = read_records(tmp_path), StoredRun(tmp_path, read_summary)

@@ -87,7 +87,7 @@ def _listener_plan(words: PlanWords, without: str) -> TrainingPlan:
         words.tasks(),
         words.settings(),
         words.options().language,
-        words=known_name("pool of words", words.fields.get("wordings", "train"), WORD_POOLS),
+        words=known_name("pool of words", words.fields.get("wordings") or "train", WORD_POOLS),
         without=known_name("variant", without, WITHOUTS),
         **words.choices(TrainingPlan),
     )
@@ -183,7 +183,7 @@ def _policy_plan(words: PlanWords, tasks: str, settings: str, memory: str) -> Po
         words.tasks(tasks),
         words.options().language,
         () if hears_none else words.settings(settings),
-        words=known_name("pool of words", words.fields.get("wordings", "train"), WORD_POOLS),
+        words=known_name("pool of words", words.fields.get("wordings") or "train", WORD_POOLS),
         memory=known_name("memory", memory, MEMORY_NAMES),
         **words.choices(PolicyPlan),
     )

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+import typer
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
@@ -104,7 +105,7 @@ def report(checks: Sequence[Check]) -> str:
 def run_doctor(render_s: int = 0) -> int:
     """Print the report and return the exit code: 0 if every check passed, otherwise 1."""
     checks = run_checks(render_s)
-    sys.stdout.write(report(checks) + "\n")
+    typer.echo(report(checks))
     return 0 if all(check.ok for check in checks) else 1
 
 
@@ -210,7 +211,11 @@ def _run_python(*arguments: str, limit_s: int = FRAME_TIMEOUT) -> tuple[bool, st
             timeout=limit_s,
         )
     except subprocess.TimeoutExpired as error:
-        output = error.stdout.decode() if isinstance(error.stdout, bytes) else error.stdout or ""
+        output = (
+            error.stdout.decode(errors="replace")
+            if isinstance(error.stdout, bytes)
+            else error.stdout or ""
+        )
         return False, output, f"no end within {limit_s} s"
     code = child.returncode
     if code < 0:

@@ -92,7 +92,7 @@ class PlanWords:
         """
         from roboirg.evaluation.plan.plan_maker import as_typed_field
 
-        given = self.fields.get(self._section) or {}
+        given = self.fields.get(self._section, {})
         if not isinstance(given, Mapping):
             raise InvalidValueError(
                 f"{self._section} of the plan is {given!r}; it must be a mapping such as "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from roboirg.core.field_types import Name
+from roboirg.core.field_types import Label, Name
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.versions import POLICY, Makeup, Versions
 
@@ -52,7 +52,7 @@ class PolicyRef:
         needs: what it declares, as far as that is known before it plays.
     """
 
-    name: Name
+    name: Label
     spec: str
     kind: str
     target: str

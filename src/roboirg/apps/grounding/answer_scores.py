@@ -56,7 +56,7 @@ class GroundingScore:
 
     @property
     def unparsed(self) -> int:
-        """Number of replies that name no answer."""
+        """Number of unreadable replies."""
         return sum(one.verdict.understood is None for one in self.judged)
 
     @property
@@ -99,7 +99,7 @@ def score_answers(
 ) -> tuple[GroundingScore, ...]:
     """Score answers, kind by kind.
 
-    A reply that names no answer is wrong. An item without an answer is missing: it is in no rate.
+    An unreadable reply is wrong. An item without an answer is missing: it is in no rate.
 
     Args:
         items: of the dataset, all of one split and one wording.

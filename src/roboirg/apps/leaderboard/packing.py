@@ -34,11 +34,13 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
         logs: whether to include what policies printed.
 
     Raises:
-        StoreError: there are no records, a line is not a record, or there is too much.
+        StoreError: there are no records, a line is damaged or no record, or there is too much.
         ForeignPathError: a file is outside of the folder, by a symbolic link, or has an odd name.
         InvalidValueError: the file cannot be written.
     """
-    entries = StoredRun(folder, read_summary).newest
+    run = StoredRun(folder, read_summary)
+    run.file.refuse_damage()
+    entries = run.newest
     wanted = [ACTION_FOLDER, *[LOG_FOLDER] * logs, *[VIDEO_FOLDER] * videos]
     names = [RECORDS_FILE, *plan_names(folder)]
     for name in wanted:

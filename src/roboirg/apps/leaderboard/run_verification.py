@@ -76,11 +76,12 @@ def verify_run(
     Raises:
         InvalidValueError: the sample is not a share.
         MissingSaltError: the run has private episodes, and their salt is not known.
-        StoreError: there are no records, or a line is not a record of this schema version.
+        StoreError: there are no records, or a line is damaged or no record of this schema version.
     """
     if not 0.0 <= sample <= 1.0:
         raise InvalidValueError(f"sample is {sample}; it must be between 0 % and 100 %.")
     run = StoredRun(folder, read_summary)
+    run.file.refuse_damage()
     for split in sorted({one.split for one in run.newest}):
         check_salt(split)
     checks: list[RecordCheck] = []

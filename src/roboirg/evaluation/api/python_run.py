@@ -12,6 +12,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.records.run_files import run_folder
 from roboirg.evaluation.run.executor import choose_executor
 from roboirg.evaluation.run.progress import ConsoleReporter
 from roboirg.evaluation.run.runner import episode_runner, run_plan
@@ -50,7 +51,8 @@ def play_plan(
             in it.
         progress: whether to show it.
     """
-    folder = (_new_folder() if out is None else Path(out)).absolute()
+    folder = _new_folder() if out is None else run_folder(out)
+    folder = folder.absolute()
     here = [one.name for one in plan.policies if one.place == "python"]
     if here:
         if workers:

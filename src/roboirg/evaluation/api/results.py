@@ -101,10 +101,18 @@ class Results:
         return results(self.folder)
 
     def rates(self) -> dict[tuple[str, str], float]:
-        """Return the mean success over tasks, 0 to 1, by policy and setting (with options)."""
+        """Return the mean success over tasks, 0 to 1, by policy and setting (with options).
+
+        Runs of a policy under several conditions or in several versions have labels of their own.
+        """
+        data = self._data.told
+        names = data.frame.names
         return {
-            (key.policy_run.policy, options_label(key.options)): float(one.rate)
-            for key, one in self._data.told.summaries.items()
+            (
+                names[key.policy_run].removesuffix(key.policy_run.mark),
+                options_label(key.options),
+            ): float(one.rate)
+            for key, one in data.summaries.items()
             if key.scope == ALL_TASKS and one.rate is not None
         }
 

@@ -19,7 +19,8 @@ ALL = "all"
 _NAME = r"[\w.+ -]+"
 """Of a policy: it becomes part of names of files."""
 _MAX_NUMBERS = 10_000
-_NUMBER = r"\d{1,18}"
+_NUMBER = r"(?:0|[1-9]\d{0,17})"
+"""Without leading zeros: 010 is 8 to some readers."""
 _MAX_QUOTED_LENGTH = 40
 _NUMBERS_HINT = "write numbers and ranges such as 0,3,5-9"
 _EPISODES_HINT = f"{_NUMBERS_HINT}, or all"
@@ -42,6 +43,8 @@ def parse_names(kind: str, given: object) -> tuple[str, ...]:
 
 
 def _words(given: object) -> list[str]:
+    if given is None:
+        return []
     is_one = isinstance(given, str) or not isinstance(given, Iterable)
     parts: Iterable[object] = [given] if is_one else cast("Iterable[object]", given)
     return [word.strip() for one in parts for word in str(one).split(",")]

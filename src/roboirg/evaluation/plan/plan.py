@@ -31,7 +31,7 @@ from roboirg.core.arms import TOLD
 from roboirg.core.delivery import TURNS
 from roboirg.core.environment_options import EnvironmentOptions, check_demonstration_frames
 from roboirg.core.errors import InvalidValueError, check_names
-from roboirg.core.field_types import CONTROLS, NAME
+from roboirg.core.field_types import CONTROLS, LABEL, LABEL_RULE
 from roboirg.core.instruction_options import DEFAULT_FRAME, InstructionOptions, identifying
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.word_pools import POOLS
@@ -62,6 +62,8 @@ from roboirg.language.settings import (
 )
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.by_name.finding import read_policy
+from roboirg.policies.by_name.key_variables import check_variables
+from roboirg.policies.contract.option_checking import flags_as_words
 from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.private_splits import MissingSaltError, is_private
 from roboirg.util.short_hash import short_hash
@@ -100,10 +102,6 @@ def _settings(given: object) -> tuple[str, ...]:
     found = {*expand_settings(words)}
     same = (one for one in words if one in SETTING_GROUPS and {*expand_settings([one])} == found)
     return next(((one,) for one in same), words)
-
-
-def _word(given: object) -> object:
-    return "off" if given is False else given  # YAML 1.1 reads the word as false
 
 
 class ChosenWordings(NamedTuple):
@@ -147,7 +145,9 @@ class Plan(BaseModel):
     from `video` on are not part of a record's identity.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", validate_default=True, allow_inf_nan=False
+    )
 
     policies: Annotated[tuple[PolicyRef, ...], BeforeValidator(_policies)] = Field(
         description="Built-in names, package.module:Class, or addresses; NAME=SPEC gives one a "
@@ -164,7 +164,7 @@ class Plan(BaseModel):
     in_turns: Annotated[tuple[str, ...], names_of("setting")] = _option(
         (), "Settings that are also played with the utterances one after another."
     )
-    forms: Annotated[tuple[str, ...], names_of("form")] = _option(
+    forms: Annotated[tuple[str, ...], BeforeValidator(partial(parse_names, "form"))] = _option(
         "implicit", "implicit, resolved or both."
     )
     split: str = _option("test", "train, val, test, random, or the name of a private split.")
@@ -194,9 +194,7 @@ class Plan(BaseModel):
         InstructionOptions(), "Further options of instructions, for settings that read them."
     )
     environment: EnvironmentOptions = _option(EnvironmentOptions(), "How episodes are played.")
-    video: Annotated[VideoMode, BeforeValidator(_word)] = _option(
-        "off", "Episodes whose video is recorded: off, failures or all."
-    )
+    video: VideoMode = _option("off", "Episodes whose video is recorded: off, failures or all.")
     long_prompts: Literal["send", "refuse"] = _option(
         "send",
         "What to do with prompts longer than the limit that a policy declares: send or refuse.",
@@ -212,10 +210,10 @@ class Plan(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _nest(cls, given: object) -> object:
-        """Put options that stand alone into their sections; None stands for the default."""
+        """Put options that stand alone into their sections."""
         if not isinstance(given, Mapping):
             return given
-        found = {name: value for name, value in given.items() if value is not None}
+        found = flags_as_words(given)
         check_names("plan key", found, PLAN_KEYS)
         for name, keys in SECTION_KEYS.items():
             section = found.get(name)
@@ -280,8 +278,8 @@ class Plan(BaseModel):
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all fields, of policies without what follows from the others."""
-        left_out = {"policies": {"__all__": {"makeup"}}}
+        """Hash of all fields but what follows from others, and names of variables."""
+        left_out = {"hosting": {"policy_env"}, "policies": {"__all__": {"makeup"}}}
         return short_hash(self.model_dump_json(context=_HASHED, exclude=left_out))
 
     def checked(self) -> Plan:
@@ -296,10 +294,9 @@ class Plan(BaseModel):
         find_settings(self.settings)
         specs: dict[str, str] = {}
         for one in self.policies:
-            if not re.fullmatch(NAME, one.name):
+            if not re.fullmatch(LABEL, one.name):
                 raise InvalidValueError(
-                    f"Policy {one.name[:80]!r} has no valid name for records: at most 1,000 "
-                    "characters, without control characters."
+                    f"Policy {one.name[:80]!r} has no valid name for records: {LABEL_RULE}."
                 )
             if specs.setdefault(one.name, one.spec) != one.spec:
                 raise InvalidValueError(
@@ -328,9 +325,10 @@ class Plan(BaseModel):
                 f"There is nothing to play: {', '.join(self.settings)} cannot express any of "
                 "these episodes."
             )
-        device = next(iter(self.hosting.devices), None)
+        check_variables(self.hosting.policy_env, "policies")
         limit = self.hosting.policy_timeout_s
-        opened = [open_policy(one, limit, device) for one in self.policies]
+        settings = replace(self.hosting, policy_process="own").settings
+        opened = [open_policy(policy, limit, settings) for policy in self.policies]
         return self.model_copy(update={"policies": tuple(opened)})
 
     def jobs(self, played: Iterable[Summary] = ()) -> tuple[Job, ...]:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
 from roboirg.core.errors import check_names
-from roboirg.core.field_types import described
+from roboirg.core.field_types import MOST_COUNT, described
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
 from roboirg.evaluation.plan.option_parsing import parse_names
 from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
@@ -20,20 +21,26 @@ RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure
 """Kinds of errors that may not occur again when the episode is retried."""
 
 
+def _names_if_any(kind: str, given: object) -> tuple[str, ...]:
+    """Return names of a kind; none for an empty list, which 0 and an empty text are not."""
+    is_empty = isinstance(given, list | tuple) and not given
+    return () if is_empty else parse_names(kind, given)
+
+
 def names_of(kind: str) -> BeforeValidator:
     """Return what reads names of a kind; there may be none."""
-    return BeforeValidator(lambda given: parse_names(kind, given) if given else ())
+    return BeforeValidator(partial(_names_if_any, kind))
 
 
 def _error_kinds(given: object) -> tuple[str, ...]:
-    names = parse_names("kind of error", given or "none")
-    if [one.lower() for one in names] == ["none"]:
+    names = _names_if_any("kind of error", given)
+    if {name.lower() for name in names} <= {"none"}:
         return ()
     check_names("kind of error", names, ERROR_KINDS)
     return tuple(kind for kind in ERROR_KINDS if kind in names)
 
 
-Count = Annotated[int, Field(ge=1)]
+Count = Annotated[int, Field(ge=1, le=MOST_COUNT)]
 TimeLimit = Annotated[Seconds, Field(gt=0)]
 
 
@@ -59,6 +66,13 @@ class Hosting:
             "GPU."
         ),
     )
+    policy_env: Annotated[tuple[str, ...], names_of("environment variable")] = field(
+        default=(),
+        metadata=described(
+            "Environment variables with secrets, such as HF_TOKEN, that policies in processes of "
+            "their own get."
+        ),
+    )
     policy_timeout_s: TimeLimit = field(
         default=600.0, metadata=described("Time limit of one call of a policy, seconds.")
     )
@@ -68,7 +82,7 @@ class Hosting:
         """The same for the hosts; None if policies run in the world's process."""
         if self.policy_process == "shared":
             return None
-        return HostSettings(self.batch, self.devices)
+        return HostSettings(self.batch, self.devices, self.policy_env)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +137,7 @@ class WorkerNeeds:
 
     cpus: Annotated[float, Field(gt=0)] = 1.0
     gpus: Annotated[float, Field(ge=0)] = 0.0
-    memory_gb: Annotated[float, Field(ge=0)] = 0.0
+    memory_gb: Annotated[float, Field(ge=0, le=MOST_COUNT)] = 0.0
     labels: Mapping[str, str] = field(default_factory=dict)
     variables: tuple[str, ...] = ()
     working_dir: str | None = None

@@ -2,7 +2,7 @@
 
 Guaranteed on a local POSIX file system, besides what `line_file` guarantees:
 
-- A damaged line in the middle is skipped and reported; all other lines are read.
+- A damaged line in the middle is skipped, and a warning names it; all other lines are read.
 - Verdicts of two policies of one name, or of two versions of one or of its server, do not get into
   one file.
 
@@ -53,7 +53,6 @@ class RecordStore:
     Attributes:
         stored: summaries by identity, the newest of each.
         torn: bytes of an unfinished line that were moved aside when the file was opened.
-        damaged: numbers of the lines that are not JSON; their episodes count as not played.
 
     Raises:
         StoreError: another process writes to the folder, or a line is not a record.
@@ -101,7 +100,7 @@ class RecordStore:
 
     def _read(self, lines: LineFile) -> None:
         self.stored = {identity_key(one): one for one in lines.parse(read_summary)}
-        self.torn, self.damaged = lines.torn, tuple(lines.damaged)
+        self.torn = lines.torn
         self._told = _told(self.stored.values())
 
     def close(self) -> None:
@@ -166,6 +165,7 @@ class StoredRun(Generic[Stored]):
 
     Attributes:
         newest: what is kept of each record, in the order of the file.
+        file: that was read, with the numbers of its damaged lines.
 
     Raises:
         StoreError: there are no records, or a line is not a record of this schema version.
@@ -173,11 +173,12 @@ class StoredRun(Generic[Stored]):
 
     def __init__(self, folder: Path, parse_line: Callable[[bytes, Path, int], Stored]) -> None:
         self._path = folder / RECORDS_FILE
-        lines = LineFile(self._path)
+        self.file = LineFile(self._path)
         kept: dict[RecordKey, tuple[Stored, LinePlace]] = {}
-        for one in lines.parse(parse_line):
-            kept[identity_key(one)] = (one, lines.place)
+        for result in self.file.parse(parse_line):
+            kept[identity_key(result)] = (result, self.file.place)
         if not kept:
+            self.file.refuse_damage()
             raise StoreError(
                 f"There are no records in {folder}; give the --out folder of a `roboirg run`."
             )

@@ -133,7 +133,7 @@ class MachineAgent:
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(mode=0o700)
         _register(folder)
-        self._folder = folder
+        self._folder, self._settings = folder, settings
         self._address: HostAddress | None = None
         if settings is None:
             return
@@ -148,7 +148,9 @@ class MachineAgent:
     def check(self, versions: MachineVersions) -> CheckedMachine:
         """Check that the machine has the same versions as the driver and can load the policies."""
         try:
-            policies = tuple(map(open_policy, versions.policies))
+            policies = tuple(
+                open_policy(policy, settings=self._settings) for policy in versions.policies
+            )
             fault = versions.difference(MachineVersions.expected(policies))
         except RoboIRGError as error:
             fault = one_line(error)

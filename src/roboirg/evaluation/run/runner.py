@@ -24,6 +24,7 @@ from roboirg.evaluation.play.video_writer import check_video_support, without_un
 from roboirg.evaluation.records.film import VIDEO_FOLDER
 from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.record_codec import StoreError, identity_key
+from roboirg.evaluation.records.run_files import refuse_links
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     TORN_FILE,
@@ -81,7 +82,7 @@ def run_plan(
         play: plays one job.
         executor: where jobs are played.
         retry_errors: play jobs again whose newest record is an error.
-        reporter: gets every record, and first any damage in the file.
+        reporter: gets every record, and first a line that was not finished.
 
     Raises:
         StoreError: another run writes to the folder, the records cannot be read or written, or
@@ -93,7 +94,7 @@ def run_plan(
     jobs = plan.jobs()
     films = without_unfinished_videos(folder / VIDEO_FOLDER)
     with _sigterm_interrupts(), RecordStore(folder) as store, films:
-        _report_damage(store, reporter)
+        _report_torn_line(store, reporter)
         _check_versions(plan, store.stored.values(), folder)
         _warn_of_untrained(plan, reporter)
         write_plan(plan, folder)
@@ -140,6 +141,7 @@ def check_run(plan: Plan, folder: Path) -> None:
             language, environment, scene or policy.
     """
     _check_writable(folder)
+    refuse_links(folder)
     _check_versions(plan, read_index(folder).values(), folder)
 
 
@@ -231,16 +233,11 @@ def _check_record_version(record: Record) -> None:
         )
 
 
-def _report_damage(store: RecordStore, reporter: Reporter) -> None:
+def _report_torn_line(store: RecordStore, reporter: Reporter) -> None:
     if store.torn:
         reporter.warn(
             f"An earlier run was stopped while it wrote a record; moved the unfinished line "
             f"({counted(len(store.torn), 'byte')}) to {store.folder / TORN_FILE}."
-        )
-    if store.damaged:
-        reporter.warn(
-            f"{store.path} has {counted(len(store.damaged), 'damaged line')}, first line "
-            f"{store.damaged[0]}; their episodes are played again."
         )
 
 

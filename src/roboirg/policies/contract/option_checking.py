@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -37,7 +38,7 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
         InvalidValueError: an option is missing or has an invalid value.
     """
     try:
-        return kind.model_validate(dict(values))
+        return kind.model_validate(flags_as_words(values))
     except ValidationError as error:
         # What stands there and means nothing explains best what is missing.
         first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
@@ -88,6 +89,16 @@ def content_of(text: str) -> str:
 def _hash(path: Path) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def flags_as_words(given: Any) -> Any:  # noqa: ANN401 - options, or the value of one
+    """Return options with True and False as words, because numbers would take them as 1 and 0.
+
+    Options that are flags take the words.
+    """
+    if isinstance(given, Mapping):
+        return {name: flags_as_words(value) for name, value in given.items()}
+    return str(given) if isinstance(given, bool | np.bool_) else given
 
 
 def plain_complaint(message: str) -> str:

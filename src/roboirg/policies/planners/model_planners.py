@@ -19,10 +19,11 @@ from roboirg.policies.planners.vlm_planner import (
     PlannerOptions,
     VLMPlanner,
 )
+from roboirg.policies.vlm.goal_schema import object_schema
 from roboirg.policies.vlm.model_content import ChatTurn, Part
 from roboirg.policies.vlm.models import ModelQuery
-from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
 from roboirg.util.media import VIDEO_RATE, Clip, Picture, Pixels, contact_sheets, evenly_spaced
+from roboirg.util.reply_reading import UnparsableReplyError, json_object, text_of, whole_number
 
 TEXT: Mapping[str, Any] = {"type": "string"}
 """Schema of a field with words."""
@@ -122,12 +123,12 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
     def query(self, observation: Observation) -> ModelQuery:
         """Add a turn with the frames since the last one."""
         self._frames = self._frames or [front_picture(observation)]
-        schema = _schema(description=TEXT, subgoal=TEXT)
+        fields = {"description": TEXT, "subgoal": TEXT}
         if not self._turns:
-            schema = _schema(subgoal_sequence=_list_of(TEXT), subgoal=TEXT)
+            fields = {"subgoal_sequence": _list_of(TEXT), "subgoal": TEXT}
         self._turn = ChatTurn("user", tuple(self._parts("next" if self._turns else "first")))
         system = self.fill("system", **self.forms())
-        return ModelQuery(system, (*self._turns, self._turn), schema)
+        return ModelQuery(system, (*self._turns, self._turn), object_schema(fields))
 
     def take(self, text: str) -> str:
         """Return the subgoal, the last one if all is done; keep the turn and its reply."""
@@ -205,8 +206,8 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
     def query(self, observation: Observation) -> ModelQuery:  # noqa: ARG002
         """Show the demonstration, the task, the key frames and the recent frames."""
         position = {"type": "integer", "enum": list(range(1, len(self._recent) + 1))}
-        schema = _schema(current_subtask=TEXT, keyframe_positions=_list_of(position))
-        return self.single(self._parts(), schema)
+        fields = {"current_subtask": TEXT, "keyframe_positions": _list_of(position)}
+        return self.single(self._parts(), object_schema(fields))
 
     def take(self, text: str) -> str:
         """Return the subgoal; add the chosen frames, which are counted from 1."""
@@ -217,10 +218,15 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
             raise UnparsableReplyError(
                 "The field 'keyframe_positions' has to be a list of numbers."
             )
-        if any(type(one) is not int or not 1 <= one <= count for one in positions):
-            raise UnparsableReplyError(f"Positions of frames are whole numbers from 1 to {count}.")
         steps = tuple(self._recent)
-        frames = self.frames | {steps[one - 1]: self._recent[steps[one - 1]] for one in positions}
+        frames = dict(self.frames)
+        for position in map(whole_number, positions):
+            if position is None or not 1 <= position <= count:
+                raise UnparsableReplyError(
+                    f"Positions of frames are whole numbers from 1 to {count}."
+                )
+            step = steps[position - 1]
+            frames[step] = self._recent[step]
         kept = merge_keyframes(frames, self.options.near)[-(self.options.most or len(frames)) :]
         self.frames = {step: frames[step] for step in kept}
         return subgoal
@@ -273,7 +279,7 @@ class StatelessPlanner(VLMPlanner[StatelessOptions]):
 
     def take(self, text: str) -> str:
         """Return the subgoal in the last line of the reply; the policy reports what comes of it."""
-        lines = [line for line in text.splitlines() if line.strip()]
+        lines = [line for line in text.splitlines() if normalize_subgoal(line)]
         subgoal = parse_points(lines[-1] if lines else "")
         return FINISHED if self.finishes(subgoal) else subgoal
 
@@ -306,16 +312,6 @@ def _sheets(frames: Pixels, most: int, every: int) -> Iterator[Picture]:
 
 def _list_of(item: Mapping[str, Any]) -> dict[str, Any]:
     return {"type": "array", "items": item}
-
-
-def _schema(**fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the JSON schema of an object with these fields."""
-    return {
-        "type": "object",
-        "properties": fields,
-        "required": list(fields),
-        "additionalProperties": False,
-    }
 
 
 def merge_keyframes(steps: Iterable[int], near: int = MAX_GAP) -> tuple[int, ...]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
-from roboirg.util.json_reply import UnparsableReplyError
+from roboirg.util.reply_reading import UnparsableReplyError, answer_of
 
 PICTURE_SIZE = 256
 """Rows and columns of the front picture."""
@@ -19,7 +19,6 @@ SCALE = 1000
 _POINT = re.compile(
     r"(?:<\|box_start\|>)?\(\s*(\d+)\s*,\s*(\d+)\s*\)(?:<\|box_end\|>)?|<\s*(\d+)\s*,\s*(\d+)\s*>"
 )
-_END = re.compile(r"<\|(?:im_end|endoftext)\|>\s*$")
 _FINISHED = re.compile(r"\b(?:complete|completed|finished|done)\b")
 
 
@@ -52,11 +51,11 @@ def parse_points(text: str) -> str:
 
 
 def normalize_subgoal(text: str) -> str:
-    """Return a model's subgoal in one line, without quotes, full stop and end token.
+    """Return a model's subgoal in one line, without thoughts, quotes, full stop and end token.
 
     It is in lower case, like all text that the policies were trained on.
     """
-    return " ".join(_END.sub("", text).split()).lower().strip("\"'`. ")
+    return " ".join(answer_of(text).split()).lower().strip("\"'`. ")
 
 
 def says_finished(subgoal: str) -> bool:

@@ -20,8 +20,8 @@ from roboirg.policies.vlm.models import ModelOptions, ModelQuery
 from roboirg.policies.vlm.models.model import config_version
 from roboirg.policies.vlm.prompt_files import SHARED, load_prompts
 from roboirg.policies.vlm.vlm_query import VLMQuery
-from roboirg.util.json_reply import UnparsableReplyError
 from roboirg.util.media import Clip, Pixels
+from roboirg.util.reply_reading import UnparsableReplyError
 
 FINISHED = ""
 """Stands for the answer that the task is complete."""

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field
 
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.handed_keys import remember_key
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.policies.contract.option_checking import NOT_COMPARED, Seconds
 from roboirg.policies.contract.policy_urls import UrlOptions
@@ -86,6 +87,7 @@ class RemoteOptions(UrlOptions):
             raise InvalidValueError(
                 f"The environment variable {self.api_key_env} (option api_key_env) holds no key."
             )
+        remember_key(key)
         return {"Authorization": f"Api-Key {key}"}
 
 
@@ -99,11 +101,6 @@ def read_endpoints(url: PolicyRef) -> tuple[Endpoint, ...]:
 
 
 def _endpoint(url: PolicyRef, text: str) -> Endpoint:
-    if "@" in text:
-        raise InvalidValueError(
-            f"A URL of {url.kind}:// cannot hold a key or password; put it into an environment "
-            "variable and name that with api_key_env=NAME."
-        )
     try:
         parts = urlsplit(f"//{text}")
         host, port = parts.hostname, parts.port

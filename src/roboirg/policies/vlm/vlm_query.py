@@ -10,12 +10,14 @@ from dataclasses import dataclass, field
 from string import Template
 from typing import TypeVar
 
-from roboirg.core.errors import ModelBusyError, PolicyConnectionError
+from roboirg.core.errors import ModelBusyError, PolicyConnectionError, PolicyReplyError
+from roboirg.core.plain_text import clip_text
 from roboirg.core.waiting import waiting
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, ModelReply, make_model
+from roboirg.policies.vlm.models.model import MOST_TOKENS
 from roboirg.policies.vlm.models.reply_store import ReplyStore, current_store, digest
-from roboirg.util.json_reply import UnparsableReplyError
+from roboirg.util.reply_reading import UnparsableReplyError, answer_of
 
 Value = TypeVar("Value")
 
@@ -24,6 +26,7 @@ SILENCE = "(no answer)"
 TRIES = 2
 FIRST_PAUSE_S = 1.0
 LONGEST_PAUSE_S = 60.0
+MAX_COUNT_LENGTH = 20
 ALWAYS = ("calls", "input_tokens", "output_tokens", "unparsed", "cost_usd")
 """Counts that stand in records even if they are 0; the cost only if prices are known."""
 
@@ -48,20 +51,21 @@ class VLMQuery:
         self.start()
 
     def ask(self, query: ModelQuery, parse: Callable[[str], Value]) -> Value | None:
-        """Return the parsed reply; None if `parse` rejects two replies.
+        """Return the parsed answer of the reply; None if `parse` rejects two.
 
         Raises:
             PolicyConnectionError: the service cannot be reached or is overloaded.
             PolicyTimeoutError: there was no reply in time.
-            PolicyReplyError: the service replied with an error or with something else.
+            PolicyReplyError: the service replied with an error or with something else, or reports
+                tokens that cannot be.
             BudgetError: the run has spent what it may.
         """
         for _ in range(TRIES):
-            reply = self._request(query)
+            answer = answer_of(self._request(query).text)
             try:
-                return parse(reply.text)
+                return parse(answer)
             except UnparsableReplyError as error:
-                rejected = ChatTurn("model", (reply.text or SILENCE,))
+                rejected = ChatTurn("model", (answer or SILENCE,))
                 retry = ChatTurn("user", (self.again.substitute(why=str(error)),))
                 query = query._replace(turns=(*query.turns, rejected, retry))
         self._counts["unparsed"] += 1
@@ -75,15 +79,16 @@ class VLMQuery:
     def usage(self) -> dict[str, float]:
         """Return calls, tokens and queries without a usable reply; the cost if prices are known.
 
+        Tokens and cost are NaN if the service did not report those of every reply.
         What was ``stored`` by an earlier try cost nothing again; ``anew`` is what was stored with
         something else sent, as by another machine; ``answered_s`` the time that its answers took,
         and ``waited_s`` that in queues and while it was busy.
         """
-        found = {
-            name: round(count, 3) if name.endswith("_s") else count
-            for name, count in self._counts.items()
-        }
-        return {name: count for name, count in found.items() if count or name in ALWAYS}
+        usage = {}
+        for name, count in self._counts.items():
+            if count or name in ALWAYS:
+                usage[name] = round(count, 3) if name.endswith("_s") else count
+        return usage
 
     @contextlib.contextmanager
     def _timed(self, name: str) -> Iterator[None]:
@@ -118,6 +123,16 @@ class VLMQuery:
         store.calls += 1
         return reply
 
+    def _check_tokens(self, reply: ModelReply) -> None:
+        """Raise an error if a count of tokens cannot be true."""
+        for count in (reply.input_tokens, reply.output_tokens):
+            if count < 0 or count > MOST_TOKENS:
+                shown = clip_text(str(count), MAX_COUNT_LENGTH)
+                raise PolicyReplyError(
+                    f"Model {self._service} reports {shown} tokens; there can be 0 to "
+                    f"{MOST_TOKENS:,}."
+                )
+
     def _send(self, query: ModelQuery, store: ReplyStore | None) -> ModelReply:
         """Send a query, again while the service is busy or, a few times, cannot be reached."""
         model = self._model = self._model or self.connect(self.options)
@@ -129,7 +144,9 @@ class VLMQuery:
                     store.wait_for_turn(self._service, self.options.requests_per_minute)
             try:
                 with self._timed("answered_s"):
-                    return model.answer(query)
+                    reply = model.answer(query)
+                self._check_tokens(reply)
+                return reply
             except PolicyConnectionError as error:
                 is_busy = isinstance(error, ModelBusyError)
                 unreachable += not is_busy

@@ -7,8 +7,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from roboirg.core.errors import InvalidValueError
 from roboirg.core.extras import extra_needed
+from roboirg.util.atomic_write import replacing
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -100,13 +100,13 @@ def save(
             if figure is None:
                 return ()
             _fix_layout(figure)
-            try:
-                folder.mkdir(parents=True, exist_ok=True)
-                for one in own:
-                    paths.append(folder / f"{stem}.{one}")
-                    figure.savefig(paths[-1], dpi=DOTS_PER_INCH, metadata=_METADATA[one])
-            except OSError as error:
-                raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
+            for ending in own:
+                path = folder / f"{stem}.{ending}"
+                with replacing(path) as part:
+                    figure.savefig(
+                        part, format=ending, dpi=DOTS_PER_INCH, metadata=_METADATA[ending]
+                    )
+                paths.append(path)
     return tuple(paths)
 
 

@@ -32,7 +32,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
-SIZE_NOTE = "n: episodes per task and setting, × policy seeds if there are several."
+SIZE_NOTE = (
+    "n: episodes per task and setting, × policy seeds if there are several; where no band is "
+    "drawn, too few episodes."
+)
 PUBLISHED_NOTE = "published: the same tasks, the paper's instructions and simulator."
 WORDS: Mapping[RateTable, tuple[str, str, str]] = {
     "main": ("success", "success with explicit instructions", "with implicit ones"),

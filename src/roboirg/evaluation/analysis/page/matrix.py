@@ -14,9 +14,9 @@ from roboirg.evaluation.analysis.results.frame import suite, task_order
 from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.intervals import TOO_FEW
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
-from roboirg.evaluation.analysis.stats.rates import p_text, points, whole_percent
+from roboirg.evaluation.analysis.stats.rates import interval_note, p_text, points, whole_percent
 
 
 def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
@@ -111,7 +111,9 @@ def notes(one: Measured[ScopeKey], subject: str) -> list[str]:
             f"{whole_percent(one.rate)} % success{mean}: {counts.successes} of "
             f"{counted(counts.trials, 'trial')}, {counted(counts.episodes, 'episode')}"
         )
-        if one.interval is not None:
+        if one.interval is None:
+            lines.append(TOO_FEW)
+        else:
             low, high = map(whole_percent, one.interval)
             lines.append(f"95 % interval {low} to {high} %")
     lines += _gap_notes(one)
@@ -127,10 +129,10 @@ def _gap_notes(one: Measured[ScopeKey]) -> list[str]:
     if one.gap is not None:
         gap = f"{points(one.gap.value)} points to explicit"
         if one.gap.retention is not None:
-            tested = "not tested" if one.p_holm is None else f"corrected {p_text(one.p_holm)}"
+            tested = "not tested" if one.p_holm is None else f"{p_text(one.p_holm)} (Holm)"
             lines.append(
                 f"{gap} on the same {counted(one.gap.episodes, 'episode')}"
-                f"{_ends(one.gap.interval)}, {tested}"
+                f"{interval_note(one.gap.interval)}, {tested}"
             )
         elif one.gap.value:
             lines.append(f"{gap}, which has no success")
@@ -139,10 +141,6 @@ def _gap_notes(one: Measured[ScopeKey]) -> list[str]:
     if one.second_gap is not None:
         lines.append(
             f"{points(one.second_gap.value)} points to the resolved form"
-            f"{_ends(one.second_gap.interval)}"
+            f"{interval_note(one.second_gap.interval)}"
         )
     return lines
-
-
-def _ends(interval: Interval | None) -> str:
-    return "" if interval is None else f" ({points(interval.low)} to {points(interval.high)})"

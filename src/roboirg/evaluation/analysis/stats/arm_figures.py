@@ -109,10 +109,9 @@ def _with_outcome(one: Summary, *, is_success: bool) -> Summary:
     return msgspec.structs.replace(one, outcome="success" if is_success else "failure")
 
 
-def _against(*others: str) -> Callable[[Arms], Sides | None]:
+def _against(other: str) -> Callable[[Arms], Sides | None]:
     def sides(arms: Arms) -> Sides | None:
-        other = next((arms[name] for name in others if name in arms), None)
-        return None if other is None or TOLD not in arms else ([arms[TOLD]], [other])
+        return ([arms[TOLD]], [arms[other]]) if TOLD in arms and other in arms else None
 
     return sides
 
@@ -140,7 +139,8 @@ def _paraphrases(arms: Arms) -> Sides | None:
 
 CONTRASTS = (
     ArmContrast(LANGUAGE_USE, "each reached when stated", "same pursued", _language_use),
-    ArmContrast(WORDS_WORTH, TOLD, SILENT, _against(SILENT, SILENT_EMPTY)),
+    ArmContrast(WORDS_WORTH, TOLD, SILENT, _against(SILENT)),
+    ArmContrast(WORDS_WORTH, TOLD, SILENT_EMPTY, _against(SILENT_EMPTY)),
     ArmContrast(ORDERS_WORTH, TOLD, SCRAMBLED, _against(SCRAMBLED)),
     ArmContrast("paraphrases", "all", "mean", _paraphrases),
     ArmContrast("repeat", TOLD, AGAIN, _against(AGAIN)),

@@ -47,11 +47,6 @@ class Counts(NamedTuple):
     missing: int = 0
 
     @property
-    def rate(self) -> Fraction | None:
-        """Successes by trials; None without a verdict."""
-        return Fraction(self.successes, self.trials) if self.trials else None
-
-    @property
     def is_complete(self) -> bool:
         """Whether every planned trial has a verdict."""
         return self.trials > 0 and not self.errors and not self.missing
@@ -89,7 +84,8 @@ class Cell:
     @property
     def rate(self) -> Fraction | None:
         """Success rate, the mean over policy seeds; None without a verdict."""
-        return self.counts.rate
+        counts = self.counts
+        return Fraction(counts.successes, counts.trials) if counts.trials else None
 
     def by_episode(self) -> dict[int, dict[int, bool]]:
         """Return the verdicts of each episode by policy seed."""

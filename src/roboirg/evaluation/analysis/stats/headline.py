@@ -32,7 +32,8 @@ class Headline:
     Attributes:
         settings: over which the gap is the mean; a setting's is the mean over its tasks.
         gap: to explicit on the same episodes, -1 to 1.
-        interval: from the paired bootstrap over episodes, which all settings share.
+        interval: from the paired bootstrap over episodes, which all settings share; None with too
+            few episodes.
         episodes: number of episodes.
         is_complete: whether every planned trial of these cells has a verdict.
     """
@@ -77,7 +78,7 @@ def headline_notes(cells: Cells, names: Mapping[PolicyRun, str]) -> Iterator[str
                 f"{name} has no headline number: the floors are those of our own words of each "
                 f"split, and it was played in {policy_run.conditions.text('wordings')}."
             )
-        elif found.interval is None or not np.isfinite(found.interval).all():
+        elif found.interval is None:
             yield (
                 f"{name} has no headline number: {counted(found.episodes, 'episode')} cannot give "
                 "it an interval; play more."

@@ -12,9 +12,8 @@ from roboirg.evaluation.analysis.stats.cells import Key
 from roboirg.evaluation.analysis.stats.rates import whole_percent
 
 HeardCounts = Counter[str]
-"""Numbers of ``episodes`` (those that ended in an error, too); of them ``cut`` and perhaps cut
-(``unknown``); of ``trials`` with a verdict and their ``successes``; and of those that were heard
-whole: ``heard trials``, ``heard successes``."""
+"""Numbers of ``episodes`` that were played, those that ended in an error, too; and of them by what
+became of the prompt: ``heard`` whole, ``cut``, or perhaps cut (``unknown``)."""
 
 
 def count_heard(frame: Frame, by: Sequence[str]) -> Mapping[Key, HeardCounts]:
@@ -29,12 +28,7 @@ def count_heard(frame: Frame, by: Sequence[str]) -> Mapping[Key, HeardCounts]:
             declared.add(run)
         counts = found.setdefault((run, *key), Counter())
         counts.update(("episodes", prompt))
-        if outcome != "error":
-            heard = "heard " * (prompt == "heard")
-            for name in dict.fromkeys(("", heard)):
-                counts[f"{name}trials"] += 1
-                counts[f"{name}successes"] += outcome == "success"
-    return {key: one for key, one in found.items() if key[0] in declared}
+    return {key: counts for key, counts in found.items() if key[0] in declared}
 
 
 def heard_notes(frame: Frame, names: Mapping[PolicyRun, str]) -> list[str]:
@@ -43,16 +37,21 @@ def heard_notes(frame: Frame, names: Mapping[PolicyRun, str]) -> list[str]:
     found = {run: one for (run,), one in counts.items() if one["cut"] or one["unknown"]}
     return [
         f"{name} did not read every instruction to its end (its prompt is limited): "
-        f"{cut_text(found[run])} % of its prompts were cut; tables --which heard has the rates."
+        f"{cut_text([found[run]])} % of its prompts were cut; tables --which heard has the rates."
         for run, name in names.items()
         if run in found
     ]
 
 
-def cut_text(one: HeardCounts) -> str:
-    """Return the share of episodes with a cut prompt in percent, between bounds if need be."""
-    low, high = (
-        whole_percent(Fraction(count, one["episodes"]))
-        for count in (one["cut"], one["cut"] + one["unknown"])
-    )
+def cut_text(tasks: Sequence[HeardCounts]) -> str:
+    """Return the share of episodes with a cut prompt in percent, between bounds if need be.
+
+    Of several tasks it is the mean of their shares.
+    """
+    least = most = Fraction(0)
+    for counts in tasks:
+        cut = Fraction(counts["cut"], counts["episodes"])
+        least += cut
+        most += cut + Fraction(counts["unknown"], counts["episodes"])
+    low, high = whole_percent(least / len(tasks)), whole_percent(most / len(tasks))
     return low if low == high else f"{low}–{high}"

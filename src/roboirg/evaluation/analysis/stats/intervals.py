@@ -23,6 +23,10 @@ SEED = 20_240_607
 """Of all bootstraps that are shown; the same records give the same numbers."""
 DRAWS = 4000
 """Bootstrap resamples; the ends of an interval then vary by about 3 % of its length."""
+TOO_FEW = "too few episodes"
+"""Printed in place of an interval: it takes more episodes than tasks."""
+_ROUNDING = 1e-9
+"""Ends of an interval that are closer are equal."""
 
 Rows = NDArray[np.int64]
 """A row for each episode with k pairs of successes and trials, shape (episodes, 2 k)."""
@@ -33,6 +37,11 @@ class Interval(NamedTuple):
 
     low: float
     high: float
+
+    @property
+    def has_width(self) -> bool:
+        """Whether the ends differ by more than rounding."""
+        return self.high - self.low > _ROUNDING
 
 
 def wilson_interval(successes: int, trials: int) -> Interval:
@@ -93,11 +102,19 @@ def percentile_interval(values: NDArray[np.float64], sizes: Sequence[int]) -> In
 def resampled_interval(
     values: NDArray[np.float64], sizes: Sequence[int], least: float = 0.0
 ) -> Interval | None:
-    """Return `percentile_interval`, or `without_spread` if all resamples have the same value."""
+    """Return `percentile_interval`, or `without_spread` if all resamples have the same value.
+
+    None with too few episodes: also if so many resamples have no trial that an end is not bounded,
+    or if the others all have the same value.
+    """
     interval = percentile_interval(values, sizes)
-    if interval is not None and np.ptp(values) == 0:
-        return without_spread(float(values[0]), sum(sizes), least)
-    return interval
+    if interval is None or not np.isfinite(interval).all():
+        return None
+    if interval.has_width:
+        return interval
+    if np.isnan(values).any():
+        return None
+    return without_spread(interval.low, sum(sizes), least)
 
 
 def without_spread(value: float, episodes: int, least: float = 0.0) -> Interval:

@@ -127,25 +127,42 @@ class Gap:
     overlap: Overlap
 
 
+class PairedRates(NamedTuple):
+    """Success rates of two cells on the same episodes, as means over tasks, 0 to 1."""
+
+    first: float
+    second: float
+
+
+def paired_rates(tasks: Sequence[Pairs]) -> PairedRates | None:
+    """Return the rates over the tasks that have pairs; None if no task has any."""
+    sums = [pairs.rows.sum(axis=0) for pairs in tasks if len(pairs.rows)]
+    if not sums:
+        return None
+    counts = np.array(sums, dtype=np.float64)
+    successes, trials = counts[:, 0::2], counts[:, 1::2]
+    return PairedRates._make(np.mean(successes / trials, axis=0).tolist())
+
+
 def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = DRAWS) -> Gap | None:
     """Measure the gap over the tasks that have pairs; None if no task has any."""
     paired = [pairs for pairs in tasks if len(pairs.rows)]
-    if not paired:
+    rates = paired_rates(paired)
+    if rates is None:
         return None
+    first, second = rates
     rows = [pairs.rows for pairs in paired]
     sizes = [len(each) for each in rows]
-    sums = np.array([each.sum(axis=0) for each in rows], dtype=np.float64)
-    first, second = np.mean(sums[:, 0::2] / sums[:, 1::2], axis=0)
     drawn = resampled_rates(rows, rng, draws)
     return Gap(
-        value=float(first - second),
+        value=first - second,
         interval=resampled_interval(drawn[:, 0] - drawn[:, 1], sizes, least=-1.0),
         p_value=sign_flip_test(np.concatenate([pairs.differences for pairs in paired])),
-        retention=float(first / second) if second else None,
-        retention_interval=_retention_interval(drawn, sizes) if second else None,
+        retention=first / second if second else None,
+        retention_interval=_retention_interval(drawn, sizes, rates) if second else None,
         tasks=len(paired),
         episodes=sum(sizes),
-        trials=int(sums[:, 1::2].sum()),
+        trials=int(np.concatenate(rows)[:, 1::2].sum()),
         overlap=pooled_overlap(paired),
     )
 
@@ -179,15 +196,17 @@ def sign_flip_test(differences: NDArray[np.int64]) -> float:
     return min(1.0, float(chances[as_far].sum()))
 
 
-def _retention_interval(drawn: NDArray[np.float64], sizes: Sequence[int]) -> Interval | None:
+def _retention_interval(
+    drawn: NDArray[np.float64], sizes: Sequence[int], rates: PairedRates
+) -> Interval | None:
     with np.errstate(divide="ignore", invalid="ignore"):
         values = drawn[:, 0] / drawn[:, 1]
     interval = percentile_interval(values, sizes)
     if interval is None:
         return None
-    if np.ptp(drawn, axis=0).any():
+    if interval.has_width:
         return Interval(max(0.0, interval.low), interval.high)
-    first, second = (without_spread(rate, sum(sizes)) for rate in drawn[0].tolist())
+    first, second = (without_spread(rate, sum(sizes)) for rate in rates)
     return Interval(first.low / second.high, first.high / second.low)
 
 

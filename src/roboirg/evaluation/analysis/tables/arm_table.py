@@ -19,7 +19,7 @@ from roboirg.evaluation.analysis.stats.arm_figures import (
 )
 from roboirg.evaluation.analysis.stats.cells import ByTask
 from roboirg.evaluation.analysis.stats.chance import silent_chance
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.intervals import TOO_FEW, Interval
 from roboirg.evaluation.analysis.stats.measure import mean_rate, measure_groups
 from roboirg.evaluation.analysis.stats.rates import (
     NOT_APPLICABLE,
@@ -34,7 +34,8 @@ from roboirg.evaluation.analysis.tables.table import Row, Table, named_columns
 _NOTE = (
     "Each figure compares two rates on the same scenes, as means over tasks, in percent with 95 "
     f"% intervals. {MEANING} Chance is the success of pursuing a random goal of the scene without "
-    "words. Differences are in points; p-values are corrected over all rows of the policy. "
+    "words. Differences are in points; p-values are after Holm's correction over all rows of the "
+    "policy. "
     "Scenes without an arm are left out of its figures."
 )
 
@@ -86,7 +87,7 @@ def language_use_sentences(first: Frame, second: Frame, names: tuple[str, str]) 
             yield (
                 f"Language use, {options_label(one.key[0])}: {names[0]} less {names[1]} "
                 f"{points(gap.value, 1)} points{interval_note(gap.interval)}, "
-                f"{p_text(one.p_holm)}, {gap.episodes} scenes."
+                f"{p_text(one.p_holm)} after Holm's correction, {gap.episodes} scenes."
             )
 
 
@@ -106,5 +107,7 @@ def _words(one: ArmFigure) -> Sequence[str]:
 
 
 def _rate_text(cells: ByTask, interval: Interval | None) -> str:
-    ends = "" if interval is None else f" ({100 * interval.low:.1f} to {100 * interval.high:.1f})"
-    return f"{100 * float(mean_rate(cells) or 0):.1f}{ends}"
+    ends = TOO_FEW
+    if interval is not None:
+        ends = f"{100 * interval.low:.1f} to {100 * interval.high:.1f}"
+    return f"{100 * float(mean_rate(cells) or 0):.1f} ({ends})"

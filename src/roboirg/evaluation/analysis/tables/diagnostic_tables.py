@@ -20,7 +20,7 @@ from roboirg.evaluation.analysis.results.option_labels import (
 )
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, break_down
-from roboirg.evaluation.analysis.stats.cells import Counts, Key
+from roboirg.evaluation.analysis.stats.cells import NOTHING, Key, cells_of
 from roboirg.evaluation.analysis.stats.comparison_text import incomplete_note
 from roboirg.evaluation.analysis.stats.failure_rates import (
     Ends,
@@ -36,6 +36,7 @@ from roboirg.evaluation.analysis.stats.measure import (
     ALL_TASKS,
     Measured,
     ScopeKey,
+    by_scope,
     with_holm,
 )
 from roboirg.evaluation.analysis.stats.rates import (
@@ -70,7 +71,7 @@ CELL = ("run", "options", "scope")
 _FORMS_NOTE = (
     "The same episodes in the implicit form and in the resolved one, which names the goal: trials "
     "solved in both, in one alone, in neither. The difference, the mean over tasks, and its "
-    "interval are in points; p-values are corrected over all rows of the policy."
+    "interval are in points; p-values are after Holm's correction over all rows of the policy."
 )
 _KINDS_NOTE = " ".join(
     f"{kind.capitalize()}: {means}." for kind, means in failures.FAILURE_KINDS.items()
@@ -89,14 +90,15 @@ _SHARES_NOTE = (
 )
 _BREAKDOWN_NOTE = (
     "Success in percent, the gap to explicit on the same episodes in points, its interval, and "
-    "its p-value corrected over all rows of the policy. Rates are means over the tasks that "
-    "have such instructions, so two rows may differ in their tasks, too."
+    "its p-value after Holm's correction over all rows of the policy. Rates are means over the "
+    "tasks that have such instructions, so two rows may differ in their tasks, too."
 )
 _HEARD_NOTE = (
     "Cut: the policy's model reads fewer tokens than the prompt needs, so the end of the prompt, "
     "where the command stands, does not arrive; between two bounds if the tokenizer is not "
     "known. Success in percent over all episodes with a verdict, and over those that were heard "
-    "whole. Policies that declare no limit (prompt_tokens) are not in this table."
+    "whole. Of all tasks, shares and rates are means over the tasks that have such episodes. "
+    "Policies that declare no limit (prompt_tokens) are not in this table."
 )
 
 
@@ -253,17 +255,26 @@ def make_heard_table(data: RunData) -> Table:
     Raises:
         InvalidValueError: no policy declares how many tokens it reads.
     """
-    found = count_heard(_with_scope(data.frame), CELL[1:])
-    if not found:
+    counts = count_heard(data.frame, ("options", "task"))
+    if not counts:
         raise InvalidValueError(
             "No policy of the runs declares how many tokens it reads; prompt_tokens=N does."
         )
+    scopes: dict[Key, list[HeardCounts]] = {}
+    for (run, options, task), own in counts.items():
+        for scope in (task, ALL_TASKS):
+            scopes.setdefault((run, options, scope), []).append(own)
+    played = by_scope(data.cells)
+    heard = by_scope(cells_of(data.frame.where(prompt="heard")))
     rows = []
-    for key, group, scope in _in_order(found, data):
-        one = found[key]
-        episodes, heard = str(one["episodes"]), str(one["heard trials"])
-        rates = (_heard_rate(one, ""), heard, _heard_rate(one, "heard "))
-        rows.append(Row(group, scope, (episodes, cut_text(one), *rates)))
+    for key, group, scope in _in_order(scopes, data):
+        run, options, _ = key
+        place = ScopeKey(run, scope, options)
+        whole = Measured(place, played[place])
+        read = Measured(place, heard.get(place, NOTHING))
+        episodes = sum(own["episodes"] for own in scopes[key])
+        cells = (str(episodes), cut_text(scopes[key]), _rate(whole), str(read.counts.trials))
+        rows.append(Row(group, scope, (*cells, _rate(read))))
     return Table(
         key="heard",
         title="Instructions that the policies' models read to the end",
@@ -272,13 +283,6 @@ def make_heard_table(data: RunData) -> Table:
         rows=tuple(rows),
         notes=(_HEARD_NOTE,),
     )
-
-
-def _heard_rate(one: HeardCounts, heard: str) -> Entry:
-    counts = Counts(one[f"{heard}successes"], one[f"{heard}trials"])
-    if counts.rate is None:
-        return Entry(word=NOT_APPLICABLE)
-    return Entry(percent=percent(counts.rate), counts=counts)
 
 
 def _with_scope(frame: Frame) -> Frame:
@@ -331,8 +335,9 @@ def make_breakdown_table(
 
 
 def _rate(one: Measured[Any]) -> Entry:
-    rate = None if one.rate is None else percent(one.rate)
-    return Entry(percent=rate, counts=one.counts, interval=one.interval)
+    if one.rate is None:
+        return Entry(word=NOT_APPLICABLE)
+    return Entry(percent=percent(one.rate), counts=one.counts, interval=one.interval)
 
 
 DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData, Iterable[Record]], Table]] = {

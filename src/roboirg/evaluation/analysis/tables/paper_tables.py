@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -141,31 +142,47 @@ def _floor_rows(
     """Yield a floor of each setting on the episodes that any policy played in it."""
     tasks = table.tasks(cells)
     played = {
-        (row_order(key.options), key.policy_run.language, key.options)
+        _Instructions(key.policy_run.language, key.policy_run.conditions.split, key.options)
         for key, cell in cells.items()
         if key.task in tasks and table.shows(key.options) and cell.verdicts
     }
-    for _, language, options in sorted(played, key=lambda one: one[:2]):
+    several_languages = len({words.language for words in played}) > 1
+    several_splits = len({words.split for words in played}) > 1
+    for words in sorted(played, key=lambda words: (row_order(words.options), *words[:2])):
         entries = {}
         for task in tasks:
-            level = floor_level(floor, _jobs(task, options, language, cells), language)
-            applies = _applies(task, options)
+            level = floor_level(floor, _jobs(task, words, cells), words.language)
+            applies = _applies(task, words.options)
             entries[task] = Entry(None if level is None else percent(level), applies=applies)
         if any(entry.percent is not None for entry in entries.values()):
-            name = floor + f", language {language}" * (len({one for _, one, _ in played}) > 1)
-            yield Row(options.setting, name, with_averages(columns, entries), "chance")
+            name = floor
+            if several_languages:
+                name += f", language {words.language}"
+            if several_splits:
+                name += f", split {words.split}"
+            yield Row(words.options.setting, name, with_averages(columns, entries), "chance")
 
 
-def _jobs(task: str, options: InstructionOptions, language: str, cells: Cells) -> Iterator[Job]:
-    """Yield the episodes with a verdict of a task in a setting, if both are installed."""
-    if task in every_task() and options.setting in all_settings():
-        for key, cell in cells.items():
-            if (key.task, key.options, key.policy_run.language) == (task, options, language):
-                split = key.policy_run.conditions.split
-                for trial in cell.verdicts:
-                    yield Job(
-                        policy="", task=task, split=split, episode=trial.episode, options=options
-                    )
+class _Instructions(NamedTuple):
+    """What instructions are of: a version of the language, a split, and options."""
+
+    language: str
+    split: str
+    options: InstructionOptions
+
+
+def _jobs(task: str, words: _Instructions, cells: Cells) -> Iterator[Job]:
+    """Yield the episodes with a verdict of a task in some words, if both are installed."""
+    if task not in every_task() or words.options.setting not in all_settings():
+        return
+    for key, cell in cells.items():
+        run = key.policy_run
+        if key.task == task and words == (run.language, run.conditions.split, key.options):
+            for trial in cell.verdicts:
+                yield Job(
+                    policy="", task=task, split=words.split, episode=trial.episode,
+                    options=words.options,
+                )  # fmt: skip
 
 
 def _published_row(table: PaperTable, columns: Sequence[Column], row: PublishedRow) -> Row:

@@ -32,7 +32,7 @@ from roboirg.evaluation.analysis.stats.measure import (
     by_scope,
     pair,
 )
-from roboirg.evaluation.analysis.stats.paired_tests import pooled_overlap
+from roboirg.evaluation.analysis.stats.paired_tests import paired_rates
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, points, whole_percent
 from roboirg.evaluation.analysis.tables.table import (
     ERROR_MARK,
@@ -118,19 +118,19 @@ def failure_text(record: Summary) -> str:
 
 
 def gap_text(key: ScopeKey, scopes: Mapping[ScopeKey, ByTask]) -> str:
-    """Return the gap to explicit over paired trials.
+    """Return the gap to explicit on the same episodes, the mean over tasks.
 
     A dash if neither has a success, which says nothing; empty without pairs.
     """
     reference = key._replace(options=reference_of(key.options))
     if key == reference:
         return ""
-    found = pooled_overlap(pair(scopes[key], scopes.get(reference, NOTHING)))
-    if not found.trials:
+    rates = paired_rates(pair(scopes[key], scopes.get(reference, NOTHING)))
+    if rates is None:
         return ""
-    if found.neither == found.trials:
+    if not any(rates):
         return NOT_APPLICABLE
-    return points((found.only_first - found.only_second) / found.trials)
+    return points(rates.first - rates.second)
 
 
 def _make_run_table(
@@ -165,8 +165,7 @@ def _entry(one: Measured[ScopeKey] | None, gap: str, differences: AllDifferences
     counts = one.counts
     shown = ((counts.errors, ERROR_MARK), (counts.missing, MISSING_MARK))
     marks = " ".join(f"{count}{mark}" for count, mark in shown if count)
-    # Pooled over trials: the gaps are over trials too.
-    rate = counts.rate
+    rate = one.rate
     if rate is None:
         return Entry(word=NOT_APPLICABLE, marks=marks)
     return Entry(
@@ -196,5 +195,5 @@ def _sizes(found: Mapping[ScopeKey, Measured[ScopeKey]]) -> str:
     text = f"n = {range_text(single, 'episode')} per cell"
     if len({key.scope for key in found}) > 2:  # noqa: PLR2004 - a task and all of them
         every = [one.counts.trials for key, one in found.items() if key.scope == ALL_TASKS]
-        text += f", {range_text(every, 'episode')} for {ALL_TASKS}"
+        text += f", {range_text(every, 'episode')} for {ALL_TASKS}, the mean over tasks"
     return text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
@@ -32,12 +33,20 @@ _COSTS: Mapping[str, str] = {
     "missed": "misses",
 }
 """What a planner costs: keys of a record's usage, and their headings."""
+_UNKNOWN_IF_ABSENT = ("input_tokens", "output_tokens", "cost_usd")
+"""What a service may not report, so that the records of its replies lack it."""
+
+
+def _usage(record: Record) -> tuple[tuple[str, float], ...]:
+    """Return the usage of a record, with NaN for what is unknown of the models that it asked."""
+    unknown = dict.fromkeys(_UNKNOWN_IF_ABSENT, math.nan) if "calls" in record.usage else {}
+    return tuple({**unknown, **record.usage}.items())
 
 
 _READ: Mapping[str, Callable[[Record], object]] = {
     "verdicts": lambda record: tuple(one.verdict for one in record.subgoals),
     "planner_failure": planner_failure,
-    "usage": lambda record: tuple(record.usage.items()),
+    "usage": _usage,
 }
 
 
@@ -62,7 +71,7 @@ def make_subgoal_table(data: RunData, records: Iterable[Record]) -> Table:
     if not shown:
         raise InvalidValueError("No planner of the runs named a subgoal; their records hold none.")
     failures, costs = (
-        [name for name in names if any(one[name] for one in shown.values())]
+        [name for name in names if any(one[name] > 0 for one in shown.values())]
         for names in (PLANNER_FAILURES, _COSTS)
     )
     meanings = "; ".join(f"{one}: {PLANNER_FAILURES[one]}" for one in failures)
@@ -95,4 +104,6 @@ def _words(counts: Counter[str], failures: Iterable[str], costs: Iterable[str]) 
     for one in SUBGOAL_VERDICTS:
         yield f"{counts[one]} ({100 * counts[one] / max(total, 1):.0f} %)"
     yield from (str(counts[one]) for one in failures)
-    yield from (f"{counts[one] / counts['episodes']:.3g}" for one in costs)
+    for name in costs:
+        mean = counts[name] / counts["episodes"]
+        yield "unknown" if math.isnan(mean) else f"{mean:.3g}"

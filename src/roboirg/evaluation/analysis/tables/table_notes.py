@@ -190,7 +190,11 @@ def _absent_tasks(names: set[str]) -> str:
 
 def _average_notes(columns: Sequence[Column], rows: Sequence[Row]) -> Iterator[str]:
     """Say which changes of averages are over fewer tasks than the reference's own average."""
-    own = [index for index, column in enumerate(columns) if not column.averages]
+    own = [
+        index
+        for index, column in enumerate(columns)
+        if not column.averages and any(row.entries[index].percent is not None for row in rows)
+    ]
     fewer = {row.group: sum(row.entries[index].applies for index in own) for row in rows}
     for group, number in fewer.items():
         if 0 < number < len(own):

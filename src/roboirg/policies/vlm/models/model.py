@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, NamedTuple, Protocol
@@ -11,6 +12,7 @@ from urllib.parse import urlsplit
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from roboirg.core.errors import MissingDependencyError
+from roboirg.core.handed_keys import remember_key
 from roboirg.policies.contract.option_checking import NOT_COMPARED, Seconds
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.util.short_hash import short_hash
@@ -21,6 +23,8 @@ KEY_VARIABLES: Mapping[Provider, str] = {"openai": "OPENAI_API_KEY", "google": "
 """Environment variables with the keys of the providers' own services, by default."""
 NO_KEY = "none"
 """Sent as the key to a server that needs none."""
+MOST_TOKENS = 100_000_000
+"""Of one query or reply: ten times the longest context of a model, ten million tokens."""
 
 
 class ModelOptions(BaseModel):
@@ -46,7 +50,7 @@ class ModelOptions(BaseModel):
         sampling_fps: frames per second at which Google samples a clip; None for its default, 1.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     provider: Provider = "openai"
     model: str = Field(min_length=1)
@@ -78,6 +82,15 @@ class ModelOptions(BaseModel):
             )
         return url
 
+    def model_post_init(self, _context: object) -> None:
+        """Remember the key, if there is one, before stored replies are read."""
+        remember_key(os.environ.get(self.key_variable or ""))
+
+    @property
+    def key_variable(self) -> str | None:
+        """The environment variable with the key; None if none is needed."""
+        return self.api_key_env or (None if self.base_url else KEY_VARIABLES.get(self.provider))
+
     def key(self) -> str:
         """Return the key, or `NO_KEY` if none is needed.
 
@@ -85,7 +98,7 @@ class ModelOptions(BaseModel):
             MissingDependencyError: the environment variable is not set; a run stops, as it could
                 play no episode.
         """
-        variable = self.api_key_env or (None if self.base_url else KEY_VARIABLES[self.provider])
+        variable = self.key_variable
         if variable is None:
             return NO_KEY
         key = os.environ.get(variable, "").strip()
@@ -112,9 +125,9 @@ class ModelOptions(BaseModel):
         return (self.input_price, self.output_price) != (None, None)
 
     def cost_usd(self, reply: ModelReply) -> float:
-        """Return what a reply costs; 0 without prices."""
+        """Return what a reply costs: 0 without prices, NaN if tokens with a price are unknown."""
         paid = ((reply.input_tokens, self.input_price), (reply.output_tokens, self.output_price))
-        return sum(tokens * (price or 0.0) for tokens, price in paid) / 1_000_000
+        return sum(tokens * price for tokens, price in paid if price) / 1_000_000
 
 
 class ModelQuery(NamedTuple):
@@ -132,11 +145,17 @@ class ModelQuery(NamedTuple):
 
 
 class ModelReply(NamedTuple):
-    """A model's reply, possibly empty, and its tokens."""
+    """A model's reply.
+
+    Attributes:
+        text: what it said, possibly nothing; thoughts may be in it as `with_thoughts` marks them.
+        input_tokens: of the query; NaN if it is unknown.
+        output_tokens: of the reply and its thoughts; NaN if it is unknown.
+    """
 
     text: str
-    input_tokens: int = 0
-    output_tokens: int = 0
+    input_tokens: float = math.nan
+    output_tokens: float = math.nan
 
 
 class Model(Protocol):

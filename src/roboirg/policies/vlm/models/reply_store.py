@@ -20,8 +20,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.core.errors import BudgetError
+from roboirg.core.handed_keys import without_keys
+from roboirg.core.plain_text import counted
 from roboirg.core.waiting import waiting
-from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
+from roboirg.policies.vlm.models.model import MOST_TOKENS, ModelOptions, ModelQuery, ModelReply
 from roboirg.util.media import Clip, Picture
 
 REPLIES_FILE = "models.sqlite"
@@ -34,6 +36,18 @@ CREATE TABLE IF NOT EXISTS replies (
     PRIMARY KEY (episode, call, sent)
 ) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS services (name TEXT PRIMARY KEY, next_at REAL) WITHOUT ROWID;
+"""
+
+# Older stores may hold counts and costs that cannot be, which are unknown.
+_REPLIES = """
+SELECT
+    sent, text,
+    CASE WHEN input_tokens BETWEEN 0 AND :most THEN input_tokens ELSE 'nan' END,
+    CASE WHEN output_tokens BETWEEN 0 AND :most THEN output_tokens ELSE 'nan' END
+FROM replies WHERE episode = :episode AND call = :call
+"""
+_SPENT = """
+SELECT total(cost_usd), count(*) - count(CASE WHEN cost_usd >= 0 THEN 1 END) FROM replies
 """
 
 _POSTPONE = """
@@ -91,19 +105,23 @@ class ReplyStore:
     def replies(self) -> dict[str, ModelReply]:
         """Return the stored replies to the next call, by the digest of what was sent.
 
-        There are none in a run that passes them over.
+        There are none in a run that passes them over. Earlier versions stored keys in them.
         """
         if self.settings.anew:
             return {}
         rows = self._database.execute(
-            "SELECT sent, text, input_tokens, output_tokens FROM replies "
-            "WHERE episode = ? AND call = ?",
-            (self.episode, self.calls),
+            _REPLIES, {"episode": self.episode, "call": self.calls, "most": MOST_TOKENS}
         )
-        return {sent: ModelReply(*reply) for sent, *reply in rows}
+        replies: dict[str, ModelReply] = {}
+        for sent, text, *tokens in rows:
+            replies[sent] = ModelReply(without_keys(text), *map(float, tokens))
+        return replies
 
     def keep(self, sent: str, reply: ModelReply, cost_usd: float) -> None:
-        """Store the reply to the next call; when this returns, it is on disk."""
+        """Store the reply to the next call; when this returns, it is on disk.
+
+        SQLite stores NULL for NaN, which is unknown.
+        """
         self._database.execute(
             "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?, ?, ?, ?)",
             (self.episode, self.calls, sent, *reply, cost_usd),
@@ -113,7 +131,7 @@ class ReplyStore:
         """Raise if the run may not ask a model.
 
         Raises:
-            BudgetError: it has spent what it may, or what the model costs is not known.
+            BudgetError: it has spent what it may, or what the model costs or has cost is unknown.
         """
         most = self.settings.max_cost_usd
         if most is None:
@@ -123,7 +141,13 @@ class ReplyStore:
                 f"--max-cost needs the prices of model {model.model!r}; give input_price and "
                 "output_price, in US dollars per million tokens."
             )
-        spent = float(self._database.execute("SELECT total(cost_usd) FROM replies").fetchone()[0])
+        spent, unknown = self._database.execute(_SPENT).fetchone()
+        if unknown:
+            raise BudgetError(
+                f"--max-cost cannot be kept: what {counted(unknown, 'reply', 'replies')} cost is "
+                f"unknown, as the service of model {model.model!r} did not report the tokens; run "
+                "the same command without --max-cost to go on."
+            )
         if spent >= most:
             raise BudgetError(
                 f"The models have cost {spent:.2f} of at most {most:.2f} US dollars; run the same "
