@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import re
 import typing
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import resources
 from pathlib import Path
 
@@ -16,23 +15,21 @@ from msgspec.structs import replace
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from roboirg.apps.leaderboard.run_verification import verify_run
 from roboirg.core.policy_ref import PolicyRef
-from roboirg.core.versions import POLICY
+from roboirg.core.versions import UNKNOWN_MAKEUP
 from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.mixing import mixtures
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.record_codec import StoreError
-from roboirg.evaluation.records.store import RecordStore, read_results
+from roboirg.evaluation.records.store import RecordStore
 from roboirg.evaluation.run.runner import check_run
 from roboirg.policies import vlm
 from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.builtin.random_policy import RandomPolicy
+from roboirg.policies.by_name import finding, policy_kinds
 from roboirg.policies.by_name.finding import Privileged, make_policy, policy_of, read_policy
-from roboirg.policies.by_name.makeup import makeup_of
 from roboirg.policies.by_name.policy_classes import url_classes
-from roboirg.policies.by_name.policy_kinds import split_spec
 from roboirg.policies.contract.option_checking import NOT_COMPARED
 from roboirg.policies.planners import OF_MODELS, PLANNERS, make_planner
 from roboirg.policies.vlm.vlm_listener import ListenerOptions
@@ -42,12 +39,11 @@ NAME = "random"
 
 
 def named(spec: str) -> PolicyRef:
-    """Return a policy as a plan has it, but for what is made of it; needs no library."""
-    ref = split_spec(NAME, spec)
-    return dataclasses.replace(ref, version="7", makeup=makeup_of(ref))
+    """Return a policy as a plan has it, but of one version whatever it is."""
+    return dataclasses.replace(read_policy(spec, NAME), version="7")
 
 
-@functools.cache
+@pytest.fixture(scope="module")
 def played() -> tuple[Record, Record]:
     first, second, *_ = map(FakePlay(), small_plan(2).jobs())
     return first, second
@@ -59,7 +55,7 @@ def store(folder: Path, *records: Record) -> None:
             opened.append(record)
 
 
-def is_refused(action: typing.Callable[[], object]) -> str:
+def refusal(action: Callable[[], object]) -> str:
     try:
         action()
     except StoreError as error:
@@ -67,35 +63,20 @@ def is_refused(action: typing.Callable[[], object]) -> str:
     return ""
 
 
-class Seen(typing.NamedTuple):
-    """What is said where results of two policies of one name meet; empty if they are one."""
-
-    stored: str
-    resumed: str
-    merged: str
-    labels: str
-    mixed: str
-
-
-def meet(folder: Path, before: PolicyRef, now: PolicyRef) -> Seen:
-    folder = folder / f"{len(list(folder.iterdir()))}"
-    one, two = (
-        replace(record, ref=ref) for record, ref in zip(played(), (before, now), strict=True)
-    )
-    store(folder / "a", one)
-    store(folder / "b", two)
+def meet(folder: Path, played: tuple[Record, Record], before: PolicyRef, now: PolicyRef) -> dict:
+    """Return what is said where results of two policies of one name meet."""
+    first, second = replace(played[0], ref=before), replace(played[1], ref=now)
+    store(folder / "a", first)
+    store(folder / "b", second)
     plan = small_plan(2).model_copy(update={"policies": (now,)})
-    resumed = is_refused(lambda: check_run(plan, folder / "a"))
-    merged = is_refused(lambda: merge_runs([folder / "b", folder / "a"], folder / "out"))
-    stored = is_refused(lambda: store(folder / "a", two))
-    labels = list(make_frame([("a", [one]), ("b", [two])]).names.values())
-    return Seen(
-        stored=stored.replace(str(folder), "."),
-        resumed=resumed.replace(str(folder), "."),
-        merged=merged.replace(str(folder), "."),
-        labels="; ".join(labels) if len(labels) > 1 else "",
-        mixed=" ".join(mixtures([one, two])),
-    )
+    refusals = {
+        "resumed": refusal(lambda: check_run(plan, folder / "a")),
+        "merged": refusal(lambda: merge_runs([folder / "b", folder / "a"], folder / "out")),
+        "stored": refusal(lambda: store(folder / "a", second)),
+    }
+    labels = [*make_frame([("a", [first]), ("b", [second])]).names.values()]
+    said = {name: text.replace(str(folder), ".") for name, text in refusals.items()}
+    return {**said, "labels": labels, "mixed": [*mixtures([first, second])]}
 
 
 OPENPI = "openpi://gpu:8000"
@@ -111,21 +92,26 @@ OTHERS = [
     ("planner:listener", "planner:forgetful"),
     ("planner:listener", f"planner:listener?hands={MME}"),
     (f"planner:mine:Guide?hands={MME}%3Fexecute=4", f"planner:mine:Guide?hands={MME}%3Fexecute=8"),
+    ("planner:listener?hands=mine:Hands", "planner:listener?hands=mine:Hands&subgoals=simple"),
     ("system:pi0.5", "system:pi0.5?policy.execute=4"),
     ("lerobot://lab/one", "lerobot://lab/two"),
-    ("trained:a.pt", "trained:a.pt?actions=joint_angle"),
-    ("trained:a.pt", "learned:a.pt"),
+    ("vlm-listener:openai?model=m", "vlm-listener:google?model=m"),
 ]
 
 
-@pytest.mark.parametrize(("before", "now"), OTHERS)
+@pytest.mark.parametrize(("before", "now"), [OTHERS[0], OTHERS[5], OTHERS[8]])
 def test_another_policy_of_the_same_name_is_refused_or_kept_apart(
-    before: str, now: str, tmp_path: Path, snapshot
+    before: str, now: str, played: tuple[Record, Record], tmp_path: Path, snapshot
 ) -> None:
     """In one sentence with both values; tables name the difference in their labels."""
-    seen = meet(tmp_path, named(before), named(now))
-    assert "" not in seen
-    assert seen._asdict() == snapshot
+    assert meet(tmp_path, played, named(before), named(now)) == snapshot
+
+
+def test_what_a_policy_is_tells_it_from_others(snapshot) -> None:
+    found = [read_policy(before).versions.differences(read_policy(now).versions)
+             for before, now in OTHERS]  # fmt: skip
+    lines = [[f"{what}: {first} | {second}" for what, first, second in each] for each in found]
+    assert lines == snapshot
 
 
 CHECKPOINT = {"config.json": "{}", "model.safetensors": "weights"}
@@ -133,32 +119,50 @@ SAME = [
     (OPENPI, "openpi://other:9/path"),
     (f"{OPENPI}?execute=8", f"{OPENPI}?execute=08&timeout=9&tls=yes"),
     (MME, f"{MME}?execute=16&history=yes&part=4"),
-    ("trained:a.pt", "trained:elsewhere/a.pt?actions=waypoint"),
-    ("trained:a.pt?hands=mme-vla://a:1", "trained:a.pt?hands=mme-vla://b:2"),
     ("planner:mine:Guide?hands=mme-vla://a:1", "planner:mine:Guide?hands=mme-vla://b:2"),
     ("planner:oracle?hands=scripted&subgoals=grounded", "planner:oracle"),
+    ("planner:qwen?hands=mine:Hands&model=m",
+     "planner:qwen?hands=mine:Hands&model=m&base_url=http://a:1"),
     ("system:pi0.5?server=b:2", f"{MME}?history=no&subgoals=none&prompt_tokens=64"),
-    (
-        "vlm-listener:openai?model=m&base_url=http://a:1&input_price=2",
-        "vlm-listener:openai?model=m",
-    ),
-    ("lerobot://{first}", "lerobot://{second}"),
+    ("vlm-listener:openai?model=m&base_url=http://a:1&input_price=2",
+     "vlm-listener:openai?model=m"),
+    ("lerobot://{first}", "lerobot://{second}?device=cuda&batch=4"),
     ("lerobot://{first}?version=7", "lerobot://lab/two?version=7"),
     (f"{OPENPI}?tokenizer={{first}}/config.json", f"{OPENPI}?tokenizer={{second}}/config.json"),
-]
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def checkpoints(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    places = {name: tmp_path_factory.mktemp(name) for name in ("first", "second")}
+    for place in places.values():
+        for name, content in CHECKPOINT.items():
+            (place / name).write_text(content)
+    return places
 
 
 @pytest.mark.parametrize(("before", "now"), SAME)
 def test_a_policy_that_moved_or_is_typed_otherwise_is_the_same(
-    before: str, now: str, tmp_path: Path
+    before: str, now: str, checkpoints: dict[str, Path]
 ) -> None:
-    for place in ("first", "second"):
-        (tmp_path / place).mkdir()
-        for name, content in CHECKPOINT.items():
-            (tmp_path / place / name).write_text(content)
-    places = {"first": tmp_path / "first", "second": tmp_path / "second"}
-    refs = [named(spec.format(**places)) for spec in (before, now)]
-    assert not any(meet(tmp_path, *refs))
+    refs = [read_policy(spec.format(**checkpoints)) for spec in (before, now)]
+    assert refs[0].makeup == refs[1].makeup != UNKNOWN_MAKEUP
+
+
+def test_a_policy_that_moved_goes_on_in_its_folder(
+    played: tuple[Record, Record], tmp_path: Path
+) -> None:
+    found = meet(tmp_path, played, *(named(spec) for spec in SAME[1]))
+    assert found == {"resumed": "", "merged": "", "stored": "", "labels": ["random"], "mixed": []}
+
+
+def test_records_without_what_the_policy_is_are_compared_by_versions_alone(
+    played: tuple[Record, Record], tmp_path: Path
+) -> None:
+    older = dataclasses.replace(named("oracle"), makeup=UNKNOWN_MAKEUP)
+    found = meet(tmp_path, played, older, named("forgetful"))
+    assert (found["resumed"], found["merged"], found["stored"]) == ("", "", "")
+    assert not found["mixed"]
 
 
 def test_a_checkpoint_with_other_bytes_is_another(tmp_path: Path) -> None:
@@ -167,7 +171,7 @@ def test_a_checkpoint_with_other_bytes_is_another(tmp_path: Path) -> None:
     found = set()
     for content in ("weights", "other"):
         file.write_text(content)
-        found.add(named(f"lerobot://{tmp_path}").makeup)
+        found.add(read_policy(f"lerobot://{tmp_path}").makeup)
     assert len(found) == 2
 
 
@@ -209,44 +213,39 @@ def registry() -> Iterator[tuple[str, type[BaseModel]]]:
     yield "vlm-listener:openai?model=m", ListenerOptions
 
 
-@pytest.mark.parametrize(("spec", "kind"), [*registry()], ids=[spec for spec, _ in registry()])
-def test_every_option_of_every_kind_is_seen_everywhere_or_nowhere(
-    spec: str, kind: type[BaseModel], tmp_path: Path
+def test_every_option_of_every_kind_is_compared_unless_it_is_declared_not_to_be() -> None:
+    for spec, kind in registry():
+        before = read_policy(spec)
+        target = spec.partition(":")[2].partition("?")[0].replace("openai", "listener")
+        prompts = str(resources.files(vlm) / "prompts" / f"{target}.toml")
+        for name, field in options_of(kind):
+            if name == "provider" and spec.startswith("vlm-listener"):
+                continue  # it stands in front of the options
+            bare = re.sub(rf"\?{name}=\w+", "", spec)
+            value = changed(name, field).format(prompts=prompts)
+            now = read_policy(f"{bare}{'&' if '?' in bare else '?'}{name}={value}")
+            is_compared = field.exclude is not NOT_COMPARED
+            assert (before.makeup != now.makeup) == is_compared, (spec, name)
+
+
+def test_every_built_in_policy_is_one_of_its_own() -> None:
+    assert len({read_policy(spec).makeup for spec in BUILTIN}) == len(BUILTIN)
+
+
+def test_of_a_kind_of_others_everything_that_is_typed_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before = named(spec)
-    target = spec.partition(":")[2].partition("?")[0].replace("openai", "listener")
-    prompts = str(resources.files(vlm) / "prompts" / f"{target}.toml")
-    for name, field in options_of(kind):
-        if name == "provider" and spec.startswith("vlm-listener"):
-            continue  # it stands in front of the options
-        bare = re.sub(rf"\?{name}=\w+", "", spec)
-        value = changed(name, field).format(prompts=prompts)
-        now = named(f"{bare}{'&' if '?' in bare else '?'}{name}={value}")
-        is_compared = NOT_COMPARED not in field.metadata
-        assert {bool(text) for text in meet(tmp_path, before, now)} == {is_compared}, name
-
-
-def test_every_built_in_policy_and_provider_is_one_of_its_own(tmp_path: Path) -> None:
-    providers = [f"vlm-listener:{provider}?model=m" for provider in ("openai", "google")]
-    made = {named(spec).makeup for spec in [*BUILTIN, *providers]}
-    assert len(made) == len(BUILTIN) + 2
-    assert all(meet(tmp_path, *map(named, providers)))
-
-
-def test_of_a_kind_of_others_everything_that_is_typed_counts(tmp_path: Path) -> None:
-    file = tmp_path / "weights"
-    file.write_text("weights")
-    copy = tmp_path / "copy"
-    copy.write_text("weights")
-
-    def lab(target: str, **options: str) -> PolicyRef:
-        ref = PolicyRef(name=NAME, spec="lab:…", kind="lab", target=target,
-                        options=tuple(options.items()))  # fmt: skip
-        return dataclasses.replace(ref, makeup=makeup_of(ref))
-
-    assert all(meet(tmp_path, lab("walk"), lab("run")))
-    assert all(meet(tmp_path, lab("walk", fast="yes"), lab("walk", fast="no")))
-    assert not any(meet(tmp_path, lab(str(file), a="1", b="2"), lab(str(copy), b="2", a="1")))
+    for module in (finding, policy_kinds):
+        monkeypatch.setattr(module, "known_kinds", lambda: {"lab": False})
+    for name in ("weights", "copy"):
+        (tmp_path / name).write_text("weights")
+    specs = [
+        "lab:walk", "lab:run", "lab:walk?fast=yes", "lab:walk?fast=no", "lab:walk?hands=left",
+        f"lab:{tmp_path}/weights?a=1&b=2", f"lab:{tmp_path}/copy?b=2&a=1",
+    ]  # fmt: skip
+    found = [read_policy(spec).makeup for spec in specs]
+    assert len({*found[:-1]}) == len(found) - 1
+    assert found[-1] == found[-2]
 
 
 def test_objects_of_two_classes_are_two_policies_even_if_they_declare_one_version() -> None:
@@ -259,31 +258,3 @@ def test_objects_of_two_classes_are_two_policies_even_if_they_declare_one_versio
     found = [policy_of(one, NAME).makeup for one in (Mine(), Other(), Privileged(Mine()), Mine())]
     assert found[0] == found[3]
     assert len(set(found)) == 3
-    assert read_policy("random").makeup == ((POLICY, "random"),)
-
-
-def test_older_records_are_compared_by_what_they_have(tmp_path: Path) -> None:
-    def older(spec: str) -> PolicyRef:
-        return dataclasses.replace(named(spec), makeup=None)
-
-    same, other = f"{OPENPI}?timeout=9&execute=8", f"{OPENPI}?timeout=9&execute=2"
-    for refs in ((older(same), older(same)), (older(same), named(same))):
-        assert not any(meet(tmp_path, *refs)[:3])
-    for refs in ((older(same), older(other)), (older(same), named(other)),
-                 (older("oracle"), named("forgetful"))):  # fmt: skip
-        assert all(meet(tmp_path, *refs))
-    folder = tmp_path / "resumed"
-    store(folder, *(replace(record, ref=ref) for record, ref in zip(
-        played(), (older(same), named(same)), strict=True)))  # fmt: skip
-    assert len(make_frame([("run", read_results(folder))]).names) == 1
-
-
-def test_a_pack_in_which_a_name_stands_for_two_policies_does_not_hold(tmp_path: Path) -> None:
-    for folder, record, spec in zip("ab", played(), ("oracle", "forgetful"), strict=True):
-        store(tmp_path / folder, replace(record, ref=named(spec)))
-    lines = [(tmp_path / folder / "records.jsonl").read_bytes() for folder in "ab"]
-    (tmp_path / "a" / "records.jsonl").write_bytes(b"".join(lines))
-    findings = [
-        text for check in verify_run(tmp_path / "a", sample=0).checks for text in check.findings
-    ]
-    assert "policy: the record says forgetful; an earlier one of random says oracle." in findings

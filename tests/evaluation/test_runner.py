@@ -260,7 +260,7 @@ def test_machines_of_other_versions_are_named() -> None:
     for language, version in here.languages.items():
         there = here._replace(languages={**here.languages, language: "2.0.1"})
         assert here.difference(there) == (
-            f"the language version of language {language} is 2.0.1 there and {version} here"
+            f"its language {language} has version 2.0.1 there and {version} here"
         )
     other = here._replace(policies=(here.policies[0], dataclasses.replace(random, version="old")))
     assert str(here.difference(other)).startswith("the policy version of random is old there")

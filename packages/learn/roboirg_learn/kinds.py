@@ -100,7 +100,5 @@ def _model(path: Path, version: str) -> PolicyModel:
     return load_policy(path)
 
 
-LEARNED = PolicyKind("learned", _learned, target_may_move=True)
-TRAINED = PolicyKind(
-    "trained", _trained, has_weights=True, target_may_move=True, defaults={ACTIONS: SPACES[0]}
-)
+LEARNED = PolicyKind("learned", _learned)
+TRAINED = PolicyKind("trained", _trained, has_weights=True)

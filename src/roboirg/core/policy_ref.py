@@ -7,14 +7,10 @@ from typing import Literal
 
 from roboirg.core.field_types import Label, Name
 from roboirg.core.policy_needs import PolicyNeeds
-from roboirg.core.versions import POLICY, Makeup, Versions
+from roboirg.core.versions import UNKNOWN_MAKEUP, Makeup, Versions
 
 BUILT_IN = "built-in"
 """Kind and version of policies that come with the package."""
-CLASS = "class"
-"""Kind of the user's own classes."""
-UNKNOWN = "unknown"
-"""Kind of policies of which only the name is known."""
 UNKNOWN_VERSION = "unknown"
 PRIVILEGED = "privileged:"
 """Before the spec of a policy of others: the user lets it read the simulator's state."""
@@ -37,7 +33,7 @@ class PolicyRef:
     Attributes:
         name: in records and tables.
         spec: as it was named, with options.
-        kind: what makes it: a kind of policies, a scheme of URLs, `BUILT_IN`, `CLASS` or
+        kind: what makes it: a kind of policies, a scheme of URLs, `BUILT_IN`, ``class`` or
             ``live``.
         target: what the kind makes: a class, file, address or name.
         options: of the kind.
@@ -46,8 +42,7 @@ class PolicyRef:
         is_privileged: whether it may read the simulator's state.
         asks: what of it asks a model, if that is ours.
         version: distinguishes it from an earlier policy of the same name.
-        makeup: what it is besides its version, wherever it is; None in older records, and where
-            only its name is known.
+        makeup: what it is besides its version, wherever it is.
         problem: why it could not be opened, in words; its version is not known then.
         needs: what it declares, as far as that is known before it plays.
     """
@@ -62,7 +57,7 @@ class PolicyRef:
     is_privileged: bool = False
     asks: Asker | None = None
     version: Name = UNKNOWN_VERSION
-    makeup: Makeup | None = None
+    makeup: Makeup = UNKNOWN_MAKEUP
     problem: str | None = None
     needs: PolicyNeeds | None = None
 
@@ -84,11 +79,7 @@ class PolicyRef:
     @property
     def versions(self) -> Versions:
         """Its version and what it is, for comparison with another one of its name."""
-        typed: Makeup | None = None
-        if self.kind != UNKNOWN:
-            maker = self.target if self.kind in (BUILT_IN, CLASS) else self.kind
-            typed = ((POLICY, maker), *sorted(self.options))
-        return Versions(policy=self.version, makeup=self.makeup, typed=typed)
+        return Versions(self.makeup, policy_version=self.version)
 
     @property
     def is_hosted(self) -> bool:
@@ -106,4 +97,4 @@ class PolicyRef:
 
 def unknown_policy(name: str) -> PolicyRef:
     """Return a policy of which nothing but its name is known."""
-    return PolicyRef(name=name, spec=name, kind=UNKNOWN, target=name)
+    return PolicyRef(name=name, spec=name, kind="unknown", target=name)

@@ -2,83 +2,82 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import NamedTuple
 
-Makeup = tuple[tuple[str, str], ...]
-"""What a policy is, besides its version: what makes it, under `POLICY`, then the options that
-change what it sees or does, in one spelling each and without those that have their defaults."""
-
-POLICY = "policy"
-DEFAULT = "the default"
-"""Value of an option that is left out."""
 NO_VERSION = "none"
 """Of a server that reported none, and without a server."""
+
+_POLICY = "policy"
+_DEFAULT = "at its default"
+
+
+class Makeup(NamedTuple):
+    """What a policy is besides its version, wherever it is.
+
+    Attributes:
+        maker: a built-in name, class, scheme, kind or file; None if it is not known.
+        options: that change what the policy sees or does, by name; not those with their defaults.
+    """
+
+    maker: str | None = None
+    options: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def text(self) -> str | None:
+        """The maker with the options; None if it is not known."""
+        words = [f"{name}={value}" for name, value in self.options]
+        return self.maker and " ".join([self.maker, *words])
+
+
+UNKNOWN_MAKEUP = Makeup()
 
 
 class Mismatch(NamedTuple):
     """A version, an option, or the policy itself, that two do not share, with the value of each."""
 
     what: str
-    first: str
-    second: str
+    first: object
+    second: object
+
+    @property
+    def label(self) -> str:
+        """The first value for a table, with the name of what it is."""
+        if self.what == _POLICY:
+            return str(self.first)
+        return f"{self.what.removeprefix('option ').removesuffix(' version')} {self.first}"
 
 
 class Versions(NamedTuple):
-    """The versions that a result depends on; None for what is not known or not to be compared.
+    """What a result depends on; None for what is not known or not to be compared.
 
     Attributes:
-        policy: the version of the policy.
-        language: the version of the words.
-        environment: the version of scenes, rules and physics.
-        server: the version that the policy's server reported, or `NO_VERSION`.
-        makeup: what the policy is; None in older records.
-        typed: the same as far as its name shows it, for comparison with older records.
-        package: the version of roboirg.
+        makeup: what the policy is.
+        environment_version: of scenes, rules and physics.
+        language_version: of the words.
+        policy_version: distinguishes it from an earlier policy of the same name.
+        server_version: that the policy's server reported, or `NO_VERSION`.
+        seed: of the scene.
     """
 
-    policy: str | None = None
-    language: str | None = None
-    environment: int | None = None
-    server: str | None = None
-    makeup: Makeup | None = None
-    typed: Makeup | None = None
-    package: str | None = None
-
-    @property
-    def known_makeup(self) -> Makeup:
-        """What the policy is, as far as it is known."""
-        return self.makeup or self.typed or ()
-
-    @property
-    def of_policy(self) -> Versions:
-        """Those of the policy and its server alone, which words and scenes do not change."""
-        return self._replace(language=None, environment=None)
+    makeup: Makeup = UNKNOWN_MAKEUP
+    environment_version: int | None = None
+    language_version: str | None = None
+    policy_version: str | None = None
+    server_version: str | None = None
+    seed: int | None = None
 
     def differences(self, other: Versions) -> list[Mismatch]:
-        """Return all in which two differ: what the policy is first, then versions."""
+        """Return all in which two differ, in the order of the fields."""
+        if self == other:
+            return []
         mine, theirs = self.makeup, other.makeup
-        if mine is None or theirs is None:
-            mine, theirs = self.typed, other.typed
-        found: list[Mismatch] = []
-        if mine is not None and theirs is not None:
-            first, second = dict(mine), dict(theirs)
-            for name in differing_names([mine, theirs]):
-                values = first.get(name, DEFAULT), second.get(name, DEFAULT)
-                what = name if name == POLICY else f"option {name}"
-                found.append(Mismatch(what, *values))
-        for name in ("environment", "language", "policy", "server", "package"):
-            here, there = getattr(self, name), getattr(other, name)
-            if here != there and here is not None and there is not None:
-                found.append(Mismatch(f"{name} version", str(here), str(there)))
-        return found
-
-
-def differing_names(makeups: Collection[Makeup]) -> list[str]:
-    """Return the options in which policies differ; only `POLICY` if they are not of one make."""
-    known = [dict(makeup) for makeup in makeups]
-    names: set[str] = set()
-    for makeup in known:
-        names |= makeup.keys()
-    found = [name for name in sorted(names) if len({makeup.get(name) for makeup in known}) > 1]
-    return [POLICY] if POLICY in found else found
+        found = [Mismatch(_POLICY, mine.maker, theirs.maker)]
+        if mine.maker == theirs.maker:
+            first, second = dict(mine.options), dict(theirs.options)
+            for name in sorted(first | second):
+                here, there = first.get(name, _DEFAULT), second.get(name, _DEFAULT)
+                found.append(Mismatch(f"option {name}", here, there))
+        for field in self._fields[1:]:
+            what = field.replace("_", " ")
+            found.append(Mismatch(what, getattr(self, field), getattr(other, field)))
+        return [pair for pair in found if pair.first != pair.second and None not in pair]

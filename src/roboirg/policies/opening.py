@@ -8,9 +8,9 @@ from dataclasses import replace
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.policy_needs import PolicyNeeds
-from roboirg.core.policy_ref import CLASS, UNKNOWN_VERSION, PolicyRef
+from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
 from roboirg.policies.by_name.finding import declared_by, look_up, make_policy
-from roboirg.policies.by_name.policy_kinds import LIVE
+from roboirg.policies.by_name.policy_kinds import CLASS, LIVE
 from roboirg.policies.contract.base import close_policy
 from roboirg.policies.contract.policy_version import read_version
 from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes

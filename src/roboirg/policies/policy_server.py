@@ -9,9 +9,10 @@ from typing import Any, NamedTuple
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.inference_facts import inference_facts
 from roboirg.core.policy_needs import PolicyNeeds
-from roboirg.core.policy_ref import BUILT_IN, CLASS, PolicyRef
+from roboirg.core.policy_ref import BUILT_IN, PolicyRef
 from roboirg.policies.by_name.finding import make_policy, read_policy
 from roboirg.policies.by_name.policy_classes import find_class
+from roboirg.policies.by_name.policy_kinds import CLASS
 from roboirg.policies.contract.json_values import as_json
 from roboirg.policies.opening import opened
 from roboirg.policies.remote.endpoints import Endpoint

@@ -138,7 +138,15 @@ def _policy_run(items: Sequence[GroundingItem], name: str) -> PolicyRun:
         )
     ((split, wordings, language, environment),) = sources
     conditions = EvalConditions(split, wordings=None if wordings == OWN_WORDS else wordings)
-    return PolicyRun(name, conditions, Versions(ANSWERS_VERSION, language, environment))
+    return PolicyRun(
+        name,
+        conditions,
+        Versions(
+            policy_version=ANSWERS_VERSION,
+            language_version=language,
+            environment_version=environment,
+        ),
+    )
 
 
 def _score(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import random
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from roboirg.core.plain_text import counted
 from roboirg.evaluation.plan.stored_plans import read_plans
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import identity_key, read_summary
-from roboirg.evaluation.records.store import StoredRun, policy_differences
+from roboirg.evaluation.records.store import StoredRun
 from roboirg.tasks.splits.private_splits import check_salt
 from roboirg.util.parallel_map import parallel_map
 
@@ -97,7 +97,6 @@ def verify_run(
             deviation = max(deviation, check.deviation)
         if check.findings:
             checks.append(check)
-    checks += _other_policies(run.newest)
     missing, notes = _completeness(folder, run.newest)
     if moved := sum(one.elsewhere for one in checks):
         elsewhere = (
@@ -114,20 +113,6 @@ def verify_run(
         errors=sum(one.outcome == "error" for one in run.newest),
         notes=notes,
     )
-
-
-def _other_policies(results: Sequence[Summary]) -> Iterator[RecordCheck]:
-    """Yield a check of each verdict of another policy than the first one of its name."""
-    told: dict[str, Summary] = {}
-    for result in results:
-        findings = [
-            f"{what}: the record says {second}; an earlier one of {result.policy} says {first}."
-            for what, first, second in policy_differences(result, told)
-        ]
-        if findings:
-            yield RecordCheck(result.slug, tuple(findings))
-        elif result.outcome != "error":
-            told.setdefault(result.policy, result)
 
 
 def _lines(run: StoredRun[Summary], sample: float, seed: int | None) -> Sequence[LineToCheck]:

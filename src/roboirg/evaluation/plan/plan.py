@@ -278,8 +278,8 @@ class Plan(BaseModel):
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all fields but what follows from others, and names of variables."""
-        left_out = {"hosting": {"policy_env"}, "policies": {"__all__": {"makeup"}}}
+        """Hash of all fields but the names of variables, which change no episode."""
+        left_out = {"hosting": {"policy_env"}}
         return short_hash(self.model_dump_json(context=_HASHED, exclude=left_out))
 
     def checked(self) -> Plan:

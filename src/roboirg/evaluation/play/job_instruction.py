@@ -59,8 +59,11 @@ def _open_wordings(job: Job) -> None:
 def other_versions(record: Summary) -> list[Mismatch]:
     """Return where a record's language or environment is not of the installed version."""
     language = LANGUAGE_VERSIONS.get(record.options.language, "unknown")
-    installed = Versions(language=language, environment=ENVIRONMENT_VERSION)
-    return record.versions.differences(installed)
+    installed = Versions(language_version=language, environment_version=ENVIRONMENT_VERSION)
+    recorded = Versions(
+        language_version=record.language_version, environment_version=record.environment_version
+    )
+    return recorded.differences(installed)
 
 
 def episode_policy_seed(policy_seed: int, episode_seed: int, arm: str = TOLD) -> int:

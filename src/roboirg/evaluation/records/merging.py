@@ -116,38 +116,26 @@ def _read_checked(line: bytes, path: Path, number: int) -> Summary:
 def _check_versions(runs: Sequence[tuple[Path, Iterable[Summary]]]) -> None:
     """Refuse records of different versions, policies or scenes, as a run does."""
     known: dict[str, tuple[Path, Versions]] = {}
-    seeds: dict[str, tuple[Path, int]] = {}
     for folder, results in runs:
         for result in results:
-            for owner, versions in _by_owner(result).items():
+            scene = f"{result.task} {result.split} {result.episode}"
+            owners = {
+                "": Versions(environment_version=result.environment_version),
+                f" of language {result.options.language}": Versions(
+                    language_version=result.language_version
+                ),
+                f" of {result.policy}": result.policy_versions,
+                f" of {scene}": Versions(seed=result.seed),
+            }
+            for owner, versions in owners.items():
                 there, expected = known.setdefault(owner, (folder, versions))
                 for what, value, other in versions.differences(expected):
-                    raise _unmergeable([folder, there], what + owner, [value, other])
-                if expected.server is None:  # an error's, which is not compared
+                    raise StoreError(
+                        f"{folder} and {there} cannot be merged: the {what}{owner} is {value} in "
+                        f"the first and {other} in the second."
+                    )
+                if expected.server_version is None:  # an error came before it
                     known[owner] = folder, versions
-            scene = f"{result.task} {result.split} {result.episode}"
-            there, seed = seeds.setdefault(scene, (folder, result.seed))
-            if result.seed != seed:
-                raise _unmergeable([folder, there], f"seed of {scene}", [result.seed, seed])
-
-
-def _by_owner(result: Summary) -> dict[str, Versions]:
-    """Return the versions of a result, each by the words for what they are versions of."""
-    versions = result.versions
-    if result.outcome == "error":
-        versions = versions._replace(server=None)
-    return {
-        "": Versions(environment=versions.environment),
-        f" of language {result.options.language}": Versions(language=versions.language),
-        f" of {result.policy}": versions.of_policy,
-    }
-
-
-def _unmergeable(folders: Sequence[Path], what: str, values: Sequence[object]) -> StoreError:
-    return StoreError(
-        f"{folders[0]} and {folders[1]} cannot be merged: the {what} is {values[0]} in the first "
-        f"and {values[1]} in the second."
-    )
 
 
 def _lines(

@@ -7,7 +7,6 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any, NamedTuple
 
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS
-from roboirg.core.versions import POLICY, Makeup
 from roboirg.core.word_pools import words_label
 from roboirg.evaluation.records.record import Summary
 
@@ -51,16 +50,8 @@ _COMMON = (
     ),
     Trait("code", "states of the package's code", "Rates do not tell them apart."),
 )
-
-
-def _makeup_words(makeup: Makeup) -> str | None:
-    """Return what makes a policy, with its options; None if neither is known."""
-    values = [value if name == POLICY else f"{name}={value}" for name, value in makeup]
-    return " ".join(values) or None
-
-
 _OF_POLICY = (
-    Trait("versions.known_makeup", "policies", _APART, _makeup_words),
+    Trait("ref.makeup.text", "policies", _APART, lambda text: text),
     Trait("played_version", "versions", _APART),
     *(
         Trait(path, name.replace("_", " "), _APART)

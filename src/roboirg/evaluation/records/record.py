@@ -366,13 +366,10 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
         return self.policy_version if server is None else f"{self.policy_version} (server {server})"
 
     @property
-    def versions(self) -> Versions:
-        """The versions that its verdict depends on, and what the policy is."""
-        return self.ref.versions._replace(
-            language=self.language_version,
-            environment=self.environment_version,
-            server=self.server_version or NO_VERSION,
-        )
+    def policy_versions(self) -> Versions:
+        """What the policy is, with its server's version unless an error came before that."""
+        missing = None if self.outcome == "error" else NO_VERSION
+        return self.ref.versions._replace(server_version=self.server_version or missing)
 
     @property
     def identity(self) -> Job:

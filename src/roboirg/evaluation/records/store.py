@@ -12,8 +12,7 @@ that lines are in the order of the plan (they are in the order in which episodes
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Generic, Self, TypeVar
@@ -88,9 +87,11 @@ class RecordStore:
             for line in lines:
                 read_record(line, self.path, 0)  # whole: what is stored can be read
                 entry = read_summary(line, self.path, 0)
-                differences = policy_differences(entry, told)
-                check_same(self.folder, entry.policy, differences, f"in {entry.slug}")
-                told.update(_told([entry]))
+                if entry.outcome != "error":
+                    before = told.get(entry.policy, entry).policy_versions
+                    differences = before.differences(entry.policy_versions)
+                    check_same(self.folder, entry.policy, differences, f"in {entry.slug}")
+                    told[entry.policy] = entry
                 added[identity_key(entry)] = entry
                 yield line
 
@@ -214,14 +215,6 @@ def _told(records: Iterable[Summary]) -> dict[str, Summary]:
     return {record.policy: record for record in records if record.outcome != "error"}
 
 
-def policy_differences(record: Summary, told: Mapping[str, Summary]) -> list[Mismatch]:
-    """Return how what played a verdict differs from what played others under that name."""
-    before = told.get(record.policy)
-    if before is None or record.outcome == "error":
-        return []
-    return before.versions.differences(record.versions.of_policy)
-
-
 def check_same(folder: Path, policy: str, found: Iterable[Mismatch], where: str = "now") -> None:
     """Refuse another policy of a name of which a folder holds episodes, or another version of it.
 
@@ -242,21 +235,11 @@ def check_same(folder: Path, policy: str, found: Iterable[Mismatch], where: str 
 
 
 def _adopt_told(records: Iterable[Stored]) -> tuple[Stored, ...]:
-    """Return the records; what one lacks of its policy comes from the policy's newest verdict.
-
-    That is, of an error, the version of the server, and of an older record what the policy is.
-    """
+    """Return the records; errors without a server's version get that of the policy's verdicts."""
     found = list(records)
     told = _told(found)
-    return tuple(_adopted(record, told.get(record.policy)) for record in found)
-
-
-def _adopted(record: Stored, told: Summary | None) -> Stored:
-    if told is None:
-        return record
-    if record.outcome == "error" and record.server_version is None:
-        record = msgspec.structs.replace(record, server_version=told.server_version)
-    if record.ref.makeup is None and told.ref.makeup is not None:
-        ref = dataclasses.replace(record.ref, makeup=told.ref.makeup)
-        record = msgspec.structs.replace(record, ref=ref)
-    return record
+    for position, record in enumerate(found):
+        if record.outcome == "error" and record.server_version is None and record.policy in told:
+            version = told[record.policy].server_version
+            found[position] = msgspec.structs.replace(record, server_version=version)
+    return tuple(found)

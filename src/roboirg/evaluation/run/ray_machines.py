@@ -25,9 +25,8 @@ from typing import NamedTuple
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import RoboIRGError
-from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
+from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.version import __version__
-from roboirg.core.versions import NO_VERSION, Versions
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.play.rollout import PlayJob
@@ -41,9 +40,6 @@ KEY_S = 1.0
 
 _PID_SUFFIX = ".pid"
 """Of empty files named after the processes of a run on a machine."""
-
-_NO_LANGUAGE = Versions(language=NO_VERSION)
-"""Of a machine that lacks one of the languages."""
 
 
 class MachineVersions(NamedTuple):
@@ -68,21 +64,21 @@ class MachineVersions(NamedTuple):
 
     def difference(self, there: MachineVersions) -> str | None:
         """Return how another machine differs, in words; None if it does not."""
-        found = there._by_owner()
-        for owner, versions in self._by_owner().items():
-            for what, mine, theirs in versions.differences(found.get(owner, _NO_LANGUAGE)):
-                return f"the {what}{owner} is {theirs} there and {mine} here"
+        pairs = [
+            ("roboirg", self.roboirg, there.roboirg),
+            *(
+                (f"its language {language}", version, there.languages.get(language, "none"))
+                for language, version in self.languages.items()
+            ),
+            ("its environment", self.environment, there.environment),
+        ]
+        for what, mine, theirs in pairs:
+            if mine != theirs:
+                return f"{what} has version {theirs} there and {mine} here"
+        for policy, other in zip(self.policies, there.policies, strict=True):
+            for what, mine, theirs in policy.versions.differences(other.versions):
+                return f"the {what} of {policy.spec} is {theirs} there and {mine} here"
         return None
-
-    def _by_owner(self) -> dict[str, Versions]:
-        """Return the versions, each by the words for what they are versions of."""
-        found = {"": Versions(package=self.roboirg, environment=self.environment)}
-        for language, version in self.languages.items():
-            found[f" of language {language}"] = Versions(language=version)
-        for policy in self.policies:
-            if policy.version != UNKNOWN_VERSION:
-                found[f" of {policy.spec}"] = policy.versions
-        return found
 
 
 class HostAddress(NamedTuple):

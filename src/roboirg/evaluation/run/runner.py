@@ -279,16 +279,17 @@ def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> Non
     """Refuse records of another policy of the same name, or of another version of it."""
     known = {ref.name: ref for ref in plan.policies}
     for policy, versions, is_verdict in {
-        (record.policy, record.versions, record.outcome != "error") for record in records
+        (record.policy, record.policy_versions, record.outcome != "error") for record in records
     }:
         now = known.get(policy)
         if now is None:
             continue
         # Two versions that could not be read may differ.
-        if now.problem is not None and (is_verdict or versions.policy != now.version):
+        if now.problem is not None and (is_verdict or versions.policy_version != now.version):
             raise StoreError(
-                f"{folder} holds episodes of {policy} version {versions.policy}, but the policy "
-                f"cannot be opened to read its version now ({now.problem}); choose another --out."
+                f"{folder} holds episodes of {policy} version {versions.policy_version}, but the "
+                f"policy cannot be opened to read its version now ({now.problem}); choose another "
+                "--out."
             )
         check_same(folder, policy, versions.differences(now.versions))
 

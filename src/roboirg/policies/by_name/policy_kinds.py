@@ -25,15 +25,7 @@ from typing import Any, NamedTuple, cast
 
 from roboirg.core.error_words import OUR_PACKAGES
 from roboirg.core.errors import UnknownNameError
-from roboirg.core.policy_ref import (
-    BUILT_IN,
-    CLASS,
-    ELSEWHERE,
-    HANDS,
-    PRIVILEGED,
-    SCRIPTED,
-    PolicyRef,
-)
+from roboirg.core.policy_ref import BUILT_IN, ELSEWHERE, HANDS, PRIVILEGED, SCRIPTED, PolicyRef
 from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.by_name.policy_classes import (
     CHECKPOINTS,
@@ -53,7 +45,7 @@ from roboirg.policies.planners.systems import System, find_system, with_options
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 from roboirg.util.discovery import entry_names, find_entry
 
-LIVE, LISTENER, PLANNER, SYSTEM = "live", "vlm-listener", "planner", "system"
+CLASS, LIVE, LISTENER, PLANNER, SYSTEM = "class", "live", "vlm-listener", "planner", "system"
 PolicyMaker = Callable[[int], Policy]
 """Makes a policy from a seed, without network or the libraries of providers."""
 
@@ -71,16 +63,11 @@ class PolicyKind(NamedTuple):
         read: returns what makes the policies of a spec. It is called with the whole spec, with what
             stands between the colon and the question mark, and with the options behind that.
         has_weights: whether its policies are trained networks, which get a process of their own.
-        target_may_move: whether the policy's version tells apart what its target may name, so that
-            a file may be moved.
-        defaults: of options; with them written out, it is the same policy.
     """
 
     name: str
     read: Callable[[str, str, Mapping[str, str]], PolicyMaker]
     has_weights: bool = False
-    target_may_move: bool = False
-    defaults: Mapping[str, str] = {}
 
 
 def split_spec(name: str, spec: str) -> PolicyRef:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
 import numpy as np
@@ -13,15 +11,12 @@ from pydantic import BaseModel, Field, ValidationError
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.field_types import MOST_SECONDS
-from roboirg.util.short_hash import short_hash
 
 Options = TypeVar("Options", bound=BaseModel)
-NOT_COMPARED = "does not make another policy"
-"""In the annotation of an option: with another value it is the same policy, as the option only
-concerns the connection or the price, or is compared as the version. All others are compared."""
-CHECKPOINT_CONFIG = "config.json"
-"""In the folder of a checkpoint."""
-Seconds = Annotated[float, Field(le=MOST_SECONDS), NOT_COMPARED]
+NOT_COMPARED = True
+"""Excludes an option from what a policy is: with another value it is the same policy, as the option
+only concerns the connection or the price, or is compared as the version."""
+Seconds = Annotated[float, Field(le=MOST_SECONDS)]
 """A time limit in an option."""
 
 
@@ -51,44 +46,6 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
         given = re.sub(r"//[^/@]*@", "//…@", repr(first["input"]))  # no password of a URL
         end = "" if message.endswith((".", "?")) else "."
         raise InvalidValueError(f"{origin}: option {name} is {given}; {message}{end}") from None
-
-
-def told_apart(options: BaseModel) -> dict[str, str]:
-    """Return the options that are compared and do not have their defaults, each in one spelling.
-
-    Of a file that is named, this is its content.
-    """
-    found: dict[str, str] = {}
-    for name, field in type(options).model_fields.items():
-        value = getattr(options, name)
-        if isinstance(value, BaseModel):
-            found |= told_apart(value)
-        elif value != field.default and NOT_COMPARED not in field.metadata:
-            found[name] = _spelled(value)
-    return found
-
-
-def _spelled(value: object) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return content_of(value) if isinstance(value, str) else str(value)
-
-
-def content_of(text: str) -> str:
-    """Return a hash of the file or checkpoint that a text names; the text if it names neither."""
-    path = Path(text)
-    try:
-        is_checkpoint = (path / CHECKPOINT_CONFIG).is_file()
-        files = sorted(path.iterdir()) if is_checkpoint else [path]
-        contents = [_hash(file) for file in files if file.is_file()]
-    except OSError:  # too long for a name, or not to be read, which is reported where it is used
-        contents = []
-    return short_hash("".join(contents)) if contents else text or "empty"
-
-
-def _hash(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def flags_as_words(given: Any) -> Any:  # noqa: ANN401 - options, or the value of one

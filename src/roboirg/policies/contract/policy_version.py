@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import inspect
 import os
 from pathlib import Path
@@ -15,6 +17,8 @@ from roboirg.core.field_types import as_name
 from roboirg.util.short_hash import short_hash
 
 MOST_LETTERS = 200
+CHECKPOINT_FILE = "config.json"
+"""In the folder of each checkpoint."""
 
 
 def read_version(policy: object) -> str | None:
@@ -65,3 +69,17 @@ def file_fingerprint(declaring: object) -> str | None:
         except OSError:
             return None
     return short_hash(kind.__qualname__.encode() + source)
+
+
+def content_of(text: str) -> str:
+    """Return a hash of the file or checkpoint that a text names; the text if it names neither."""
+    files = [Path(text)]
+    content = ""
+    with contextlib.suppress(OSError):  # what cannot be read is reported where it is used
+        if Path(f"{text}/{CHECKPOINT_FILE}").is_file():
+            files = sorted(Path(text).iterdir())
+        for path in files:
+            if path.is_file():
+                with path.open("rb") as file:
+                    content += hashlib.file_digest(file, "sha256").hexdigest()
+    return short_hash(content) if content else text or "empty"

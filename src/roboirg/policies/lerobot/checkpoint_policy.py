@@ -16,7 +16,7 @@ import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,10 +55,10 @@ class LeRobotPolicyOptions(UrlOptions):
         tokenizer: file of the model's tokenizer.
     """
 
-    device: str = Field("cpu", min_length=1)
-    batch: int | None = Field(None, ge=1)
+    device: str = Field("cpu", min_length=1, exclude=NOT_COMPARED)
+    batch: int | None = Field(None, ge=1, exclude=NOT_COMPARED)
     execute: int | None = Field(None, ge=1)
-    version: Annotated[str, NOT_COMPARED] = Field(UNKNOWN_VERSION, min_length=1)
+    version: str = Field(UNKNOWN_VERSION, min_length=1, exclude=NOT_COMPARED)
     prompt_tokens: int | None = Field(None, ge=1)
     prompt_added: int = Field(0, ge=0)
     tokenizer: str | None = Field(None, min_length=1)

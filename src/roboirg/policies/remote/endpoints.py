@@ -21,8 +21,6 @@ MIB = 2**20
 
 ActionSpaceName = Annotated[str, AfterValidator(lambda name: find_action_space(name).name)]
 """An option that names an action space."""
-Shared = Annotated[bool, NOT_COMPARED]
-"""Whether several episodes may use a server at the same time."""
 
 
 class Endpoint(NamedTuple):
@@ -61,14 +59,14 @@ class RemoteOptions(UrlOptions):
         tokenizer: file of the model's tokenizer.
     """
 
-    timeout: Seconds = Field(120.0, gt=0)
-    connect: Seconds = Field(60.0, gt=0)
-    wait: Seconds = Field(3600.0, ge=0)
-    shared: Shared = False
-    tls: Annotated[bool, NOT_COMPARED] = False
-    api_key_env: Annotated[str | None, NOT_COMPARED] = Field(None, min_length=1)
-    max_reply_mib: Annotated[float, NOT_COMPARED] = Field(16.0, gt=0)
-    version: Annotated[str | None, NOT_COMPARED] = Field(None, min_length=1)
+    timeout: Seconds = Field(120.0, gt=0, exclude=NOT_COMPARED)
+    connect: Seconds = Field(60.0, gt=0, exclude=NOT_COMPARED)
+    wait: Seconds = Field(3600.0, ge=0, exclude=NOT_COMPARED)
+    shared: bool = Field(False, exclude=NOT_COMPARED)
+    tls: bool = Field(False, exclude=NOT_COMPARED)
+    api_key_env: str | None = Field(None, min_length=1, exclude=NOT_COMPARED)
+    max_reply_mib: float = Field(16.0, gt=0, exclude=NOT_COMPARED)
+    version: str | None = Field(None, min_length=1, exclude=NOT_COMPARED)
     prompt_tokens: int | None = Field(None, ge=1)
     prompt_added: int = Field(0, ge=0)
     tokenizer: str | None = Field(None, min_length=1)

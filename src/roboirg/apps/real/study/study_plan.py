@@ -145,7 +145,6 @@ class StudyPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         written = msgspec.to_builtins(self)
         for one, trial in zip(written["trials"], self.trials, strict=True):
             one["job"]["options"] = identifying(trial.job.options)
-            (one["job"]["ref"] or {}).pop("makeup", None)  # earlier plans have none
         return short_hash(msgspec.json.encode(written))
 
     def trial(self, name: str) -> PlannedTrial:

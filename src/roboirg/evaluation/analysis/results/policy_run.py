@@ -13,7 +13,7 @@ from typing import NamedTuple
 from roboirg.core.arms import TOLD
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS, EnvironmentOptions
 from roboirg.core.subgoal_text import BETWEEN_VERSIONS, SCRIPTED_HANDS
-from roboirg.core.versions import POLICY, Versions, differing_names
+from roboirg.core.versions import UNKNOWN_MAKEUP, Versions
 from roboirg.core.word_pools import words_label
 from roboirg.evaluation.records.record import Job, Summary
 
@@ -72,9 +72,11 @@ class PolicyRun(NamedTuple):
 
     @classmethod
     def of(cls, result: Summary, run: str = "") -> PolicyRun:
-        versions = result.versions
-        versions = versions._replace(
-            policy=result.played_version, server=None, makeup=versions.known_makeup, typed=None
+        versions = Versions(
+            result.ref.makeup,
+            result.environment_version,
+            result.language_version,
+            result.played_version,
         )
         conditions = EvalConditions.of(result)
         return cls(result.policy, conditions, versions, run, result.privileged, result.robot)
@@ -82,7 +84,7 @@ class PolicyRun(NamedTuple):
     @property
     def language(self) -> str:
         """The version of the language that it heard; empty before it has played."""
-        return "" if self.versions is None else str(self.versions.language)
+        return "" if self.versions is None else str(self.versions.language_version)
 
     @property
     def marked_policy(self) -> str:
@@ -92,12 +94,14 @@ class PolicyRun(NamedTuple):
     @property
     def has_planner(self) -> bool:
         """Whether it has played as a planner with a policy."""
-        return self.versions is not None and BETWEEN_VERSIONS in str(self.versions.policy)
+        versions = self.versions
+        return versions is not None and BETWEEN_VERSIONS in str(versions.policy_version)
 
     @property
     def mark(self) -> str:
         """The mark of a privileged policy; empty for the others."""
-        has_hands = self.versions is not None and SCRIPTED_HANDS in str(self.versions.policy)
+        versions = self.versions
+        has_hands = versions is not None and SCRIPTED_HANDS in str(versions.policy_version)
         return (HANDS if has_hands else PRIVILEGED) * self.is_privileged
 
 
@@ -130,16 +134,12 @@ def _version_labels(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> 
     versions = policy_run.versions
     if versions is None:
         return []
-    played = [run for run in policy_runs if run.versions is not None]
-    # What a policy is matters only among runs of the same policy.
-    same = [run for run in played if run.policy == policy_run.policy]
-    found = []
-    makeup = dict(versions.known_makeup)
-    for name in differing_names({run.versions.known_makeup for run in same if run.versions}):
-        label = f"{name} {makeup[name]}" if name in makeup else f"default {name}"
-        found.append(makeup[name] if name == POLICY else label)
-    for name in ("policy", "language", "environment"):
-        others = same if name == "policy" else played
-        if len({getattr(run.versions, name) for run in others}) > 1:
-            found.append(f"{name} {getattr(versions, name)}")
-    return found
+    found: dict[str, str] = {}
+    for other in policy_runs:
+        others = other.versions or Versions()
+        if other.policy != policy_run.policy:
+            # What a policy is matters only among runs of the same policy.
+            others = others._replace(policy_version=None, makeup=UNKNOWN_MAKEUP)
+        for mismatch in versions.differences(others):
+            found[mismatch.what] = mismatch.label
+    return [found[what] for what in sorted(found)]

@@ -16,7 +16,7 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,11 +54,11 @@ class MmeVlaOptions(RemoteOptions):
         part: frames per message.
     """
 
-    timeout: Seconds = Field(600.0, gt=0)
+    timeout: Seconds = Field(600.0, gt=0, exclude=NOT_COMPARED)
     execute: int = Field(EXECUTED, ge=1)
     history: bool = True
     subgoals: SubgoalField = "grounded"
-    part: Annotated[int, NOT_COMPARED] = Field(EXECUTED, ge=1)
+    part: int = Field(EXECUTED, ge=1, exclude=NOT_COMPARED)
 
 
 class MmeVlaPolicy(RemotePolicy):

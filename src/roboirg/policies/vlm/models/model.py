@@ -6,7 +6,7 @@ import json
 import math
 import os
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 from urllib.parse import urlsplit
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
@@ -54,16 +54,16 @@ class ModelOptions(BaseModel):
 
     provider: Provider = "openai"
     model: str = Field(min_length=1)
-    base_url: Annotated[str | None, NOT_COMPARED] = None
-    api_key_env: Annotated[str | None, NOT_COMPARED] = None
-    timeout_s: Seconds = Field(default=120.0, gt=0)
-    retries: Annotated[int, NOT_COMPARED] = Field(default=2, ge=0, le=10)
-    patience_s: Seconds = Field(default=300.0, ge=0)
-    requests_per_minute: Annotated[float | None, NOT_COMPARED] = Field(default=None, ge=0.001)
+    base_url: str | None = Field(None, exclude=NOT_COMPARED)
+    api_key_env: str | None = Field(None, exclude=NOT_COMPARED)
+    timeout_s: Seconds = Field(default=120.0, gt=0, exclude=NOT_COMPARED)
+    retries: int = Field(default=2, ge=0, le=10, exclude=NOT_COMPARED)
+    patience_s: Seconds = Field(default=300.0, ge=0, exclude=NOT_COMPARED)
+    requests_per_minute: float | None = Field(default=None, ge=0.001, exclude=NOT_COMPARED)
     temperature: float | None = Field(default=0.0, ge=0)
     max_output_tokens: int | None = Field(default=None, ge=1)
-    input_price: Annotated[float | None, NOT_COMPARED] = Field(default=None, ge=0)
-    output_price: Annotated[float | None, NOT_COMPARED] = Field(default=None, ge=0)
+    input_price: float | None = Field(default=None, ge=0, exclude=NOT_COMPARED)
+    output_price: float | None = Field(default=None, ge=0, exclude=NOT_COMPARED)
     video: Literal["frames", "mp4"] = "frames"
     clip_frames: int = Field(default=16, ge=1)
     structured: bool = True
@@ -115,9 +115,7 @@ class ModelOptions(BaseModel):
 
     def about(self) -> dict[str, str | float | int | bool | None]:
         """Return, for records, the address and all that may change a reply; never a key."""
-        fields = type(self).model_fields.items()
-        left_out = {name for name, field in fields if NOT_COMPARED in field.metadata}
-        return {**self.model_dump(mode="json", exclude=left_out), "address": self.address()}
+        return {**self.model_dump(mode="json"), "address": self.address()}
 
     @property
     def has_prices(self) -> bool:
