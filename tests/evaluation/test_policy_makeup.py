@@ -16,7 +16,6 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from roboirg.core.policy_ref import PolicyRef
-from roboirg.core.versions import UNKNOWN_MAKEUP
 from roboirg.evaluation.analysis.results.frame import make_frame
 from roboirg.evaluation.records.merging import merge_runs
 from roboirg.evaluation.records.mixing import mixtures
@@ -146,7 +145,7 @@ def test_a_policy_that_moved_or_is_typed_otherwise_is_the_same(
     before: str, now: str, checkpoints: dict[str, Path]
 ) -> None:
     refs = [read_policy(spec.format(**checkpoints)) for spec in (before, now)]
-    assert refs[0].makeup == refs[1].makeup != UNKNOWN_MAKEUP
+    assert refs[0].makeup == refs[1].makeup != ()
 
 
 def test_a_policy_that_moved_goes_on_in_its_folder(
@@ -159,7 +158,7 @@ def test_a_policy_that_moved_goes_on_in_its_folder(
 def test_records_without_what_the_policy_is_are_compared_by_versions_alone(
     played: tuple[Record, Record], tmp_path: Path
 ) -> None:
-    older = dataclasses.replace(named("oracle"), makeup=UNKNOWN_MAKEUP)
+    older = dataclasses.replace(named("oracle"), makeup=())
     found = meet(tmp_path, played, older, named("forgetful"))
     assert (found["resumed"], found["merged"], found["stored"]) == ("", "", "")
     assert not found["mixed"]

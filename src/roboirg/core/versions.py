@@ -7,29 +7,12 @@ from typing import NamedTuple
 NO_VERSION = "none"
 """Of a server that reported none, and without a server."""
 
-_POLICY = "policy"
+Makeup = tuple[tuple[str, str], ...]
+"""What a policy is besides its version, wherever it is: what makes it, under `POLICY`, then the
+options that change what it sees or does, but not those with their defaults. Empty if unknown."""
+
+POLICY = "policy"
 _DEFAULT = "at its default"
-
-
-class Makeup(NamedTuple):
-    """What a policy is besides its version, wherever it is.
-
-    Attributes:
-        maker: a built-in name, class, scheme, kind or file; None if it is not known.
-        options: that change what the policy sees or does, by name; not those with their defaults.
-    """
-
-    maker: str | None = None
-    options: tuple[tuple[str, str], ...] = ()
-
-    @property
-    def text(self) -> str | None:
-        """The maker with the options; None if it is not known."""
-        words = [f"{name}={value}" for name, value in self.options]
-        return self.maker and " ".join([self.maker, *words])
-
-
-UNKNOWN_MAKEUP = Makeup()
 
 
 class Mismatch(NamedTuple):
@@ -42,7 +25,7 @@ class Mismatch(NamedTuple):
     @property
     def label(self) -> str:
         """The first value for a table, with the name of what it is."""
-        if self.what == _POLICY:
+        if self.what == POLICY:
             return str(self.first)
         return f"{self.what.removeprefix('option ').removesuffix(' version')} {self.first}"
 
@@ -59,7 +42,7 @@ class Versions(NamedTuple):
         seed: of the scene.
     """
 
-    makeup: Makeup = UNKNOWN_MAKEUP
+    makeup: Makeup = ()
     environment_version: int | None = None
     language_version: str | None = None
     policy_version: str | None = None
@@ -70,14 +53,20 @@ class Versions(NamedTuple):
         """Return all in which two differ, in the order of the fields."""
         if self == other:
             return []
-        mine, theirs = self.makeup, other.makeup
-        found = [Mismatch(_POLICY, mine.maker, theirs.maker)]
-        if mine.maker == theirs.maker:
-            first, second = dict(mine.options), dict(theirs.options)
+        first, second = dict(self.makeup), dict(other.makeup)
+        maker = Mismatch(POLICY, first.pop(POLICY, None), second.pop(POLICY, None))
+        found = [maker]
+        if maker.first == maker.second:
             for name in sorted(first | second):
-                here, there = first.get(name, _DEFAULT), second.get(name, _DEFAULT)
-                found.append(Mismatch(f"option {name}", here, there))
+                what = f"option {name}"
+                found.append(Mismatch(what, first.get(name, _DEFAULT), second.get(name, _DEFAULT)))
         for field in self._fields[1:]:
             what = field.replace("_", " ")
             found.append(Mismatch(what, getattr(self, field), getattr(other, field)))
         return [pair for pair in found if pair.first != pair.second and None not in pair]
+
+
+def makeup_text(makeup: Makeup) -> str | None:
+    """Return what makes a policy, with its options; None if it is not known."""
+    words = [value if name == POLICY else f"{name}={value}" for name, value in makeup]
+    return " ".join(words) or None

@@ -118,14 +118,13 @@ def _check_versions(runs: Sequence[tuple[Path, Iterable[Summary]]]) -> None:
     known: dict[str, tuple[Path, Versions]] = {}
     for folder, results in runs:
         for result in results:
-            scene = f"{result.task} {result.split} {result.episode}"
             owners = {
                 "": Versions(environment_version=result.environment_version),
                 f" of language {result.options.language}": Versions(
                     language_version=result.language_version
                 ),
                 f" of {result.policy}": result.policy_versions,
-                f" of {scene}": Versions(seed=result.seed),
+                f" of {result.task} {result.split} {result.episode}": Versions(seed=result.seed),
             }
             for owner, versions in owners.items():
                 there, expected = known.setdefault(owner, (folder, versions))

@@ -25,7 +25,7 @@ from typing import NamedTuple
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import RoboIRGError
-from roboirg.core.policy_ref import PolicyRef
+from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
 from roboirg.core.version import __version__
 from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
 from roboirg.evaluation.hosting.policy_opening import open_policy
@@ -33,6 +33,7 @@ from roboirg.evaluation.play.rollout import PlayJob
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.run.workers import POLL_S, Worker
 from roboirg.language import LANGUAGE_VERSIONS
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks.splits.private_splits import use_salt
 
 KEY_S = 1.0
@@ -76,8 +77,9 @@ class MachineVersions(NamedTuple):
             if mine != theirs:
                 return f"{what} has version {theirs} there and {mine} here"
         for policy, other in zip(self.policies, there.policies, strict=True):
-            for what, mine, theirs in policy.versions.differences(other.versions):
-                return f"the {what} of {policy.spec} is {theirs} there and {mine} here"
+            if policy.version != UNKNOWN_VERSION:
+                for what, mine, theirs in policy.versions.differences(other.versions):
+                    return f"the {what} of {policy.spec} is {theirs} there and {mine} here"
         return None
 
 
@@ -145,7 +147,8 @@ class MachineAgent:
         """Check that the machine has the same versions as the driver and can load the policies."""
         try:
             policies = tuple(
-                open_policy(policy, settings=self._settings) for policy in versions.policies
+                open_policy(read_policy(policy.spec, policy.name), settings=self._settings)
+                for policy in versions.policies
             )
             fault = versions.difference(MachineVersions.expected(policies))
         except RoboIRGError as error:

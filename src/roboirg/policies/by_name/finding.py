@@ -19,7 +19,7 @@ from roboirg.core.policy_ref import (
     Place,
     PolicyRef,
 )
-from roboirg.core.versions import Makeup
+from roboirg.core.versions import POLICY, Makeup, makeup_text
 from roboirg.policies.by_name.policy_classes import find_class
 from roboirg.policies.by_name.policy_kinds import (
     CLASS,
@@ -106,26 +106,29 @@ def _makeup(ref: PolicyRef, system: System | None) -> Makeup:
     if ref.kind in (BUILT_IN, CLASS):
         maker = ref.spec
     elif ref.version == UNKNOWN_VERSION and ref.place != "server":
-        maker = f"{ref.kind}:{content_of(ref.target)}"
+        maker += f":{content_of(ref.target)}"
     options: dict[str, Any] = dict(ref.options)
-    hands, made = SCRIPTED, None
+    hands = SCRIPTED
+    made: Any = None
     if system is not None:
         if system.planner is None:
             return read_policy(system.policy).makeup
-        options, hands = dict(system.planner), system.policy
+        options = dict(system.planner)
+        hands = system.policy
         kind = options.pop("kind", "")
         maker = f"{PLANNER}:{kind}"
         if ":" not in kind:  # else it is the user's own, which has no options
             made = make_planner(kind, options, maker)
     elif not ref.is_foreign:
-        hands, made = options.pop(HANDS, SCRIPTED), maker_of(ref)(0)
+        hands = options.pop(HANDS, SCRIPTED)
+        made = maker_of(ref)(0)
     if hasattr(made, "options"):
         options = made.options.model_dump(exclude_defaults=True)
         options |= options.pop("model", {})  # its model's options stand next to its own
     if hands not in (SCRIPTED, ELSEWHERE):
-        options[HANDS] = read_policy(hands).makeup.text
+        options[HANDS] = makeup_text(read_policy(hands).makeup)
     pairs = [(name, content_of(str(value))) for name, value in sorted(options.items())]
-    return Makeup(maker, tuple(pairs))
+    return ((POLICY, maker), *pairs)
 
 
 def policy_of(policy: str | type[Any] | object, name: str | None = None) -> PolicyRef:
@@ -148,9 +151,10 @@ def policy_of(policy: str | type[Any] | object, name: str | None = None) -> Poli
     check_policy(name, given, ("reset", "act"))
     live[name] = given
     ref = split_spec(name, f"{declaration}{LIVE}:{name}")
-    makeup = Makeup(f"{declaration}{kind.__module__}:{kind.__qualname__}")
-    ref = replace(ref, place="python", makeup=makeup)
-    return replace(ref, is_foreign=True, is_privileged=ref.is_declared)
+    makeup = ((POLICY, f"{declaration}{kind.__module__}:{kind.__qualname__}"),)
+    return replace(
+        ref, place="python", is_foreign=True, is_privileged=ref.is_declared, makeup=makeup
+    )
 
 
 def make_policy(policy: str | PolicyRef, seed: int) -> Policy:

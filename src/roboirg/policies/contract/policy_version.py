@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 import inspect
 import os
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.field_types import as_name
+from roboirg.util.regular_file import file_hash
 from roboirg.util.short_hash import short_hash
 
 MOST_LETTERS = 200
@@ -80,6 +80,5 @@ def content_of(text: str) -> str:
             files = sorted(Path(text).iterdir())
         for path in files:
             if path.is_file():
-                with path.open("rb") as file:
-                    content += hashlib.file_digest(file, "sha256").hexdigest()
+                content += file_hash(path)
     return short_hash(content) if content else text or "empty"

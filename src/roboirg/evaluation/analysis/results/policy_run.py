@@ -13,7 +13,7 @@ from typing import NamedTuple
 from roboirg.core.arms import TOLD
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS, EnvironmentOptions
 from roboirg.core.subgoal_text import BETWEEN_VERSIONS, SCRIPTED_HANDS
-from roboirg.core.versions import UNKNOWN_MAKEUP, Versions
+from roboirg.core.versions import Versions
 from roboirg.core.word_pools import words_label
 from roboirg.evaluation.records.record import Job, Summary
 
@@ -139,7 +139,7 @@ def _version_labels(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> 
         others = other.versions or Versions()
         if other.policy != policy_run.policy:
             # What a policy is matters only among runs of the same policy.
-            others = others._replace(policy_version=None, makeup=UNKNOWN_MAKEUP)
+            others = others._replace(policy_version=None, makeup=())
         for mismatch in versions.differences(others):
             found[mismatch.what] = mismatch.label
     return [found[what] for what in sorted(found)]
