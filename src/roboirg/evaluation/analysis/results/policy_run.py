@@ -57,7 +57,7 @@ class PolicyRun(NamedTuple):
     Attributes:
         policy: its name.
         conditions: under which it played.
-        versions: None before it has played; the policy's has that of its server.
+        versions: unknown before it has played; the policy's has that of its server.
         run: name of the run if several runs hold the same episodes, else empty.
         is_privileged: whether the policy read the simulator's state.
         robot: the real robot of a study; None in simulation.
@@ -65,7 +65,7 @@ class PolicyRun(NamedTuple):
 
     policy: str
     conditions: EvalConditions
-    versions: Versions | None
+    versions: Versions
     run: str = ""
     is_privileged: bool = False
     robot: str | None = None
@@ -84,7 +84,7 @@ class PolicyRun(NamedTuple):
     @property
     def language(self) -> str:
         """The version of the language that it heard; empty before it has played."""
-        return "" if self.versions is None else str(self.versions.language_version)
+        return self.versions.language_version or ""
 
     @property
     def marked_policy(self) -> str:
@@ -94,14 +94,12 @@ class PolicyRun(NamedTuple):
     @property
     def has_planner(self) -> bool:
         """Whether it has played as a planner with a policy."""
-        versions = self.versions
-        return versions is not None and BETWEEN_VERSIONS in str(versions.policy_version)
+        return BETWEEN_VERSIONS in str(self.versions.policy_version)
 
     @property
     def mark(self) -> str:
         """The mark of a privileged policy; empty for the others."""
-        versions = self.versions
-        has_hands = versions is not None and SCRIPTED_HANDS in str(versions.policy_version)
+        has_hands = SCRIPTED_HANDS in str(self.versions.policy_version)
         return (HANDS if has_hands else PRIVILEGED) * self.is_privileged
 
 
@@ -131,15 +129,12 @@ def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:
 
 def _version_labels(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> list[str]:
     """Return what a policy is and its versions, as far as it differs from others in them."""
-    versions = policy_run.versions
-    if versions is None:
-        return []
     found: dict[str, str] = {}
     for other in policy_runs:
-        others = other.versions or Versions()
+        others = other.versions
         if other.policy != policy_run.policy:
             # What a policy is matters only among runs of the same policy.
             others = others._replace(policy_version=None, makeup=())
-        for mismatch in versions.differences(others):
+        for mismatch in policy_run.versions.differences(others):
             found[mismatch.what] = mismatch.label
     return [found[what] for what in sorted(found)]

@@ -54,8 +54,8 @@ class ModelOptions(BaseModel):
 
     provider: Provider = "openai"
     model: str = Field(min_length=1)
-    base_url: str | None = Field(None, exclude=NOT_COMPARED)
-    api_key_env: str | None = Field(None, exclude=NOT_COMPARED)
+    base_url: str | None = Field(default=None, exclude=NOT_COMPARED)
+    api_key_env: str | None = Field(default=None, exclude=NOT_COMPARED)
     timeout_s: Seconds = Field(default=120.0, gt=0, exclude=NOT_COMPARED)
     retries: int = Field(default=2, ge=0, le=10, exclude=NOT_COMPARED)
     patience_s: Seconds = Field(default=300.0, ge=0, exclude=NOT_COMPARED)
