@@ -92,7 +92,7 @@ def test_rows_are_sorted_by_task_then_episode_then_seed(result) -> None:
 def test_what_is_missing_belongs_to_the_version_that_played_first(result) -> None:
     two = [result("success", at, policy_version=name) for at, name in enumerate("ba")]
     cells = cells_of(make_frame([("run", two)], [result("success", 2).identity]))
-    assert {key.policy_run.versions.policy: one.missing for key, one in cells.items()} == {
+    assert {key.policy_run.versions.policy_version: one.missing for key, one in cells.items()} == {
         "a": 0, "b": 1,
     }  # fmt: skip
 

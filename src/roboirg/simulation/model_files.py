@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from roboirg.core.errors import MissingDependencyError
+from roboirg.util.regular_file import file_hash
 from roboirg.util.user_folders import user_folder
 
 FOLDER_VARIABLE = "ROBOIRG_MODEL_FILES"
@@ -99,6 +100,5 @@ def _digest(root: Path) -> str:
     digest = hashlib.sha256()
     for name in MODEL_FILES:
         digest.update(name.encode())
-        with (root / name).open("rb") as file:
-            digest.update(hashlib.file_digest(file, "sha256").digest())
+        digest.update(bytes.fromhex(file_hash(root / name)))
     return digest.hexdigest()

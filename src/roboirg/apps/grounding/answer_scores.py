@@ -12,9 +12,10 @@ import numpy as np
 
 from roboirg.core.arms import TOLD
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.versions import Versions
 from roboirg.evaluation.analysis.results.frame import MISSING, Frame, as_column, task_order
 from roboirg.evaluation.analysis.results.option_labels import options_sort_key
-from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun, Versions
+from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
 from roboirg.evaluation.grounding_items.answer_file import Answer
@@ -137,7 +138,15 @@ def _policy_run(items: Sequence[GroundingItem], name: str) -> PolicyRun:
         )
     ((split, wordings, language, environment),) = sources
     conditions = EvalConditions(split, wordings=None if wordings == OWN_WORDS else wordings)
-    return PolicyRun(name, conditions, Versions(ANSWERS_VERSION, language, environment))
+    return PolicyRun(
+        name,
+        conditions,
+        Versions(
+            policy_version=ANSWERS_VERSION,
+            language_version=language,
+            environment_version=environment,
+        ),
+    )
 
 
 def _score(

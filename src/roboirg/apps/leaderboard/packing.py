@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 import zipfile
 from collections.abc import Mapping
@@ -18,7 +17,7 @@ from roboirg.evaluation.records.record_codec import StoreError, read_summary
 from roboirg.evaluation.records.run_files import plan_names, run_file
 from roboirg.evaluation.records.store import RECORDS_FILE, StoredRun
 from roboirg.util.atomic_write import replacing
-from roboirg.util.regular_file import open_regular
+from roboirg.util.regular_file import file_hash
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _BLOCK = 1 << 20
@@ -84,7 +83,6 @@ def _file_hash(path: Path) -> str:
         InvalidValueError: it cannot be read.
     """
     try:
-        with open_regular(path) as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        return file_hash(path)
     except OSError as error:
         raise InvalidValueError(f"Cannot read {path}: {error.strerror}.") from error

@@ -101,7 +101,7 @@ def check_line(one: LineToCheck, folder: Path) -> RecordCheck:
 
 def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
     findings = [
-        f"{what}_version: the record says {recorded}; this roboirg checks {installed}."
+        f"{what.replace(' ', '_')}: the record says {recorded}; this roboirg checks {installed}."
         for what, recorded, installed in other_versions(record)
     ]
     if findings:

@@ -122,8 +122,8 @@ def _explicit_differences(policy_run: PolicyRun, cell: Cell) -> Iterator[str]:
         yield f"{environment.meshes} meshes"
     if environment.demonstration_frames not in (None, "all"):
         yield f"frames of the video: {environment.demonstration_frames}"
-    if versions is not None and versions.environment != ENVIRONMENT_VERSION:
-        yield f"environment version {versions.environment}"
+    if versions.environment_version not in (None, ENVIRONMENT_VERSION):
+        yield f"environment version {versions.environment_version}"
     if cell.errors:
         yield counted(cell.errors, "error")
     if cell.missing:

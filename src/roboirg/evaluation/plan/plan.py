@@ -278,8 +278,8 @@ class Plan(BaseModel):
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all fields but the names of variables, which change no episode."""
-        left_out = {"hosting": {"policy_env"}}
+        """Hash of all fields but names of variables and what follows from the others."""
+        left_out = {"hosting": {"policy_env"}, "policies": {"__all__": {"makeup"}}}
         return short_hash(self.model_dump_json(context=_HASHED, exclude=left_out))
 
     def checked(self) -> Plan:

@@ -26,6 +26,7 @@ from roboirg.core.instruction_options import InstructionOptions, identifying
 from roboirg.core.observations import DemonstrationSource
 from roboirg.core.plain_text import clip_text
 from roboirg.core.policy_ref import PolicyRef
+from roboirg.core.versions import NO_VERSION, Versions
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
 from roboirg.util.short_hash import short_hash
 
@@ -363,6 +364,12 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
         """The version of the policy with that of its server, if it reported one."""
         server = self.server_version
         return self.policy_version if server is None else f"{self.policy_version} (server {server})"
+
+    @property
+    def policy_versions(self) -> Versions:
+        """What the policy is, with its server's version unless an error came before that."""
+        missing = None if self.outcome == "error" else NO_VERSION
+        return self.ref.versions._replace(server_version=self.server_version or missing)
 
     @property
     def identity(self) -> Job:

@@ -15,7 +15,6 @@ from typing import NamedTuple
 from roboirg.core.error_words import MAX_CAUSE_LENGTH
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
-from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.evaluation.episode_errors import Terminated, format_cause
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import write_plan
@@ -30,6 +29,7 @@ from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     TORN_FILE,
     RecordStore,
+    check_same,
     read_index,
 )
 from roboirg.evaluation.run.executor import Executor
@@ -228,7 +228,7 @@ def _check_record_version(record: Record) -> None:
     """Refuse what a worker with another version of language or environment has played."""
     for what, version, ours in other_versions(record):
         raise StoreError(
-            f"A worker returned {record.slug} with {what} version {version}, but this roboirg has "
+            f"A worker returned {record.slug} with {what} {version}, but this roboirg has "
             f"version {ours}; the record was not stored."
         )
 
@@ -258,7 +258,7 @@ def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> N
     for record in records:
         for what, version, ours in other_versions(record):
             raise StoreError(
-                f"{folder} holds episodes of {what} version {version}, but this roboirg has "
+                f"{folder} holds episodes of {what} {version}, but this roboirg has "
                 f"version {ours}; choose another --out."
             )
     for task, split, episode, seed in {
@@ -276,25 +276,22 @@ def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> N
 
 
 def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> None:
-    """Refuse records of another version of a policy of the same name."""
-    known = {one.name: one for one in plan.policies}
-    for policy, version, is_verdict in {
-        (one.policy, one.policy_version, one.outcome != "error") for one in records
+    """Refuse records of another policy of the same name, or of another version of it."""
+    known = {ref.name: ref for ref in plan.policies}
+    for policy, versions, is_verdict in {
+        (record.policy, record.policy_versions, record.outcome != "error") for record in records
     }:
         now = known.get(policy)
-        # Two versions that could not be read may differ.
-        if now is None or (version == now.version and not (is_verdict and now.problem)):
+        if now is None:
             continue
-        if now.problem is not None:
+        # Two versions that could not be read may differ.
+        if now.problem is not None and (is_verdict or versions.policy_version != now.version):
             raise StoreError(
-                f"{folder} holds episodes of {policy} version {version}, but the policy cannot be "
-                f"opened to read its version now ({now.problem}); choose another --out."
+                f"{folder} holds episodes of {policy} version {versions.policy_version}, but the "
+                f"policy cannot be opened to read its version now ({now.problem}); choose another "
+                "--out."
             )
-        if now.is_foreign or now.version != UNKNOWN_VERSION:
-            raise StoreError(
-                f"{folder} holds episodes of {policy} version {version}, but the policy is now "
-                f"version {now.version}; choose another --out."
-            )
+        check_same(folder, policy, versions.differences(now.versions))
 
 
 @contextlib.contextmanager

@@ -13,6 +13,9 @@ from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.field_types import MOST_SECONDS
 
 Options = TypeVar("Options", bound=BaseModel)
+NOT_COMPARED = True
+"""Excludes an option from what a policy is: with another value it is the same policy, as the option
+only concerns the connection or the price, or is compared as the version."""
 Seconds = Annotated[float, Field(le=MOST_SECONDS)]
 """A time limit in an option."""
 

@@ -145,6 +145,7 @@ class StudyPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         written = msgspec.to_builtins(self)
         for one, trial in zip(written["trials"], self.trials, strict=True):
             one["job"]["options"] = identifying(trial.job.options)
+            del one["job"]["ref"]["makeup"]  # which plans did not have
         return short_hash(msgspec.json.encode(written))
 
     def trial(self, name: str) -> PlannedTrial:

@@ -22,7 +22,7 @@ from urllib.parse import quote
 import msgspec
 
 from roboirg.core.conditions import Fact, facts_of
-from roboirg.core.episode import Episode, Scene, describe_goal
+from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Scene, describe_goal
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.fact_traits import fact_traits
 from roboirg.core.plain_text import counted
@@ -91,12 +91,10 @@ class EpisodeDetails:
             policy="", task=record.task, split=record.split, episode=record.episode,
             options=record.options, arm=record.arm, wordings_file=record.wordings_file,
         )  # fmt: skip
-        foreign = {what for what, *_ in other_versions(record)}
-        scene = (
-            _played_scene(job.task, job.split, job.episode, job.arm)
-            if "environment" not in foreign
-            else _PlayedScene(None, {}, {})
-        )
+        foreign = other_versions(record)
+        scene = _PlayedScene(None, {}, {})
+        if record.environment_version == ENVIRONMENT_VERSION:
+            scene = _played_scene(job.task, job.split, job.episode, job.arm)
         cause, audit = record.attribution, record.prompt
         found: Details = {
             "turns": [[index(turn.stage), index(turn.text)] for turn in record.instruction],
@@ -282,9 +280,8 @@ def _conditions(record: Record) -> str:
         for name in ("actions", "demonstration_frames", "observe_every")
         if (value := getattr(record.environment, name)) is not None
     ]
-    server = "" if record.server_version is None else f" (server {record.server_version})"
     versions = (
-        f"policy {record.policy_version}{server}, language {record.language_version}, environment "
+        f"policy {record.played_version}, language {record.language_version}, environment "
         f"{record.environment_version}, roboirg {record.package_version}"
     )
     return f"{', '.join(parts)}; {versions}"

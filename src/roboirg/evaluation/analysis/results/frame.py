@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.arms import TOLD
+from roboirg.core.versions import Versions
 from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun, labels
 from roboirg.evaluation.records.record import Job, Summary
@@ -256,7 +257,7 @@ def make_frame(runs: Runs, planned: Sequence[Job] = (), *, named: str = "") -> F
     owners = {(one.policy, one.conditions): one for one, _, _ in reversed(rows if jobs else [])}
     for job in jobs.values():
         conditions = EvalConditions.of(job)
-        unplayed = PolicyRun(job.policy, conditions, None, named)
+        unplayed = PolicyRun(job.policy, conditions, Versions(), named)
         rows.append((owners.get((job.policy, conditions), unplayed), job, MISSING))
     return _sorted(rows, list(dict.fromkeys(job.policy for job in planned)))
 

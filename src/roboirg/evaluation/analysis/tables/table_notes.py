@@ -75,7 +75,7 @@ def notes_of(
         _absent_tasks({key.task for key in shown}),
         _TWIN_NOTE * any(row.name.endswith(TWIN_MARK) for row in rows),
         _FLOORS_NOTE * ("chance" in sources),
-        unmeasured_note(floors, [one.language for one in policy_runs if one.versions]),
+        unmeasured_note(floors, [one.language for one in policy_runs if one.language]),
         *(NOTES[table.of_paper] if table.of_paper and "published" in sources else ()),
         *comparison_notes(compared, names),
         *_average_notes(columns, rows),

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from roboirg.core.errors import MissingDependencyError
 from roboirg.core.handed_keys import remember_key
-from roboirg.policies.contract.option_checking import Seconds
+from roboirg.policies.contract.option_checking import NOT_COMPARED, Seconds
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.util.short_hash import short_hash
 
@@ -54,16 +54,16 @@ class ModelOptions(BaseModel):
 
     provider: Provider = "openai"
     model: str = Field(min_length=1)
-    base_url: str | None = None
-    api_key_env: str | None = None
-    timeout_s: Seconds = Field(default=120.0, gt=0)
-    retries: int = Field(default=2, ge=0, le=10)
-    patience_s: Seconds = Field(default=300.0, ge=0)
-    requests_per_minute: float | None = Field(default=None, ge=0.001)
+    base_url: str | None = Field(default=None, exclude=NOT_COMPARED)
+    api_key_env: str | None = Field(default=None, exclude=NOT_COMPARED)
+    timeout_s: Seconds = Field(default=120.0, gt=0, exclude=NOT_COMPARED)
+    retries: int = Field(default=2, ge=0, le=10, exclude=NOT_COMPARED)
+    patience_s: Seconds = Field(default=300.0, ge=0, exclude=NOT_COMPARED)
+    requests_per_minute: float | None = Field(default=None, ge=0.001, exclude=NOT_COMPARED)
     temperature: float | None = Field(default=0.0, ge=0)
     max_output_tokens: int | None = Field(default=None, ge=1)
-    input_price: float | None = Field(default=None, ge=0)
-    output_price: float | None = Field(default=None, ge=0)
+    input_price: float | None = Field(default=None, ge=0, exclude=NOT_COMPARED)
+    output_price: float | None = Field(default=None, ge=0, exclude=NOT_COMPARED)
     video: Literal["frames", "mp4"] = "frames"
     clip_frames: int = Field(default=16, ge=1)
     structured: bool = True
@@ -115,16 +115,7 @@ class ModelOptions(BaseModel):
 
     def about(self) -> dict[str, str | float | int | bool | None]:
         """Return, for records, the address and all that may change a reply; never a key."""
-        return {
-            **self.model_dump(
-                mode="json",
-                exclude={
-                    *("base_url", "api_key_env", "timeout_s", "retries", "patience_s"),
-                    *("requests_per_minute", "input_price", "output_price"),
-                },
-            ),
-            "address": self.address(),
-        }
+        return {**self.model_dump(mode="json"), "address": self.address()}
 
     @property
     def has_prices(self) -> bool:
