@@ -29,12 +29,12 @@ from roboirg.core.plain_text import counted
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     bin_keep_out,
-    button_footprint,
     button_keep_out,
     draw_bin,
     draw_button,
     draw_cubes,
     draw_number,
+    footprint,
 )
 from roboirg.tasks.shared.stages import PRESSED, press_stage
 from roboirg.tasks.task import Commands, Task, command_pools
@@ -66,7 +66,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     late = bool(rng.integers(2))
     button = draw_button(rng, BUTTON_REGION)
     # RoboMME places the bin without looking at the button; here its walls stay off the base.
-    bin_ = draw_bin(rng, BIN_REGION, [button_footprint(button)])
+    bin_ = draw_bin(rng, BIN_REGION, [footprint(button)])
     present = [COLORS[index] for index in rng.permutation(len(COLORS))]
     present = present[: COLORS_PRESENT[difficulty]]
     wanted = _draw_wanted(rng, difficulty, present)

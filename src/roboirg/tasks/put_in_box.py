@@ -12,8 +12,8 @@ import numpy as np
 from roboirg.core.conditions import Fact, Rule
 from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stage
 from roboirg.core.footprints import Footprint, Region
+from roboirg.tasks.shared.fixtures import footprint
 from roboirg.tasks.shared.real_table import (
-    box_footprint,
     draw_box,
     draw_sides,
     draw_tape,
@@ -38,7 +38,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
         draw_box(rng, f"box_{color}", color, on_side(LEFT_BOX_REGION, sides[color]))
         for color in BOXES
     )
-    obstacles: list[Footprint] = [box_footprint(box) for box in boxes]
+    obstacles: list[Footprint] = [footprint(box) for box in boxes]
     tape = draw_tape(rng, "tape", TAPE, TAPE_REGION, TAPE_GAP, obstacles)
     goal = Goal.of(color=str(BOXES[int(rng.integers(len(BOXES)))]))
     return Scene((*boxes, tape)), goal
