@@ -127,7 +127,7 @@ def rejudge(
 ) -> EpisodeReplay:
     """Judge an episode again by all its events, in order; steps count since the world began."""
     facts = facts_by_step(events, elapsed_steps)
-    judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+    judge = Judge.of(episode)
     expected_stages: list[int] = []
     expected = -len(episode.demonstration)
     for step in _evaluations(judge, events, elapsed_steps):
@@ -140,7 +140,7 @@ def rejudge(
 
 def decide(episode: Episode, events: Sequence[Event], elapsed_steps: int) -> Decision:
     """Judge an episode again up to its verdict; faster than `rejudge`."""
-    judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+    judge = Judge.of(episode)
     for step in _evaluations(judge, events, elapsed_steps):
         if judge.status is not Status.ONGOING:
             return Decision(judge, step)
@@ -151,7 +151,7 @@ def completed_stages(
     episode: Episode, events: Sequence[Event], elapsed_steps: int
 ) -> dict[int, int]:
     """Return the steps that completed stages of the policy, by index; faster than `rejudge`."""
-    judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+    judge = Judge.of(episode)
     found: dict[int, int] = {}
     for step in _evaluations(judge, events, elapsed_steps):
         found.setdefault(judge.index - len(episode.demonstration) - 1, step)
