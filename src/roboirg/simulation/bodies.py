@@ -73,7 +73,7 @@ class Body:
     @property
     def position(self) -> Point:
         """Position of the object's origin, world frame, m."""
-        return Point(*(float(value) for value in self.entity.pose.p))
+        return Point(*self.entity.pose.p.tolist())
 
     @property
     def yaw(self) -> float:
