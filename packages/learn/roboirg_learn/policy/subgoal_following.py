@@ -93,7 +93,7 @@ class LearnedHands(LearnedPolicy):
             return np.append(observation["end_effector"], LEAVE)[None]
         nothing = np.zeros(self.model.goal_size, np.float32)
         chosen = seen.decide(nothing, tool_of(observation), asked_for([self._asked]))
-        return np.asarray(chosen, np.float64)[None]
+        return chosen[None]
 
     def _take(self, subgoal: str) -> None:
         found = asked_numbers(subgoal, self.model.sight)
