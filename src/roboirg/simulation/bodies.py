@@ -22,7 +22,7 @@ from roboirg.core import object_sizes
 from roboirg.core.episode import ObjectKind, SceneObject
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.motions import Point
-from roboirg.simulation.rendering.tube_mesh import Rgba, tube
+from roboirg.simulation.rendering.tube_mesh import Rgba, tube_mesh
 
 Triple = tuple[float, float, float]
 Cuboid = tuple[Triple, Triple]
@@ -297,7 +297,8 @@ def _build_tape(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     body = finish_body(builder, scene, item, "dynamic")
     if visible:
         component = sapien.render.RenderBodyComponent()
-        component.attach(tube(outer, inner, object_sizes.TAPE_HALF, COLOR_RGBA[str(item.color)]))
+        mesh = tube_mesh(outer, inner, object_sizes.TAPE_HALF, COLOR_RGBA[str(item.color)])
+        component.attach(mesh.clone())
         body.entity.add_component(component)
     return body
 
