@@ -92,10 +92,14 @@ class EpisodeReplay:
         pairs = pairwise((*self.expected_stages, self.expected_stage))
         return ((now, step) for step, (now, then) in enumerate(pairs) if then != now >= 0)
 
-    def started(self, *roles: FactRole, after: int) -> Iterator[FactInterval]:
-        """Yield the intervals of facts with some roles that start later than a step."""
+    def started(self, *roles: FactRole, after: int | None = None) -> Iterator[FactInterval]:
+        """Yield the intervals of facts with some roles that start later than a step.
+
+        By default, those that start in the policy's turn.
+        """
+        start = self.policy_start_step if after is None else after
         return (
-            one for one in self.intervals if one.start > after and one.fact.traits.role in roles
+            one for one in self.intervals if one.start > start and one.fact.traits.role in roles
         )
 
     def tried(self, kind: FactKind, *subjects: str) -> Iterator[FactInterval]:
