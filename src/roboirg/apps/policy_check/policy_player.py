@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.policy_check.check_result import FAIL, CheckAbortedError, describe_error
+from roboirg.apps.policy_check.check_result import ending_checks
 from roboirg.apps.policy_check.expert_episode import ExpertEpisode
 from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.policy_needs import PolicyNeeds
@@ -102,19 +102,15 @@ class PolicyPlayer:
             CheckAbortedError: the policy raised, or gave no actions.
         """
         episode = copy.deepcopy(episode)
-        try:
+        with ending_checks(check, "reset(): "):
             policy = self.make_fresh() if fresh or self._policy is None else self._policy
             policy.reset(episode.instruction, episode.demonstration)
-        except (Exception, SystemExit) as error:
-            raise CheckAbortedError(check, FAIL, f"reset(): {describe_error(error)}") from error
         episodes, observation = SyntheticEpisodes(self.needs, self.seed), episode.first
         rollout = SyntheticRollout([], "")
         for _ in range(calls):
-            try:
+            with ending_checks(check, "act(): "):
                 actions = policy.act(observation)
                 chunk = check_chunk(actions, self.space)
-            except (Exception, SystemExit) as error:
-                raise CheckAbortedError(check, FAIL, f"act(): {describe_error(error)}") from error
             # A copy: a policy may reuse its array.
             rollout.chunks.append(chunk.copy())
             rollout = rollout._replace(dtype=str(np.asarray(actions).dtype))

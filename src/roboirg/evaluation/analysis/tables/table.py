@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Literal, NamedTuple
@@ -151,13 +150,10 @@ class Table:
                 names_group = not number or len(labels) == 1
                 yield not number, labels if names_group else ("", *labels[1:]), row
 
-    def groups(self) -> Iterable[list[Row]]:
+    def groups(self) -> list[list[Row]]:
         """Return the rows of each group; published policies are apart from others of the name."""
         is_by_policy = self.heads[0] == POLICY
-        groups: dict[object, list[Row]] = {}
-        for row in self.rows:
-            groups.setdefault((row.group, is_by_policy and row.source), []).append(row)
-        return groups.values()
+        return grouped(self.rows, lambda row: (row.group, is_by_policy and row.source))
 
     def labels(self, row: Row) -> tuple[str, ...]:
         """Return the label of a row below each head; names of published policies are marked."""
@@ -167,6 +163,14 @@ class Table:
         if row.source == "published" and POLICY in self.heads:
             labels[self.heads.index(POLICY)] += PUBLISHED_MARK
         return tuple(labels)
+
+
+def grouped(rows: Iterable[Row], key: Callable[[Row], object]) -> list[list[Row]]:
+    """Return the rows of each key; groups are in the order of their first rows."""
+    groups: dict[object, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(key(row), []).append(row)
+    return list(groups.values())
 
 
 def average(entries: Sequence[Entry]) -> Entry:
@@ -221,18 +225,23 @@ def _changed(columns: Sequence[Column], row: Row, reference: Row) -> Iterator[En
 
 
 def with_best(rows: Iterable[Row]) -> Iterator[Row]:
-    """Yield the rows with the best entries of each column, group and source marked.
+    """Yield rows, those of a group together, with its best entries in each column marked.
 
-    None is the best if all have the same rate, only one has a rate, or one is incomplete.
+    The sources are apart. None is the best if all have the same rate, only one has a rate, or one
+    is incomplete.
     """
-    for _, rivals in itertools.groupby(rows, lambda row: (row.group, row.source)):
-        found = list(rivals)
-        columns = zip(*(row.entries for row in found), strict=True)
-        for row, cells in zip(found, zip(*map(_with_best, columns), strict=True), strict=True):
-            yield replace(row, cells=cells)
+    for group in grouped(rows, lambda row: row.group):
+        for rivals in grouped(group, lambda row: row.source):
+            columns = zip(*(row.entries for row in rivals), strict=True)
+            best = [_best(column) for column in columns]
+            for row in rivals:
+                entries = zip(row.entries, best, strict=True)
+                cells = [replace(entry, best=entry.percent in rates) for entry, rates in entries]
+                yield replace(row, cells=cells)
 
 
-def _with_best(rivals: Sequence[Entry]) -> list[Entry]:
+def _best(rivals: Sequence[Entry]) -> set[Decimal | None]:
+    """Return the best rate, if there is one."""
     rates = {entry.percent for entry in rivals if entry.percent is not None}
     is_fair = len(rates) > 1 and not any(entry.marks for entry in rivals)
-    return [replace(one, best=is_fair and one.percent == max(rates)) for one in rivals]
+    return {max(rates)} if is_fair else set()
