@@ -93,7 +93,7 @@ def verify_run(
         if progress is not None:
             progress(done, len(run.newest))
         verdicts[check.replayed] += 1
-        if check.replayed is ReplayVerdict.TOLERANT:
+        if check.replayed == "tolerant":
             deviation = max(deviation, check.deviation)
         if check.findings:
             checks.append(check)
