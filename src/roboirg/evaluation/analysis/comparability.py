@@ -14,6 +14,7 @@ from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import words_label
 from roboirg.evaluation.analysis.published import MAX_STEPS, TRIALS, published_tasks
+from roboirg.evaluation.analysis.results.frame import RunNames
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cell, CellKey
 from roboirg.language.settings import EXPLICIT
@@ -69,7 +70,7 @@ def comparison_sign(differences: Differences | None) -> str:
     return DIFFERENT_SIGN if differences else COMPARABLE_SIGN
 
 
-def comparison_notes(found: AllDifferences, names: Mapping[PolicyRun, str]) -> list[str]:
+def comparison_notes(found: AllDifferences, names: RunNames) -> list[str]:
     """Return sentences that explain the signs and say what differs, by policy and task."""
     cells = {key: one for key, one in found.items() if comparison_sign(one)}
     notes = []

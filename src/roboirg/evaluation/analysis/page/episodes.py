@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from roboirg.evaluation.analysis.results.frame import Frame, join, make_frame
+from roboirg.evaluation.analysis.results.frame import Frame, RunNames, join, make_frame
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.plan.sources import Source
@@ -64,7 +64,7 @@ class PageEpisodes:
         return cls(runs, RunData(frame), tuple(_episodes(runs, frame, videos=videos)))
 
     @property
-    def names(self) -> Mapping[PolicyRun, str]:
+    def names(self) -> RunNames:
         """Labels of the policy runs, in the order of the page."""
         return self.data.frame.names
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 from roboirg.core.episode import DIFFICULTIES
@@ -10,12 +10,16 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.page.columns import setting_label
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
-from roboirg.evaluation.analysis.results.frame import suite, task_order
+from roboirg.evaluation.analysis.results.frame import RunNames, suite, task_order
 from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
-from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
 from roboirg.evaluation.analysis.stats.intervals import TOO_FEW
-from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
+from roboirg.evaluation.analysis.stats.measure import (
+    ALL_TASKS,
+    ScopeSummary,
+    Summaries,
+    summarize,
+)
 from roboirg.evaluation.analysis.stats.rates import interval_note, p_text, points, whole_percent
 
 
@@ -69,8 +73,8 @@ def _rows(cells: Cells) -> dict[str, dict[str, str | None]]:
 
 
 def _matrix_cells(
-    summaries: Mapping[ScopeKey, Measured[ScopeKey]],
-    names: Mapping[PolicyRun, str],
+    summaries: Summaries,
+    names: RunNames,
     rows: Collection[str],
     columns: Sequence[InstructionOptions],
 ) -> list[dict[str, Any]]:
@@ -86,7 +90,7 @@ def _matrix_cells(
     ]
 
 
-def _cell(one: Measured[ScopeKey], subject: str) -> dict[str, Any]:
+def _cell(one: ScopeSummary, subject: str) -> dict[str, Any]:
     cell: dict[str, Any] = {"note": notes(one, subject)}
     if one.rate is not None:
         cell |= {"rate": round(float(one.rate), 4), "text": whole_percent(one.rate)}
@@ -100,7 +104,7 @@ def _cell(one: Measured[ScopeKey], subject: str) -> dict[str, Any]:
     return cell
 
 
-def notes(one: Measured[ScopeKey], subject: str) -> list[str]:
+def notes(one: ScopeSummary, subject: str) -> list[str]:
     """Return a cell in words: first its subject, then its results."""
     lines, counts = [f"{subject}, {options_label(one.key.options)}"], one.counts
     if one.rate is None:
@@ -124,7 +128,7 @@ def notes(one: Measured[ScopeKey], subject: str) -> list[str]:
     return lines
 
 
-def _gap_notes(one: Measured[ScopeKey]) -> list[str]:
+def _gap_notes(one: ScopeSummary) -> list[str]:
     lines: list[str] = []
     if one.gap is not None:
         gap = f"{points(one.gap.value)} points to explicit"

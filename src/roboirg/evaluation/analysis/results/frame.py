@@ -28,6 +28,8 @@ Runs = Sequence[tuple[str, Sequence[Summary]]]
 """Results of runs, each with its name."""
 
 
+RunNames = Mapping[PolicyRun, str]
+"""Labels of policy runs, in order."""
 _Row = tuple[PolicyRun, Job, str]
 """Who plays; the result, or the job of an episode that was not played; and the outcome."""
 
@@ -208,12 +210,12 @@ class Frame(Mapping[str, Any]):
         return list(self["result"][self["outcome"] != MISSING])
 
     @cached_property
-    def names(self) -> Mapping[PolicyRun, str]:
+    def names(self) -> RunNames:
         """Labels of the policy runs, in order."""
         return labels(self["run"])
 
     @property
-    def names_as_played(self) -> Mapping[PolicyRun, str]:
+    def names_as_played(self) -> RunNames:
         """Labels of the policy runs, in the order of their first records."""
         return {run: self.names[run] for run in self["run"][np.argsort(self["place"])]}
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.plain_text import counted
+from roboirg.evaluation.analysis.results.frame import RunNames
 from roboirg.evaluation.analysis.results.option_labels import reference_of
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cell, Cells
@@ -55,7 +56,7 @@ class Headline:
         )
 
 
-def headline_notes(cells: Cells, names: Mapping[PolicyRun, str]) -> Iterator[str]:
+def headline_notes(cells: Cells, names: RunNames) -> Iterator[str]:
     """Yield a sentence with the headline number of each policy run that played what it needs.
 
     For a run in words whose floors were not measured, the sentence gives the reason.

@@ -6,8 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
-from roboirg.evaluation.analysis.results.frame import MISSING, Frame
-from roboirg.evaluation.analysis.results.policy_run import PolicyRun
+from roboirg.evaluation.analysis.results.frame import MISSING, Frame, RunNames
 from roboirg.evaluation.analysis.stats.cells import Key
 from roboirg.evaluation.analysis.stats.rates import whole_percent
 
@@ -31,7 +30,7 @@ def count_heard(frame: Frame, by: Sequence[str]) -> Mapping[Key, HeardCounts]:
     return {key: counts for key, counts in found.items() if key[0] in declared}
 
 
-def heard_notes(frame: Frame, names: Mapping[PolicyRun, str]) -> list[str]:
+def heard_notes(frame: Frame, names: RunNames) -> list[str]:
     """Return a sentence for each policy of which some prompts were cut, or may have been."""
     counts = count_heard(frame, ())
     found = {run: one for (run,), one in counts.items() if one["cut"] or one["unknown"]}

@@ -244,6 +244,11 @@ class ScopeKey(NamedTuple):
     options: InstructionOptions
 
 
+ScopeSummary = Measured[ScopeKey]
+"""What was measured in a scope."""
+Summaries = Mapping[ScopeKey, ScopeSummary]
+
+
 def by_scope(cells: Cells) -> Mapping[ScopeKey, ByTask]:
     """Group cells by scope, in their order: tasks, then suites, then all tasks."""
     levels: tuple[dict[ScopeKey, dict[str, Cell]], ...] = ({}, {}, {})
@@ -254,9 +259,7 @@ def by_scope(cells: Cells) -> Mapping[ScopeKey, ByTask]:
     return {key: own for level in levels for key, own in level.items()}
 
 
-def summarize(
-    cells: Cells, wanted: Collection[str] | None = None
-) -> Mapping[ScopeKey, Measured[ScopeKey]]:
+def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
     """Measure each policy run and set of options in each scope, or in those that are wanted.
 
     The gap is to explicit, the second gap is the implicit form less the resolved one. P-values are

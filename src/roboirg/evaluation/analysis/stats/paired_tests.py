@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -74,16 +75,16 @@ class Pairs:
             rows.append(
                 (sum(ours_shared), len(ours_shared), sum(theirs_shared), len(theirs_shared))
             )
-        trials = [
-            (won, second.verdicts[at])
-            for at, won in first.verdicts.items()
-            if at in second.verdicts
-        ]
+        counts = Counter(
+            (won, second.verdicts[trial])
+            for trial, won in first.verdicts.items()
+            if trial in second.verdicts
+        )
         overlap = Overlap(
-            both=trials.count((True, True)),
-            only_first=trials.count((True, False)),
-            only_second=trials.count((False, True)),
-            neither=trials.count((False, False)),
+            both=counts[True, True],
+            only_first=counts[True, False],
+            only_second=counts[False, True],
+            neither=counts[False, False],
         )
         return cls(np.array(rows, dtype=np.int64).reshape(-1, 4), overlap)
 
@@ -154,6 +155,7 @@ def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = D
     rows = [pairs.rows for pairs in paired]
     sizes = [len(each) for each in rows]
     drawn = resampled_rates(rows, rng, draws)
+    counts = zip(*(pairs.overlap for pairs in paired), strict=True)
     return Gap(
         value=first - second,
         interval=resampled_interval(drawn[:, 0] - drawn[:, 1], sizes, least=-1.0),
@@ -163,14 +165,8 @@ def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = D
         tasks=len(paired),
         episodes=sum(sizes),
         trials=int(np.concatenate(rows)[:, 1::2].sum()),
-        overlap=pooled_overlap(paired),
+        overlap=Overlap._make(map(sum, counts)),
     )
-
-
-def pooled_overlap(tasks: Sequence[Pairs]) -> Overlap:
-    """Add the overlaps of several tasks."""
-    counts = zip(*(pairs.overlap for pairs in tasks), strict=True)
-    return Overlap._make(map(sum, counts)) if tasks else Overlap(0, 0, 0, 0)
 
 
 def sign_flip_test(differences: NDArray[np.int64]) -> float:

@@ -59,14 +59,14 @@ def make_arm_table(data: RunData) -> Table:
         columns=named_columns(
             "episodes", "first, %", "second, %", "chance", "difference", "95 % interval", "p"
         ),
-        rows=tuple(
+        rows=[
             Row(
                 f"{names[one.key.run]}, {options_label(one.key.options)}",
                 f"{one.key.contrast.name}: {one.key.contrast.first} − {one.key.contrast.second}",
                 _words(one),
             )
             for one in found
-        ),
+        ],
         notes=(_NOTE,),
     )
 

@@ -91,12 +91,12 @@ def make_facts_table(data: RunData, records: Iterable[Record]) -> Table:
         title="Facts of the run",
         heads=("of", "fact"),
         columns=(Column("value", is_text=True),),
-        rows=tuple(
+        rows=[
             Row(of, name, ["; ".join(values) or NOT_REPORTED])
             for of in (RUN, *totals)
             for (owner, name), values in known.items()
             if owner == of
-        ),
+        ],
     )
 
 

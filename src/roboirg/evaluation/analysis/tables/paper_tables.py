@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -17,12 +17,12 @@ from roboirg.evaluation.analysis.published import (
     published_lines,
     published_rows,
 )
+from roboirg.evaluation.analysis.results.frame import RunNames
 from roboirg.evaluation.analysis.results.option_labels import (
     reference_of,
     setting_sort_key,
     staged_options,
 )
-from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cell, CellKey, Cells, cell_interval
 from roboirg.evaluation.analysis.stats.chance import floor_level
 from roboirg.evaluation.analysis.stats.intervals import SEED
@@ -73,7 +73,7 @@ def make_table(
     if which == COVERAGE:
         return _coverage()
     check_names("table", [which], WHICH)
-    names: Mapping[PolicyRun, str] = {} if data is None else data.told.frame.names_as_played
+    names: RunNames = {} if data is None else data.told.frame.names_as_played
     cells: Cells = {} if data is None else data.told.cells
     table = PAPER_TABLES[which]
     tasks = table.tasks(cells)
@@ -100,7 +100,7 @@ def make_table(
         title=table.title,
         heads=table.heads,
         columns=columns,
-        rows=tuple(_by_policy(rows) if table.heads == (POLICY, "setting") else rows),
+        rows=_by_policy(rows) if table.heads == (POLICY, "setting") else rows,
         notes=notes_of(table, columns, rows, cells, names, differences, floors),
     )
 
@@ -194,11 +194,10 @@ def _published_row(table: PaperTable, columns: Sequence[Column], row: PublishedR
     return replace(table.row(row.options, row.model, cells), source="published")
 
 
-def _by_policy(rows: Sequence[Row]) -> Iterator[Row]:
-    """Yield rows that are grouped by setting grouped by policy instead."""
-    for group in grouped(rows, lambda row: (row.source, row.name)):
-        for row in group:
-            yield replace(row, group=row.name, name=row.group)
+def _by_policy(rows: Sequence[Row]) -> list[Row]:
+    """Return rows that are grouped by setting grouped by policy instead."""
+    groups = grouped(rows, lambda row: (row.source, row.name))
+    return [replace(row, group=row.name, name=row.group) for group in groups for row in group]
 
 
 def _references(table: PaperTable, rows: Sequence[Row]) -> Iterator[Row | None]:
@@ -227,6 +226,6 @@ def _coverage() -> Table:
         title="Implicit references in benchmarks",
         heads=heads,
         columns=named_columns(*covers),
-        rows=tuple(rows),
+        rows=rows,
         notes=("partial: pronouns within a chain of actions only. Source: the paper.",),
     )

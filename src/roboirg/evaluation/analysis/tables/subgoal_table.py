@@ -86,14 +86,14 @@ def make_subgoal_table(data: RunData, records: Iterable[Record]) -> Table:
             *(Column(one, "failed episodes") for one in failures),
             *(Column(_COSTS[one], "per episode") for one in costs),
         ),
-        rows=tuple(
+        rows=[
             Row(
                 f"{data.frame.names[key.policy_run]}, {options_label(key.options)}",
                 key.task,
-                tuple(_words(counts, failures, costs)),
+                list(_words(counts, failures, costs)),
             )
             for key, counts in shown.items()
-        ),
+        ],
         notes=notes,
     )
 

@@ -133,9 +133,9 @@ class Table:
     key: str
     title: str
     heads: tuple[str, ...]
-    columns: tuple[Column, ...]
-    rows: tuple[Row, ...]
-    notes: tuple[str, ...] = ()
+    columns: Sequence[Column]
+    rows: Sequence[Row]
+    notes: Sequence[str] = ()
 
     @property
     def headings(self) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from roboirg.core.instruction_options import ALL_STAGES, InstructionOptions
 from roboirg.evaluation.analysis.published import AVERAGE, RateTable, published_tasks
+from roboirg.evaluation.analysis.results.frame import RunNames
 from roboirg.evaluation.analysis.results.option_labels import (
     has_default_options,
     is_usual,
@@ -87,7 +88,7 @@ class PaperTable:
         return (*columns, Column(AVERAGE, averages=tuple(tasks)))
 
     def positions(
-        self, cells: Cells, names: Mapping[PolicyRun, str]
+        self, cells: Cells, names: RunNames
     ) -> Iterator[tuple[PolicyRun, InstructionOptions, str]]:
         """Yield policy run, options and label of the policy of each row."""
         tasks = set(self.tasks(cells))
