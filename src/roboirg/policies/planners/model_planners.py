@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.observations import Observation
 from roboirg.core.subgoal_text import split_point
 from roboirg.policies.planners.planner import WHEN_DONE
 from roboirg.policies.planners.points import normalize_subgoal, parse_points
@@ -56,9 +56,8 @@ class QwenPlanner(VLMPlanner[QwenOptions]):
     ButtonUnmaskSwap, by the text of the subgoal, as a policy does not know its task. Only these
     tasks have such subgoals."""
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode."""
-        super().reset(instruction, demonstration)
+    def forget(self) -> None:
+        """Forget the subgoals."""
         self._history: list[str] = []
 
     def query(self, observation: Observation) -> ModelQuery:
@@ -105,9 +104,8 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
         super().__init__(options, kind, seed)
         self.demonstration_frames = "all" if options.observe_every == 1 else options.observe_every
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+    def forget(self) -> None:
         """Begin a new conversation, without frames of the last episode."""
-        super().reset(instruction, demonstration)
         self._frames: list[Pixels] = []
         self._turns: list[ChatTurn] = []
         self._quoted = ""
@@ -180,9 +178,8 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
 
     options_type = MemerOptions
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+    def forget(self) -> None:
         """Clear the memory."""
-        super().reset(instruction, demonstration)
         self.frames: dict[int, Pixels] = {}
         self._recent: dict[int, Pixels] = {}
         self._last_step = 0
@@ -264,9 +261,8 @@ class StatelessPlanner(VLMPlanner[StatelessOptions]):
 
     options_type = StatelessOptions
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode."""
-        super().reset(instruction, demonstration)
+    def forget(self) -> None:
+        """Forget the pictures."""
         self._past: list[Pixels] = []
 
     def watch(self, observation: Observation, step: int) -> None:  # noqa: ARG002

@@ -85,7 +85,7 @@ class VLMPlanner(ABC, Generic[Options]):
         self.prompts, self.shared = load_prompts(kind, options.prompts), load_prompts(SHARED)
         self.fill = self.prompts.fill
         self.vlm = VLMQuery(options.model, self.prompts["again"])
-        VLMPlanner.reset(self, "", {})
+        self.reset("", {})
 
     @property
     def version(self) -> str:
@@ -113,6 +113,10 @@ class VLMPlanner(ABC, Generic[Options]):
         seen = len(demonstration.get("joint_positions", ()))
         self.video: Pixels | None = demonstration["front_rgb"] if seen else None
         self._summary: Clip | None = None
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget what was remembered of the last episode."""
 
     def hear(self, text: str, step: int) -> None:  # noqa: ARG002
         """Remember an utterance; the next query quotes everything that was said."""

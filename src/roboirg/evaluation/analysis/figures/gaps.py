@@ -45,7 +45,7 @@ WORDS: Mapping[RateTable, tuple[str, str, str]] = {
 
 Tasks = Mapping[InstructionOptions, Sequence[str]]
 """The tasks of each column."""
-Played = Mapping[tuple[InstructionOptions, PolicyRun], Mapping[str, Cell]]
+Played = Mapping[InstructionOptions, Mapping[PolicyRun, ByTask]]
 """By column and policy run, the tasks with a verdict."""
 
 
@@ -95,10 +95,10 @@ def _title(which: RateTable, options: InstructionOptions) -> str:
 
 
 def _played(which: RateTable, cells: Cells) -> Played:
-    found: dict[tuple[InstructionOptions, PolicyRun], dict[str, Cell]] = {}
+    found: dict[InstructionOptions, dict[PolicyRun, dict[str, Cell]]] = {}
     for (policy_run, task, options), cell in cells.items():
         if cell.verdicts and PAPER_TABLES[which].shows(options):
-            found.setdefault((options, policy_run), {})[task] = cell
+            found.setdefault(options, {}).setdefault(policy_run, {})[task] = cell
     return found
 
 
@@ -108,12 +108,10 @@ def _shared_tasks(which: RateTable, played: Played) -> dict[InstructionOptions, 
     Those that played the reference as well must have played these tasks with it.
     """
     shared = {}
-    for options in sorted({options for options, _ in played}, key=row_order):
-        runs = [policy_run for one, policy_run in played if one == options]
-        places = [
-            (one, run) for one in (options, PAPER_TABLES[which].reference(options)) for run in runs
-        ]
-        needed = [played[place] for place in places if place in played]
+    for options in sorted(played, key=row_order):
+        runs = played[options]
+        before = played.get(PAPER_TABLES[which].reference(options), {})
+        needed = [*runs.values(), *(own for run, own in before.items() if run in runs)]
         if tasks := [task for task in needed[0] if all(task in own for own in needed)]:
             shared[options] = tasks
     return shared
@@ -131,17 +129,17 @@ def _own_rates(
     which: RateTable, policy_run: PolicyRun, played: Played, tasks: Tasks
 ) -> dict[str, Rate]:
     """Return the rates of a policy run by column, over exactly the column's tasks."""
-    table = PAPER_TABLES[which]
+    own = {options: runs[policy_run] for options, runs in played.items() if policy_run in runs}
 
     def reference(key: tuple[InstructionOptions]) -> ByTask:
-        before = table.reference(key[0])
-        return NOTHING if key[0] == before else played.get((before, policy_run), NOTHING)
+        before = PAPER_TABLES[which].reference(key[0])
+        return NOTHING if key[0] == before else own.get(before, NOTHING)
 
     found = measure_groups(
         {
-            (options,): {task: own[task] for task in names}
+            (options,): {task: own[options][task] for task in names}
             for options, names in tasks.items()
-            if (own := played.get((options, policy_run)))
+            if options in own
         },
         [reference],
         is_mean=lambda _key: True,
@@ -157,9 +155,13 @@ def _own_rates(
 def _size_and_sign(policy_run: PolicyRun, cells: Cells, differences: AllDifferences) -> str:
     """Return how many episodes a policy has per cell, and whether its rates are comparable."""
     trials = [cell.rows()[:, 1] for key, cell in cells.items() if key.policy_run == policy_run]
-    sizes, seeds = [*map(len, trials)], max(max(one) for one in trials)
-    low, high = min(sizes), max(sizes)
-    text = f"n = {low}" + f" to {high}" * (low < high) + f" × {seeds}" * bool(seeds > 1)
+    sizes = sorted({len(one) for one in trials})
+    seeds = max(max(one) for one in trials)
+    text = f"n = {sizes[0]}"
+    if len(sizes) > 1:
+        text += f" to {sizes[-1]}"
+    if seeds > 1:
+        text += f" × {seeds}"
     own = [one for key, one in differences.items() if key.policy_run == policy_run]
     signs = [comparison_sign(one) for one in own if one is not None]
     if signs:

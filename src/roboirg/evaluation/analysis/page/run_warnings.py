@@ -44,13 +44,12 @@ def run_warnings(episodes: PageEpisodes) -> list[tuple[str, str]]:
     These are sentences above the results, each after its kind, ``warning`` or ``note``.
     """
     heard = heard_notes(episodes.data.frame, episodes.names)
-    warnings = (_incomplete(episodes), mixtures([one.record for one in episodes.all]), heard)
     headline = headline_notes(episodes.data.cells, episodes.names)
-    notes = (_without_reference(episodes), _private(episodes), headline)
-    return [
-        *(("warning", text) for text in chain(*warnings)),
-        *(("note", text) for text in chain(*notes)),
-    ]
+    kinds = {
+        "warning": (_incomplete(episodes), mixtures([one.record for one in episodes.all]), heard),
+        "note": (_without_reference(episodes), _private(episodes), headline),
+    }
+    return [(kind, text) for kind, parts in kinds.items() for text in chain(*parts)]
 
 
 def facts_of(episodes: PageEpisodes) -> list[tuple[str, str]]:
@@ -70,18 +69,12 @@ def facts_of(episodes: PageEpisodes) -> list[tuple[str, str]]:
 
 def comparisons(episodes: PageEpisodes) -> list[dict[str, Any]]:
     """Return the comparison of the first pairs of policies in words."""
-    names = list(episodes.names)
-    arms = [one.conditions.arm for one in names]
-    alike = [pair for pair in combinations(range(len(names)), 2) if arms[pair[0]] == arms[pair[1]]]
-    pairs = alike[:MAX_COMPARISONS]
-    return [
-        {
-            "left": first,
-            "right": second,
-            "sentences": _compared(episodes, names[first], names[second]),
-        }
-        for first, second in pairs
-    ]
+    found = []
+    for (left, first), (right, second) in combinations(enumerate(episodes.names), 2):
+        if first.conditions.arm == second.conditions.arm and len(found) < MAX_COMPARISONS:
+            words = _compared(episodes, first, second)
+            found.append({"left": left, "right": right, "sentences": words})
+    return found
 
 
 def _compared(episodes: PageEpisodes, first: PolicyRun, second: PolicyRun) -> list[str]:

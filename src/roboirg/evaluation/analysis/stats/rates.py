@@ -41,6 +41,11 @@ def whole_percent(rate: float | Fraction) -> str:
     return f"{100 * float(rate):.0f}"
 
 
+def percent_range(low: Fraction, high: Fraction) -> str:
+    """Return two rates as whole percentages, one if they are equal then: ``3–7``."""
+    return "–".join(dict.fromkeys((whole_percent(low), whole_percent(high))))
+
+
 def points(gap: float, decimals: int = 0) -> str:
     """Return a gap in signed percentage points, with a proper minus: ``−12``, ``+3``, ``±0``."""
     text = f"{100 * gap:+.{decimals}f}".replace("-", "−")

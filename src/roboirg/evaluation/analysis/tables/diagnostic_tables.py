@@ -19,7 +19,7 @@ from roboirg.evaluation.analysis.results.option_labels import (
     setting_sort_key,
 )
 from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, break_down
-from roboirg.evaluation.analysis.stats.cells import NOTHING, Key, cells_of
+from roboirg.evaluation.analysis.stats.cells import NOTHING, Key, cells_of, rows_of
 from roboirg.evaluation.analysis.stats.comparison_text import incomplete_note
 from roboirg.evaluation.analysis.stats.failure_rates import (
     Ends,
@@ -43,7 +43,7 @@ from roboirg.evaluation.analysis.stats.rates import (
     NOT_APPLICABLE,
     gap_words,
     percent,
-    whole_percent,
+    percent_range,
 )
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
@@ -152,11 +152,10 @@ def make_forms_table(data: RunData) -> Table:
 
 def count_failures(frame: Frame, by: Sequence[str]) -> Mapping[Key, Counter[str]]:
     """Return, by some columns, the number of ``trials`` with a verdict and of failures by name."""
-    found: dict[Key, Counter[str]] = {}
-    names = ("outcome", "failure", *by)
-    for outcome, failure, *key in zip(*(frame[name] for name in names), strict=True):
+    found: defaultdict[Key, Counter[str]] = defaultdict(Counter)
+    for *key, outcome, failure in rows_of(frame, *by, "outcome", "failure"):
         if outcome in ("success", "failure"):
-            counts = found.setdefault(tuple(key), Counter())
+            counts = found[tuple(key)]
             counts["trials"] += 1
             if outcome == "failure":
                 counts[failure if failure in FAILURES else UNATTRIBUTED] += 1
@@ -208,7 +207,7 @@ def _ends(success: ScopeSummary, *kinds: ScopeSummary) -> RowCells:
 
 
 def _share_text(ends: Ends | None) -> str:
-    return NOT_APPLICABLE if ends is None else "–".join(dict.fromkeys(map(whole_percent, ends)))
+    return NOT_APPLICABLE if ends is None else percent_range(*ends)
 
 
 def make_failure_name_table(data: RunData) -> Table:

@@ -71,21 +71,25 @@ def make_facts_table(data: RunData, records: Iterable[Record]) -> Table:
     results = [one for one in data.frame["result"] if isinstance(one, Summary)]
     kept = {(one.slug, one.started_at) for one in results}
     known: defaultdict[tuple[str, str], dict[str, None]] = defaultdict(dict)
+
+    def add(owner: str, name: str, *values: object) -> None:
+        for value in values:
+            known[owner, name] |= dict.fromkeys(_words(value))
+
     totals: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for record in records:
         if (record.slug, record.started_at) in kept:  # without what was played again
             for name, value in _of_policy(record):
-                known[record.policy, name] |= dict.fromkeys(_words(value))
+                add(record.policy, name, value)
             total = totals[record.policy]
             total.update(steps=record.steps, calls=record.calls)
             total["executed"] = max(total["executed"], record.executed)
     for name, values in _of_run(results, data):
-        known[RUN, name] |= dict.fromkeys(word for value in values for word in _words(value))
+        add(RUN, name, *values)
     for policy, total in totals.items():
-        mean = f"{total['steps'] / total['calls']:.1f}" if total["calls"] else ""
-        known[policy, "control steps per call, mean"] |= dict.fromkeys(_words(mean))
-        most = total["executed"] or None
-        known[policy, "actions executed per call, most"] |= dict.fromkeys(_words(most))
+        mean = f"{total['steps'] / total['calls']:.1f}" if total["calls"] else None
+        add(policy, "control steps per call, mean", mean)
+        add(policy, "actions executed per call, most", total["executed"] or None)
     return Table(
         key="facts",
         title="Facts of the run",

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.results.reading import with_columns
-from roboirg.evaluation.analysis.stats.cells import CellKey
+from roboirg.evaluation.analysis.stats.cells import CellKey, rows_of
 from roboirg.evaluation.analysis.stats.planner_failures import PLANNER_FAILURES, planner_failure
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.table import Column, Row, Table
@@ -59,23 +59,24 @@ def make_subgoal_table(data: RunData, records: Iterable[Record]) -> Table:
     frame = with_columns(data.frame, records, _READ)
     found: defaultdict[CellKey, Counter[str]] = defaultdict(Counter)
     names = ("run", "task", "options", *_READ)
-    for run, task, options, verdicts, failure, usage in zip(
-        *(frame[name] for name in names), strict=True
-    ):
+    for run, task, options, verdicts, failure, usage in rows_of(frame, *names):
         if usage is not None:  # else the episode was not played
             counts = found[CellKey(run, task, options)]
-            counts.update(("episodes", *verdicts, *([failure] if failure else ())))
+            counts.update(("episodes", *verdicts))
             counts.update({name: value for name, value in usage if name in _COSTS})
+            if failure:
+                counts[failure] += 1
     known = (*SUBGOAL_VERDICTS, *PLANNER_FAILURES)
     shown = {key: one for key, one in found.items() if any(one[name] for name in known)}
     if not shown:
         raise InvalidValueError("No planner of the runs named a subgoal; their records hold none.")
-    failures, costs = (
-        [name for name in names if any(one[name] > 0 for one in shown.values())]
-        for names in (PLANNER_FAILURES, _COSTS)
-    )
-    meanings = "; ".join(f"{one}: {PLANNER_FAILURES[one]}" for one in failures)
-    notes = (_NOTE, *([f"Failed episodes, by what the planner did: {meanings}."] * bool(failures)))
+    occurring = {name for counts in shown.values() for name in counts if counts[name] > 0}
+    failures = [name for name in PLANNER_FAILURES if name in occurring]
+    costs = [name for name in _COSTS if name in occurring]
+    notes = [_NOTE]
+    if failures:
+        meanings = "; ".join(f"{name}: {PLANNER_FAILURES[name]}" for name in failures)
+        notes.append(f"Failed episodes, by what the planner did: {meanings}.")
     return Table(
         key="subgoals",
         title="Subgoals of planners",

@@ -77,14 +77,10 @@ class PaperTable:
             suites: dict[str, list[str]] = {}
             for task in tasks:
                 suites.setdefault(all_tasks()[task].suite.capitalize(), []).append(task)
-            columns = [
-                column
-                for suite, own in suites.items()
-                for column in (
-                    *(Column(name, suite) for name in own),
-                    Column(f"{suite} {AVERAGE}", suite, tuple(own)),
-                )
-            ]
+            columns = []
+            for suite, own in suites.items():
+                columns += [Column(name, suite) for name in own]
+                columns.append(Column(f"{suite} {AVERAGE}", suite, tuple(own)))
         return (*columns, Column(AVERAGE, averages=tuple(tasks)))
 
     def positions(
