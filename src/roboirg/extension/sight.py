@@ -89,7 +89,9 @@ def labeled_views(episode: Episode, later: int) -> tuple[LabeledView, ...]:
 
 
 def _view(world: World, episode: Episode) -> LabeledView:
-    names, centers, positions = [], [], []
+    names = []
+    centers = []
+    positions = []
     pixels = pixels_by_object(world)
     for item in episode.scene.objects:
         rows, columns = pixels[item.name]
@@ -245,7 +247,8 @@ class _LookRecorder(EpisodeLoop):
 
     def __init__(self, env: RoboIRGEnv, policy: WaypointExpert, drawn: range) -> None:
         super().__init__(env, policy)
-        self._expert, self._drawn = policy, drawn
+        self._expert = policy
+        self._drawn = drawn
         self._rows: list[tuple[Any, ...]] = []
         self._decisions: list[tuple[int, ExpertWaypoint]] = []
         self._pictures: dict[int, bytes] = {}

@@ -98,7 +98,8 @@ def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
     if log is not None and play:
         again, played = replay(record, log)
     else:
-        again, played = unplayed(record), None
+        again = unplayed(record)
+        played = None
     findings = list(_differences(record, again, WORD_FIELDS))
     if log is None and record.outcome != "error":
         findings.append("Its actions were not kept, so the verdict cannot be checked.")
@@ -131,7 +132,8 @@ def _words(record: Record, unplayed: Record) -> Iterator[str]:
 
 def _differences(record: Record, again: Record, fields: tuple[str, ...]) -> Iterator[str]:
     for name in fields:
-        recorded, expected = getattr(record, name), getattr(again, name)
+        recorded = getattr(record, name)
+        expected = getattr(again, name)
         if recorded != expected:
             yield _difference(name, recorded, expected)
 

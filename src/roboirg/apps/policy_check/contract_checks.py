@@ -126,7 +126,8 @@ def _describe_actions(
 
 def check_reports(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Check what records get from the policy besides its actions."""
-    policy, source = player.policy, player.source
+    policy = player.policy
+    source = player.source
     is_ours = isinstance(source, str) and not read_policy(source).is_foreign
     try:
         metadata = policy_metadata(policy, is_ours=is_ours)
@@ -161,7 +162,8 @@ def check_determinism(player: PolicyPlayer) -> Iterator[CheckResult]:
 
 def check_reset(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Check that an episode does not depend on the one before it."""
-    name, expected = "reset forgets", player.expected
+    name = "reset forgets"
+    expected = player.expected
     if not (player.repeatable and getattr(player.policy, "deterministic", True)):
         yield CheckResult(name, "note", "Not checked: the policy is not deterministic.")
         return

@@ -82,7 +82,8 @@ def _check_gripper(answers: Chunks, moments: list[ExpertMoment]) -> Iterator[Che
     opens = np.array([moment.actions[0, -1] > 0 for moment in moments])
     if min(opens.sum(), (~opens).sum()) < MIN_MOMENTS:
         return
-    opened, closed = given[opens], given[~opens]
+    opened = given[opens]
+    closed = given[~opens]
     gap = GRIPPER_GAP * (given.max() - given.min())
     if gap > 0 and opened.max() + gap < closed.min():
         message = (

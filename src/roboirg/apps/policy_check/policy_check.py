@@ -90,7 +90,8 @@ def print_check_results(results: list[CheckResult], console: Console) -> None:
         )
     console.print(table, highlight=False)
     verdicts = [result.verdict for result in results]
-    failed, warned = verdicts.count("fail"), verdicts.count("warn")
+    failed = verdicts.count("fail")
+    warned = verdicts.count("warn")
     checks = counted(len(results), "check")
     summary = f"{failed} of {checks} failed" if failed else f"{checks}, none failed"
     console.print(f"{summary}, {counted(warned, 'warning')}." if warned else f"{summary}.")

@@ -49,7 +49,8 @@ class PolicyPlayer:
     """
 
     def __init__(self, source: str | Policy, seed: int) -> None:
-        self.source, self.seed = source, seed
+        self.source = source
+        self.seed = seed
         self.needs = PolicyNeeds()
         self.repeatable = False
         self._policy: Policy | None = None
@@ -105,7 +106,8 @@ class PolicyPlayer:
         with ending_checks(check, "reset(): "):
             policy = self.make_fresh() if fresh or self._policy is None else self._policy
             policy.reset(episode.instruction, episode.demonstration)
-        episodes, observation = SyntheticEpisodes(self.needs, self.seed), episode.first
+        episodes = SyntheticEpisodes(self.needs, self.seed)
+        observation = episode.first
         rollout = SyntheticRollout([], "")
         for _ in range(calls):
             with ending_checks(check, "act(): "):
@@ -134,7 +136,8 @@ class PolicyPlayer:
         return self._policy
 
     def close(self) -> None:
-        policy, self._policy = self._policy, None
+        policy = self._policy
+        self._policy = None
         close_policy(policy)
 
 

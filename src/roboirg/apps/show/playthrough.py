@@ -105,7 +105,8 @@ class _MomentRecorder:
     _is_demonstration: bool | None = None
 
     def __call__(self, env: RoboIRGEnv, is_demonstration: bool) -> None:
-        judge, step = env.session.judge, env.session.world.elapsed
+        judge = env.session.judge
+        step = env.session.world.elapsed
         key_event = self.key_events.at(step, judge.index)
         begins = is_demonstration != self._is_demonstration
         completes = judge.index > self._completed

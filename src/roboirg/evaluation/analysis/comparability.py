@@ -104,7 +104,8 @@ def _text(tasks: Mapping[str, Differences]) -> str:
 
 
 def _explicit_differences(policy_run: PolicyRun, cell: Cell) -> Iterator[str]:
-    conditions, versions = policy_run.conditions, policy_run.versions
+    conditions = policy_run.conditions
+    versions = policy_run.versions
     environment = conditions.environment
     # Only a file with exactly RoboMME's sentences can be opened under its name.
     if (conditions.wordings or "").partition("@")[0] != ROBOMME_NAME:

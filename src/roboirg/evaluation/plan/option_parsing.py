@@ -115,7 +115,8 @@ def parse_episodes(given: object, split: str, tasks: Collection[str]) -> tuple[i
         UnknownNameError: there is no such split.
         InvalidValueError: the text is neither a number nor a list, or the split has fewer episodes.
     """
-    words, size = parse_names("episode", given), functools.partial(splits.split_size, split)
+    words = parse_names("episode", given)
+    size = functools.partial(splits.split_size, split)
     if means_all(words) or {*words} <= {*DIFFICULTIES}:
         if split not in SPLITS:
             raise InvalidValueError(

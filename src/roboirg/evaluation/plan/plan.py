@@ -219,7 +219,8 @@ class Plan(BaseModel):
             section = found.get(name)
             check_names(f"key of {name}", section if isinstance(section, Mapping) else (), keys)
         for name in FLAT.keys() & found.keys():
-            value, section = found.pop(name), found.get(FLAT[name], {})
+            value = found.pop(name)
+            section = found.get(FLAT[name], {})
             if is_dataclass(section) and not isinstance(section, type):
                 section = asdict(section)
             if isinstance(section, Mapping):
@@ -436,7 +437,8 @@ class Plan(BaseModel):
 
         An option that the setting does not read keeps its default, so that equal words are one job.
         """
-        rule, usual = all_settings()[setting], InstructionOptions(setting)
+        rule = all_settings()[setting]
+        usual = InstructionOptions(setting)
         chosen = {option: getattr(self.instruction, option) for option in rule.reads - {"stages"}}
         for form in self.forms if rule.implicit else (usual.form,):
             for stages in self.stages if "stages" in rule.reads else (usual.stages,):
@@ -521,7 +523,8 @@ def plan_options() -> Iterator[PlanOption]:
         types = get_type_hints(SECTIONS[name])
         for option in fields(SECTIONS[name]):
             if option.name in FLAT:
-                words, default = option.metadata["help"], option.default
+                words = option.metadata["help"]
+                default = option.default
                 default = ",".join(default) if isinstance(default, tuple) else default
                 yield PlanOption(option.name, name, types[option.name], default, words)
 

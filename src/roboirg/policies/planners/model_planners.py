@@ -134,14 +134,17 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
         if self.finishes(subgoal):
             subgoal = str(self.subgoal)
         self._turns += [self._turn, ChatTurn("model", (text,))]
-        self._quoted, self._frames = self.instruction, []
+        self._quoted = self.instruction
+        self._frames = []
         return subgoal
 
     def _parts(self, when: str) -> Iterator[Part]:
-        frames, has_clip = self._frames, len(self._frames) >= MIN_CLIP_FRAMES
+        frames = self._frames
+        has_clip = len(self._frames) >= MIN_CLIP_FRAMES
         clip = "clip"
         if when == "first":
-            clip, has_clip = "video", self.video is not None
+            clip = "video"
+            has_clip = self.video is not None
             frames = [*(() if self.video is None else self.video), *frames]
         if self._quoted != self.instruction:  # the first turn, or more has been said since
             yield self.goal()
@@ -208,7 +211,8 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
 
     def take(self, text: str) -> str:
         """Return the subgoal; add the chosen frames, which are counted from 1."""
-        reply, count = json_object(text), len(self._recent)
+        reply = json_object(text)
+        count = len(self._recent)
         subgoal = parse_points(text_of(reply, "current_subtask"))
         positions = reply.get("keyframe_positions")
         if not isinstance(positions, list):

@@ -65,7 +65,8 @@ def draw_failures(content: RunData) -> Figure | None:
 
 
 def _draw_bar(axes: Axes, place: float, counts: Counter[str], shown: Sequence[str]) -> None:
-    left, trials = 0.0, counts["trials"]
+    left = 0.0
+    trials = counts["trials"]
     for name in shown:
         width = 100 * counts[name] / max(1, trials)
         axes.barh(

@@ -180,7 +180,8 @@ def panels(
         which is two units high, and one more for every further line of its label.
     """
     across = min(across, len(rows))
-    down, width = -(-len(rows) // across), PAGE_INCHES if across > 1 else COLUMN_INCHES
+    down = -(-len(rows) // across)
+    width = PAGE_INCHES if across > 1 else COLUMN_INCHES
     labels = [[folded(label, MOST_ROW_LETTERS) for label in own] for own in rows.values()]
     longest = max(len(line) for own in labels for label in own for line in label.split("\n"))
     room = (width - longest / ROW_LETTERS) / across

@@ -54,7 +54,8 @@ def draw_next_to_reference(which: RateTable, content: RunData, published: bool) 
 
     None without data, and for contexts if there is only one, as in a run of the usual settings.
     """
-    table, played = PAPER_TABLES[which], _played(which, content.cells)
+    table = PAPER_TABLES[which]
+    played = _played(which, content.cells)
     tasks = _shared_tasks(which, played) if content.cells else _published_tasks(which)
     if which == "context" and len(tasks) <= 1:
         return None
@@ -146,7 +147,8 @@ def _own_rates(
     )
     rates = {}
     for one in found:
-        rate, gap = float(one.rate or 0), one.gap
+        rate = float(one.rate or 0)
+        gap = one.gap
         before = None if gap is None else rate - gap.value
         rates[_title(which, one.key[0])] = Rate(rate, before, (gap or one).interval)
     return rates
@@ -179,7 +181,8 @@ def _published_rates(which: RateTable, tasks: Tasks) -> Iterator[RateRow]:
         rates = {}
         for options, names in tasks.items():
             row = published.get((first.model, options), first)
-            rate, before = row.average_over(names), first.average_over(names)
+            rate = row.average_over(names)
+            before = first.average_over(names)
             if rate is not None and before is not None and row.options == options:
                 alone = float(rate) / 100
                 rates[_title(which, options)] = Rate(

@@ -97,7 +97,8 @@ class EpisodeDetails:
             if "environment" not in foreign
             else _PlayedScene(None, {}, {})
         )
-        cause, audit = record.attribution, record.prompt
+        cause = record.attribution
+        audit = record.prompt
         found: Details = {
             "turns": [[index(turn.stage), index(turn.text)] for turn in record.instruction],
             "reached": audit.reached if audit and record.prompt_verdict == "cut" else None,
@@ -246,7 +247,8 @@ def _named(record: Record) -> str | None:
 
     None if nothing was named, and if no model names anything.
     """
-    goal, cause = record.policy_metadata.get("understood"), record.attribution
+    goal = record.policy_metadata.get("understood")
+    cause = record.attribution
     if isinstance(goal, dict):
         return describe_goal(goal)
     end = record.steps if cause is None or cause.step is None else cause.step

@@ -92,8 +92,11 @@ def _episodes(runs: Runs, frame: Frame, *, videos: bool) -> Iterator[PageEpisode
         if isinstance(one, Summary)
     ]
     for _, _, owner, record in sorted(rows, key=operator.itemgetter(0, 1)):
-        folder, number = named[owner.run].folder, [*named].index(owner.run)
-        slug, film, poster = record.slug, None, None
+        folder = named[owner.run].folder
+        number = [*named].index(owner.run)
+        slug = record.slug
+        film = None
+        poster = None
         if videos and record.video is not None:
             film = _existing(folder, record.video)
             poster = film and _existing(folder, poster_name(record.video))

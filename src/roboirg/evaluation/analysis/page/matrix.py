@@ -106,7 +106,8 @@ def _cell(one: ScopeSummary, subject: str) -> dict[str, Any]:
 
 def notes(one: ScopeSummary, subject: str) -> list[str]:
     """Return a cell in words: first its subject, then its results."""
-    lines, counts = [f"{subject}, {options_label(one.key.options)}"], one.counts
+    lines = [f"{subject}, {options_label(one.key.options)}"]
+    counts = one.counts
     if one.rate is None:
         lines.append("no verdict yet")
     else:

@@ -160,7 +160,8 @@ def _add_all(
 
 
 def _data(episodes: PageEpisodes, details: EpisodeDetails) -> dict[str, Any]:
-    filters, numbers = make_filters(episodes), make_numbers(episodes)
+    filters = make_filters(episodes)
+    numbers = make_numbers(episodes)
     policies = [one.policy for one in episodes.names]
     twins = (place for place, one in enumerate(policies) if place and one == policies[0])
     return {

@@ -164,7 +164,8 @@ class Frame(Mapping[str, Any]):
         if name == "policy_label" and name not in self.columns:
             self.columns[name] = as_column([self.names[run] for run in self["run"]])
         elif name not in self.columns:
-            read, rows = COLUMNS[name].read, zip(self["result"], self["outcome"], strict=True)
+            read = COLUMNS[name].read
+            rows = zip(self["result"], self["outcome"], strict=True)
             found = [None if outcome == MISSING else read(one) for one, outcome in rows]
             self.columns[name] = as_column(found)
         return self.columns[name]

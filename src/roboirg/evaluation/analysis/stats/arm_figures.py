@@ -117,7 +117,8 @@ def _against(other: str) -> Callable[[Arms], Sides | None]:
 
 
 def _language_use(arms: Arms) -> Sides | None:
-    told, other = arms.get(TOLD), arms.get(OTHER_GOAL)
+    told = arms.get(TOLD)
+    other = arms.get(OTHER_GOAL)
     if told is None or other is None or told.goals is None or other.goals is None:
         return None
     own_twice = _won(told) and other.goals.original == "success"

@@ -78,7 +78,8 @@ class Cell:
     @property
     def counts(self) -> Counts:
         episodes = {one.episode for one in self.verdicts}
-        successes, trials = sum(self.verdicts.values()), len(self.verdicts)
+        successes = sum(self.verdicts.values())
+        trials = len(self.verdicts)
         return Counts(successes, trials, len(episodes), self.errors, self.missing)
 
     @property

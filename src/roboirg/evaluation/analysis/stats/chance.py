@@ -74,7 +74,8 @@ def silent_chance(task: str, split: str, number: int) -> float:
 
     Goals that begin with all stages of the right one succeed, too.
     """
-    episode, known = get_episode(task, split, number), get_task(task)
+    episode = get_episode(task, split, number)
+    known = get_task(task)
     plans = [known.stages(episode.scene, goal) for goal in known.goals(episode.scene)]
     return sum(begins_with(plan, episode.stages) for plan in plans) / len(plans)
 
@@ -85,7 +86,8 @@ def _level(floor: str, language: str, job: Job) -> Fraction | None:
         key = FloorKey(TEST if job.split == TEST else RANDOM, job.setting, job.task)
         found = (measured_floors(language) or {}).get(key)
         return Fraction(str(found.shares[floor].goals)) if found and is_usual(job.options) else None
-    episode, instruction = get_episode(job.task, job.split, job.episode), instruct_job(job)
+    episode = get_episode(job.task, job.split, job.episode)
+    instruction = instruct_job(job)
     if floor == CHANCE:
         return right_share(blind_goals(instruction, episode), episode)
     return goal_share(guess_goal(floor, instruction.text, job.task), episode)

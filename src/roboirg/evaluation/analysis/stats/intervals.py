@@ -46,7 +46,8 @@ class Interval(NamedTuple):
 
 def wilson_interval(successes: int, trials: int) -> Interval:
     """Return Wilson's score interval of a proportion, of one trial or more, all independent."""
-    rate, weight = successes / trials, Z_95 * Z_95 / trials
+    rate = successes / trials
+    weight = Z_95 * Z_95 / trials
     center = (rate + weight / 2) / (1 + weight)
     half = Z_95 * math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials)) / (1 + weight)
     # The formula gives exactly 0 and 1 at the ends; floating point may not.

@@ -65,10 +65,12 @@ class Pairs:
     @classmethod
     def of(cls, first: Cell, second: Cell) -> Pairs:
         """Pair two cells of the same task."""
-        ours, theirs = first.by_episode(), second.by_episode()
+        ours = first.by_episode()
+        theirs = second.by_episode()
         rows = []
         for episode in sorted(ours.keys() & theirs.keys()):
-            here, there = ours[episode], theirs[episode]
+            here = ours[episode]
+            there = theirs[episode]
             shared = here.keys() & there.keys()
             ours_shared = [won for seed, won in here.items() if seed in shared or not shared]
             theirs_shared = [won for seed, won in there.items() if seed in shared or not shared]
@@ -141,7 +143,8 @@ def paired_rates(tasks: Sequence[Pairs]) -> PairedRates | None:
     if not sums:
         return None
     counts = np.array(sums, dtype=np.float64)
-    successes, trials = counts[:, 0::2], counts[:, 1::2]
+    successes = counts[:, 0::2]
+    trials = counts[:, 1::2]
     return PairedRates._make(np.mean(successes / trials, axis=0).tolist())
 
 

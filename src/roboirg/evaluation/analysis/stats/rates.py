@@ -69,7 +69,8 @@ def gap_words(gap: Gap | None, p_value: float | None) -> tuple[str, str, str]:
     """Return a gap in points, its interval, and its corrected p-value; dashes without one."""
     if gap is None:
         return NOT_APPLICABLE, NOT_APPLICABLE, NOT_APPLICABLE
-    ends, p_words = TOO_FEW, NOT_APPLICABLE
+    ends = TOO_FEW
+    p_words = NOT_APPLICABLE
     if gap.interval is not None:
         ends = " to ".join(points(end, 1) for end in gap.interval)
     if p_value is not None:

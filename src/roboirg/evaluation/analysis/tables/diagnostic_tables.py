@@ -118,7 +118,8 @@ def make_forms_table(data: RunData) -> Table:
         and key.scope not in one.cells
         and (several or key.scope != ALL_TASKS)
     ]
-    runs, scopes = list(data.frame.names), [one.key.scope for one in found]
+    runs = list(data.frame.names)
+    scopes = [one.key.scope for one in found]
     found.sort(
         key=lambda one: (
             runs.index(one.key.policy_run), scopes.index(one.key.scope),
@@ -191,7 +192,8 @@ def make_failure_table(data: RunData, *, means: bool = False) -> Table:
 
 
 def _ends(success: ScopeSummary, *kinds: ScopeSummary) -> RowCells:
-    counts, ends = success.counts, (success, *kinds)
+    counts = success.counts
+    ends = (success, *kinds)
     gaps = (gap_words(one.gap, None) for one in ends)
     explicit = [
         {task: one.others[task] for task in success.tasks if task in one.others} for one in kinds
@@ -260,7 +262,8 @@ def make_heard_table(data: RunData) -> Table:
     heard = by_scope(cells_of(data.frame.where(prompt="heard")))
 
     def cells(key: ScopeKey) -> RowCells:
-        whole, read = Measured(key, played[key]), Measured(key, heard.get(key, NOTHING))
+        whole = Measured(key, played[key])
+        read = Measured(key, heard.get(key, NOTHING))
         episodes = sum(own["episodes"] for own in scopes[key])
         cut = cut_text(scopes[key])
         return (str(episodes), cut, _rate(whole), str(read.counts.trials), _rate(read))

@@ -135,7 +135,8 @@ def _entry(
 
 def _applies(task: str, options: InstructionOptions) -> bool:
     """Whether a task has a setting; taken for granted if either is not installed."""
-    known, setting = every_task().get(task), options.setting
+    known = every_task().get(task)
+    setting = options.setting
     return known is None or setting not in all_settings() or setting in settings_of(known)
 
 

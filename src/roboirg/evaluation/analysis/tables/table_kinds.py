@@ -27,7 +27,8 @@ TWIN_MARK = " (twin)"
 
 
 def row_order(options: InstructionOptions) -> tuple[object, ...]:
-    stages, language = options.stages, options.language
+    stages = options.stages
+    language = options.language
     return (*setting_sort_key(options.setting), len(stages), stages, language)
 
 

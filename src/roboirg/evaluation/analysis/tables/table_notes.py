@@ -136,7 +136,8 @@ def _sizes(judged: Sequence[Counts]) -> str:
 
 
 def _incomplete_notes(counts: Sequence[Counts], entries: Sequence[Entry]) -> Iterator[str]:
-    errors, missing = sum(one.errors for one in counts), sum(one.missing for one in counts)
+    errors = sum(one.errors for one in counts)
+    missing = sum(one.missing for one in counts)
     if errors:
         yield (
             f"{ERROR_MARK} {counted(errors, 'trial')} ended in an error and "

@@ -135,7 +135,9 @@ def _float(table: Table, indices: list[int], number: int, count: int) -> str:
 def _column_groups(columns: Sequence[Column], names: int) -> list[str]:
     if not any(column.group for column in columns):
         return []
-    cells, rules, place = [""] * names, "", names + 1
+    cells = [""] * names
+    rules = ""
+    place = names + 1
     for name, members in itertools.groupby(column.group for column in columns):
         width = len(list(members))
         cells.append(rf"\multicolumn{{{width}}}{{c}}{{{escaped(name)}}}")
