@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboirg.apps.policy_check.check_result import CheckResult, describe_error, ending_checks
-from roboirg.apps.policy_check.expert_episode import ExpertMoment, RecordExpert
+from roboirg.apps.policy_check.expert_episode import ExpertMoment, RecordExpert, Rows
 from roboirg.apps.policy_check.policy_player import Chunks, PolicyPlayer
 from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE
 
@@ -66,13 +65,11 @@ def _error(chunks: Chunks, moments: Sequence[ExpertMoment]) -> float:
     return float(np.mean([_distance(*one) for one in zip(chunks, moments, strict=True)]))
 
 
-def _distance(chunk: NDArray[np.float64], moment: ExpertMoment) -> float:
+def _distance(chunk: Rows, moment: ExpertMoment) -> float:
     size = len(moment.still)
     columns = size if size == ARM_JOINTS else POSITION_SIZE
     rows = min(len(chunk), len(moment.actions))
-    difference: NDArray[np.float64] = np.abs(
-        chunk[:rows, :columns] - moment.actions[:rows, :columns]
-    )
+    difference: Rows = np.abs(chunk[:rows, :columns] - moment.actions[:rows, :columns])
     return float(difference.max(axis=1).mean())
 
 

@@ -7,10 +7,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboirg.apps.policy_check.check_result import ending_checks
-from roboirg.apps.policy_check.expert_episode import ExpertEpisode
+from roboirg.apps.policy_check.expert_episode import ExpertEpisode, Rows
 from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies.by_name.finding import make_policy
@@ -20,7 +19,7 @@ from roboirg.policies.contract.synthetic_episodes import SyntheticEpisode, Synth
 CALLS = 3
 """Calls of `act` in a synthetic episode."""
 VIDEO_STEPS = 40
-Chunks = list[NDArray[np.float64]]
+Chunks = list[Rows]
 FIRST, SECOND = "Put the red cube on the target.", "Press the second button from the left."
 
 
@@ -143,10 +142,7 @@ class PolicyPlayer:
 
 def are_equal(one: SyntheticRollout, other: SyntheticRollout) -> bool:
     """Return whether two rollouts have the same actions, bit for bit."""
-    return len(one.chunks) == len(other.chunks) and all(
-        np.array_equal(first, second)
-        for first, second in zip(one.chunks, other.chunks, strict=True)
-    )
+    return all(map(np.array_equal, one.chunks, other.chunks))
 
 
 def describe_difference(one: SyntheticRollout, other: SyntheticRollout) -> str:

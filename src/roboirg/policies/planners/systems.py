@@ -101,7 +101,11 @@ def _policy_with(spec: str, option: str, value: str, origin: str) -> str:
             f"Option {option!r}: the policy of {origin} is {spec!r}, which is not a URL."
         )
     url = split_url(spec)
-    place = value if option == SERVER else url.target
-    changed = {} if option == SERVER else {option.removeprefix(POLICY): value}
-    query = urlencode({**dict(url.options), **changed})
-    return f"{url.kind}://{place}" + (f"?{query}" if query else "")
+    place = url.target
+    options = dict(url.options)
+    if option == SERVER:
+        place = value
+    else:
+        options[option.removeprefix(POLICY)] = value
+    query = f"?{urlencode(options)}" if options else ""
+    return f"{url.kind}://{place}{query}"

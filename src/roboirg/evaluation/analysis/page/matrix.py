@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
 from typing import Any
 
 from roboirg.core.episode import DIFFICULTIES
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.page.columns import setting_label
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
-from roboirg.evaluation.analysis.results.frame import RunNames, suite, task_order
+from roboirg.evaluation.analysis.results.frame import suite, task_order
 from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
 from roboirg.evaluation.analysis.stats.intervals import TOO_FEW
@@ -31,15 +29,25 @@ def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
     """
     columns = sorted({key.options for key in episodes.data.cells}, key=options_sort_key)
     rows = _rows(episodes.data.cells)
+    places = {policy_run: place for place, policy_run in enumerate(episodes.names)}
+    lines = {scope: line for line, scope in enumerate(rows)}
+
+    def cells(summaries: Summaries) -> list[dict[str, Any]]:
+        return [
+            {
+                "at": [places[key.policy_run], lines[key.scope], columns.index(key.options)],
+                **_cell(one, f"{episodes.names[key.policy_run]}, {key.scope}"),
+            }
+            for key, one in summaries.items()
+            if key.scope in lines
+        ]
+
     found = {one.record.difficulty for one in episodes.all}
-    levels = {"": episodes.data.summaries}
-    if len(found) > 1:
-        ordered = dict.fromkeys((*DIFFICULTIES, *found))
-        levels |= {
-            level: summarize(cells_of(episodes.data.frame.where(difficulty=level)))
-            for level in ordered
-            if level in found
-        }
+    levels = [{"difficulty": "", "cells": cells(episodes.data.summaries)}]
+    for level in DIFFICULTIES if len(found) > 1 else ():
+        if level in found:
+            summaries = summarize(cells_of(episodes.data.frame.where(difficulty=level)))
+            levels.append({"difficulty": level, "cells": cells(summaries)})
     return {
         "policies": list(episodes.names.values()),
         "columns": [
@@ -47,13 +55,7 @@ def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
             for one in columns
         ],
         "rows": [{"name": name, **scope} for name, scope in rows.items()],
-        "levels": [
-            {
-                "difficulty": level,
-                "cells": _matrix_cells(summaries, episodes.names, rows, columns),
-            }
-            for level, summaries in levels.items()
-        ],
+        "levels": levels,
     }
 
 
@@ -70,24 +72,6 @@ def _rows(cells: Cells) -> dict[str, dict[str, str | None]]:
             rows[name] = {"task": None, "suite": name}
         rows |= {task: {"task": task, "suite": None} for task in members}
     return rows
-
-
-def _matrix_cells(
-    summaries: Summaries,
-    names: RunNames,
-    rows: Collection[str],
-    columns: Sequence[InstructionOptions],
-) -> list[dict[str, Any]]:
-    places = {policy_run: place for place, policy_run in enumerate(names)}
-    lines = {scope: line for line, scope in enumerate(rows)}
-    return [
-        {
-            "at": [places[key.policy_run], lines[key.scope], columns.index(key.options)],
-            **_cell(one, f"{names[key.policy_run]}, {key.scope}"),
-        }
-        for key, one in summaries.items()
-        if key.scope in lines
-    ]
 
 
 def _cell(one: ScopeSummary, subject: str) -> dict[str, Any]:

@@ -184,9 +184,9 @@ def _data(episodes: PageEpisodes, details: EpisodeDetails) -> dict[str, Any]:
 
 def _breakdown_tables(frame: Frame) -> list[Table]:
     """Return the tables of control arms, and of gaps by kind of instruction, that have rows."""
-    tables = [make_breakdown_table(one, frame) for one in BREAKDOWNS.values()]
-    arms = _tables_with_rows(lambda: make_arm_table(RunData(frame)))  # no scene may have two arms
-    return [*arms, *(table for table in tables if table.rows)]
+    tables = _tables_with_rows(lambda: make_arm_table(RunData(frame)))  # no scene may have two arms
+    tables += [make_breakdown_table(one, frame) for one in BREAKDOWNS.values()]
+    return [table for table in tables if table.rows]
 
 
 def _tables_with_rows(make: Callable[[], Table]) -> list[Table]:

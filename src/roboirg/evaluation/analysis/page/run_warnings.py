@@ -69,7 +69,7 @@ def facts_of(episodes: PageEpisodes) -> list[tuple[str, str]]:
 
 def comparisons(episodes: PageEpisodes) -> list[dict[str, Any]]:
     """Return the comparison of the first pairs of policies in words."""
-    found = []
+    found: list[dict[str, Any]] = []
     for (left, first), (right, second) in combinations(enumerate(episodes.names), 2):
         if first.conditions.arm == second.conditions.arm and len(found) < MAX_COMPARISONS:
             words = _compared(episodes, first, second)

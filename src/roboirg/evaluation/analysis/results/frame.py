@@ -283,7 +283,7 @@ def _sorted(rows: Sequence[_Row], policies: Sequence[str]) -> Frame:
     task_at = [tasks.index(job.task) for job in jobs]
     episodes = [job.episode for job in jobs]
     seeds = [job.policy_seed for job in jobs]
-    order = np.lexsort((seeds, episodes, options_at, task_at, run_at))
+    order = np.lexsort(np.array([seeds, episodes, options_at, task_at, run_at]))
     frame = Frame(
         {
             "place": order,

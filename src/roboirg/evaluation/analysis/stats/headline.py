@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.results.frame import RunNames
@@ -15,6 +14,7 @@ from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cell, Cells
 from roboirg.evaluation.analysis.stats.intervals import (
     SEED,
+    Draws,
     Interval,
     Rows,
     resampled_interval,
@@ -134,7 +134,7 @@ def _paired_rows(settings: Sequence[Cell], explicit: Cell) -> Rows:
     return rows[rows.any(axis=1)]
 
 
-def _mean_gap(rates: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _mean_gap(rates: Sequence[Draws]) -> Draws:
     """Return the mean gap of each resample, over settings, and before that over their tasks.
 
     Args:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from roboirg.evaluation.analysis.stats.cells import Cell
 from roboirg.evaluation.analysis.stats.intervals import (
     DRAWS,
+    Draws,
     Interval,
     Rows,
     percentile_interval,
@@ -195,9 +196,7 @@ def sign_flip_test(differences: NDArray[np.int64]) -> float:
     return min(1.0, float(chances[as_far].sum()))
 
 
-def _retention_interval(
-    drawn: NDArray[np.float64], sizes: Sequence[int], rates: PairedRates
-) -> Interval | None:
+def _retention_interval(drawn: Draws, sizes: Sequence[int], rates: PairedRates) -> Interval | None:
     with np.errstate(divide="ignore", invalid="ignore"):
         values = drawn[:, 0] / drawn[:, 1]
     interval = percentile_interval(values, sizes)

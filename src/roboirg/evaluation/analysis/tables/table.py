@@ -157,9 +157,11 @@ class Table:
 
     def labels(self, row: Row) -> tuple[str, ...]:
         """Return the label of a row below each head; names of published policies are marked."""
-        listed = row.name.split(",")
-        checks = [CHECK_MARK if head in listed else "" for head in self.heads[1:]]
-        labels = [row.group, *(checks if len(checks) > 1 else [row.name])][-len(self.heads) :]
+        names = [row.name]
+        if len(self.heads) > 2:  # noqa: PLR2004 - a group and a name
+            listed = row.name.split(",")
+            names = [CHECK_MARK if head in listed else "" for head in self.heads[1:]]
+        labels = [row.group, *names][-len(self.heads) :]
         if row.source == "published" and POLICY in self.heads:
             labels[self.heads.index(POLICY)] += PUBLISHED_MARK
         return tuple(labels)
@@ -207,7 +209,7 @@ def with_changes(columns: Sequence[Column], rows: Iterable[tuple[Row, Row | None
     some settings.
     """
     return [
-        row if reference is None else replace(row, cells=tuple(_changed(columns, row, reference)))
+        row if reference is None else replace(row, cells=list(_changed(columns, row, reference)))
         for row, reference in rows
     ]
 
