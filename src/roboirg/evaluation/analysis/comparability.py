@@ -96,10 +96,14 @@ def comparison_notes(found: AllDifferences, names: RunNames) -> list[str]:
 
 def _text(tasks: Mapping[str, Differences]) -> str:
     """Return what differs, with the tasks in which it does unless these are all."""
+    found: dict[str, list[str]] = {}
+    for task, differences in tasks.items():
+        for difference in differences:
+            found.setdefault(difference, []).append(task)
     parts = []
-    for difference in dict.fromkeys(one for differences in tasks.values() for one in differences):
-        where = [task for task, differences in tasks.items() if difference in differences]
-        parts.append(difference + ("" if len(where) == len(tasks) else f" ({', '.join(where)})"))
+    for difference, where in found.items():
+        named = "" if len(where) == len(tasks) else f" ({', '.join(where)})"
+        parts.append(difference + named)
     return "; ".join(parts)
 
 

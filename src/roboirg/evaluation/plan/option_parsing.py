@@ -66,18 +66,20 @@ def parse_arms(given: object) -> Names:
     return tuple(dict.fromkeys(found))
 
 
-def parse_policies(given: str | Iterable[str]) -> Names:
+def parse_policies(given: Iterable[str]) -> Names:
     """Parse policies; one text may hold several names separated by commas.
 
     Raises:
         InvalidValueError: there is none, or ``NAME=SPEC`` has a name that is not allowed.
     """
-    # Addresses and their options may contain commas.
-    parts = (
-        (spec.strip(),) if "://" in spec or "?" in spec else parse_names("policy", spec)
-        for spec in ([given] if isinstance(given, str) else map(str, given))
-    )
-    policies = tuple(dict.fromkeys(name for names in parts for name in names))
+    found: list[str] = []
+    for spec in given:
+        # Addresses and their options may contain commas.
+        if "://" in spec or "?" in spec:
+            found.append(spec.strip())
+        else:
+            found += parse_names("policy", spec)
+    policies = tuple(dict.fromkeys(found))
     if not policies:
         raise InvalidValueError("No policy was given.")
     for policy in policies:

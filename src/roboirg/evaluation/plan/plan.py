@@ -131,10 +131,6 @@ def _open_wordings(given: object) -> object:
     return ChosenWordings(file, str(open_wordings(file)))
 
 
-Seeds = Annotated[Numbers, BeforeValidator(partial(parse_numbers, "policy seed"))]
-StageSets = Annotated[tuple[Numbers, ...], BeforeValidator(parse_stage_sets)]
-
-
 def _option(default: Any, text: str) -> Any:  # noqa: ANN401 - as it may be typed
     return Field(default=default, description=text)
 
@@ -175,14 +171,16 @@ class Plan(BaseModel):
         "Positions in the split, from 0: a list such as 0,3,5-9; 4 for the first four; all; or "
         "easy, medium, hard.",
     )
-    policy_seeds: Seeds = _option("0", "Every seed plays every episode.")
+    policy_seeds: Annotated[Numbers, BeforeValidator(partial(parse_numbers, "policy seed"))] = (
+        _option("0", "Every seed plays every episode.")
+    )
     arms: Annotated[Names, BeforeValidator(parse_arms)] = _option(
         TOLD,
         "told, and control arms of the same scenes: other-goal, silent, silent-empty, scrambled, "
         "paraphrase:N (N other texts), again (another policy seed). Scenes without such an arm "
         "are left out.",
     )
-    stages: StageSets = _option(
+    stages: Annotated[tuple[Numbers, ...], BeforeValidator(parse_stage_sets)] = _option(
         "1-5",
         "Sets of stages of the contextual setting, separated by semicolons: 1,5;1-5; every set is "
         "played.",
@@ -461,8 +459,7 @@ class Plan(BaseModel):
             return False
         found = splits.get_episode(task, self.split, episode)
         easier = replace(options, setting=plain)
-        refused = [find_refusal(found, one) is not None for one in (options, easier)]
-        return refused == [True, False]
+        return find_refusal(found, options) is not None and find_refusal(found, easier) is None
 
     def _instruction_jobs(self) -> Iterator[Job]:
         """Yield one job for each instruction that the language may not be able to express."""
@@ -514,7 +511,8 @@ class PlanOption(NamedTuple):
     help: str
 
     def value_in(self, plan: Plan) -> object:
-        return getattr(plan if self.section is None else getattr(plan, self.section), self.name)
+        holder = getattr(plan, self.section) if self.section else plan
+        return getattr(holder, self.name)
 
 
 def plan_options() -> Iterator[PlanOption]:

@@ -145,7 +145,8 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
         if when == "first":
             clip = "video"
             has_clip = self.video is not None
-            frames = [*(() if self.video is None else self.video), *frames]
+            if self.video is not None:
+                frames = [*self.video, *frames]
         if self._quoted != self.instruction:  # the first turn, or more has been said since
             yield self.goal()
         yield self.fill(f"{when}_{clip}" if has_clip else f"{when}_picture")

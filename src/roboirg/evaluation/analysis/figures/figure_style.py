@@ -55,12 +55,12 @@ DARK_STYLE = {
     ),
 }
 """For pages with a dark background."""
-_METADATA: Mapping[str, Mapping[str, None] | None] = {
+_METADATA = {
     "svg": {"Date": None},
     "pdf": {"CreationDate": None},
     "png": None,
 }
-_SAME_FILES: Mapping[str, object] = {
+_SAME_FILES = {
     "font.family": "DejaVu Sans",
     "pdf.fonttype": 42,  # letters, not outlines, which some venues refuse
     "svg.hashsalt": "roboirg",  # the ids in an SVG file are random without it

@@ -37,7 +37,7 @@ SIZE_NOTE = (
     "drawn, too few episodes."
 )
 PUBLISHED_NOTE = "published: the same tasks, the paper's instructions and simulator."
-WORDS: Mapping[RateTable, tuple[str, str, str]] = {
+WORDS = {
     "main": ("success", "success with explicit instructions", "with implicit ones"),
     "context": ("success", "success with stages 1,5", "with more stages"),
 }

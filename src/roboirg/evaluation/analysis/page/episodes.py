@@ -6,7 +6,7 @@ import operator
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from roboirg.evaluation.analysis.results.frame import Frame, RunNames, join, make_frame
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
@@ -19,6 +19,10 @@ from roboirg.evaluation.records.run_files import run_file
 
 Runs = Mapping[str, Source]
 """The runs that a page shows by their names: one, or two to compare."""
+
+
+JsonObject = dict[str, Any]
+"""What the page's script reads."""
 
 
 class PageEpisode(NamedTuple):

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.page.columns import setting_label
-from roboirg.evaluation.analysis.page.episodes import PageEpisodes
+from roboirg.evaluation.analysis.page.episodes import JsonObject, PageEpisodes
 from roboirg.evaluation.analysis.results.frame import suite, task_order
 from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
@@ -21,7 +19,7 @@ from roboirg.evaluation.analysis.stats.measure import (
 from roboirg.evaluation.analysis.stats.rates import interval_note, p_text, points, whole_percent
 
 
-def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
+def make_matrix(episodes: PageEpisodes) -> JsonObject:
     """Return the heat maps as JSON values: columns, rows, and cells by policy, row and column.
 
     There is one set of cells for all episodes and, if there are several difficulties, one for
@@ -32,7 +30,7 @@ def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
     places = {policy_run: place for place, policy_run in enumerate(episodes.names)}
     lines = {scope: line for line, scope in enumerate(rows)}
 
-    def cells(summaries: Summaries) -> list[dict[str, Any]]:
+    def cells(summaries: Summaries) -> list[JsonObject]:
         return [
             {
                 "at": [places[key.policy_run], lines[key.scope], columns.index(key.options)],
@@ -74,8 +72,8 @@ def _rows(cells: Cells) -> dict[str, dict[str, str | None]]:
     return rows
 
 
-def _cell(one: ScopeSummary, subject: str) -> dict[str, Any]:
-    cell: dict[str, Any] = {"note": notes(one, subject)}
+def _cell(one: ScopeSummary, subject: str) -> JsonObject:
+    cell: JsonObject = {"note": notes(one, subject)}
     if one.rate is not None:
         cell |= {"rate": round(float(one.rate), 4), "text": whole_percent(one.rate)}
     if one.interval is not None:

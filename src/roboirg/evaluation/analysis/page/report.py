@@ -8,12 +8,11 @@ import json
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.page.columns import make_filters, make_numbers
 from roboirg.evaluation.analysis.page.details import EpisodeDetails
-from roboirg.evaluation.analysis.page.episodes import PageEpisodes
+from roboirg.evaluation.analysis.page.episodes import JsonObject, PageEpisodes
 from roboirg.evaluation.analysis.page.matrix import make_matrix
 from roboirg.evaluation.analysis.page.run_warnings import comparisons, facts_of, run_warnings
 from roboirg.evaluation.analysis.results.frame import Frame
@@ -159,7 +158,7 @@ def _add_all(
             progress(done, len(episodes.all))
 
 
-def _data(episodes: PageEpisodes, details: EpisodeDetails) -> dict[str, Any]:
+def _data(episodes: PageEpisodes, details: EpisodeDetails) -> JsonObject:
     filters = make_filters(episodes)
     numbers = make_numbers(episodes)
     policies = [one.policy for one in episodes.names]

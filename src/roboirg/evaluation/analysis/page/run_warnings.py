@@ -6,12 +6,11 @@ import operator
 from collections import Counter
 from collections.abc import Iterable
 from itertools import chain, combinations
-from typing import Any
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.core.word_pools import words_label
-from roboirg.evaluation.analysis.page.episodes import PageEpisodes
+from roboirg.evaluation.analysis.page.episodes import JsonObject, PageEpisodes
 from roboirg.evaluation.analysis.results.frame import MISSING
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.comparison import compare
@@ -67,9 +66,9 @@ def facts_of(episodes: PageEpisodes) -> list[tuple[str, str]]:
     return [(label, text) for label, text in facts.items() if text]
 
 
-def comparisons(episodes: PageEpisodes) -> list[dict[str, Any]]:
+def comparisons(episodes: PageEpisodes) -> list[JsonObject]:
     """Return the comparison of the first pairs of policies in words."""
-    found: list[dict[str, Any]] = []
+    found: list[JsonObject] = []
     for (left, first), (right, second) in combinations(enumerate(episodes.names), 2):
         if first.conditions.arm == second.conditions.arm and len(found) < MAX_COMPARISONS:
             words = _compared(episodes, first, second)

@@ -86,7 +86,7 @@ def arm_figures(frame: Frame) -> tuple[ArmFigure, ...]:
 
 
 def _figure(key: ArmKey, trials: Iterable[Arms], rng: np.random.Generator) -> ArmFigure | None:
-    cells: tuple[dict[str, Cell], dict[str, Cell]] = {}, {}
+    cells: list[dict[str, Cell]] = [{}, {}]
     for arms in trials:
         for side, results in zip(cells, key.contrast.sides(arms) or (), strict=False):
             for one in results:

@@ -93,7 +93,7 @@ class Cell:
         episodes: dict[int, dict[int, bool]] = defaultdict(dict)
         for (episode, seed), won in self.verdicts.items():
             episodes[episode][seed] = won
-        return dict(episodes)
+        return episodes
 
     def rows(self) -> Rows:
         """Return successes and trials of each episode, shape (episodes, 2)."""

@@ -251,12 +251,13 @@ Summaries = Mapping[ScopeKey, ScopeSummary]
 
 def by_scope(cells: Cells) -> Mapping[ScopeKey, ByTask]:
     """Group cells by scope, in their order: tasks, then suites, then all tasks."""
-    levels: tuple[dict[ScopeKey, dict[str, Cell]], ...] = ({}, {}, {})
-    for (policy_run, task, options), cell in cells.items():
-        for level, scope in zip(levels, (task, suite(task), ALL_TASKS), strict=True):
+    found: dict[ScopeKey, dict[str, Cell]] = {}
+    for scope_of in (str, suite, lambda _task: ALL_TASKS):
+        for (policy_run, task, options), cell in cells.items():
+            scope = scope_of(task)
             if scope is not None:
-                level.setdefault(ScopeKey(policy_run, scope, options), {})[task] = cell
-    return {key: own for level in levels for key, own in level.items()}
+                found.setdefault(ScopeKey(policy_run, scope, options), {})[task] = cell
+    return found
 
 
 def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:

@@ -68,7 +68,7 @@ _DECLARED = (
 
 def make_facts_table(data: RunData, records: Iterable[Record]) -> Table:
     """Make the table from the whole records of the runs of `data`."""
-    results = [one for one in data.frame["result"] if isinstance(one, Summary)]
+    results = data.frame.played
     kept = {(one.slug, one.started_at) for one in results}
     known: defaultdict[tuple[str, str], dict[str, None]] = defaultdict(dict)
 
@@ -134,8 +134,12 @@ def _of_policy(record: Record) -> Iterator[tuple[str, object]]:
     declared = _metadata(record)
     found = None if SERVER in declared else record.inference  # a server's process is not asked
     if found is not None:
-        measured: dict[str, Any] = {"python": found.python, "libraries": found.libraries}
-        measured |= {"parameter_dtype": found.dtypes, "device": found.devices}
+        measured = {
+            "python": found.python,
+            "libraries": found.libraries,
+            "parameter_dtype": found.dtypes,
+            "device": found.devices,
+        }
         declared = {**{key: value for key, value in measured.items() if value}, **declared}
     if declared.get("network") == "none":
         declared = {**dict.fromkeys(_OF_NETWORKS, NOT_APPLICABLE), **declared}
@@ -154,7 +158,7 @@ def _metadata(record: Record) -> dict[str, Any]:
 
 def _words(value: object) -> list[str]:
     """Return a value in words; nothing if it is unknown."""
-    if value is None or value == "":
+    if value in (None, ""):
         return []
     if isinstance(value, Mapping):
         return [f"{key} {one}" for key, one in value.items()]

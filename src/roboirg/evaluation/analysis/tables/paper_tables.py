@@ -35,6 +35,7 @@ from roboirg.evaluation.analysis.tables.table import (
     Column,
     Entry,
     Row,
+    Source,
     Table,
     grouped,
     named_columns,
@@ -213,20 +214,22 @@ def _references(table: PaperTable, rows: Sequence[Row]) -> Iterator[Row | None]:
 
 def _coverage() -> Table:
     """Return the paper's table with this benchmark's row derived from its tasks."""
-    heads = ("kind", "benchmark")
     has = {setting for task in all_tasks().values() for setting in settings_of(task)}
     rows = []
     for line in published_lines(COVERAGE):
-        covers = {name: word for name, word in line.items() if name not in heads}
-        is_own = line["benchmark"] == OWN_NAME
-        own = {setting: "yes" if setting in has else "no" for setting in covers}
-        words = list((own if is_own else covers).values())
-        rows.append(Row(line["kind"], line["benchmark"], words, "ours" if is_own else "cited"))
+        kind = line.pop("kind")
+        benchmark = line.pop("benchmark")
+        words = list(line.values())
+        source: Source = "cited"
+        if benchmark == OWN_NAME:
+            words = ["yes" if setting in has else "no" for setting in line]
+            source = "ours"
+        rows.append(Row(kind, benchmark, words, source))
     return Table(
         key=COVERAGE,
         title="Implicit references in benchmarks",
-        heads=heads,
-        columns=named_columns(*covers),
+        heads=("kind", "benchmark"),
+        columns=named_columns(*line),
         rows=rows,
         notes=("partial: pronouns within a chain of actions only. Source: the paper.",),
     )

@@ -92,15 +92,10 @@ def make_run_tables(frame: Frame) -> list[Table]:
 def print_failures(frame: Frame, console: Console) -> None:
     """List the episodes of each policy run without success and the cause; count the rest."""
     for run, label in frame.names.items():
-        own = frame.where(run=run)
+        failures = [one for one in frame.where(run=run).played if one.outcome != "success"]
         # The same order for any number of worker processes.
-        failures = sorted(
-            (
-                one
-                for one, outcome in zip(own["result"], own["outcome"], strict=True)
-                if outcome in ("failure", "error")
-            ),
-            key=lambda one: (one.task, one.split, one.episode, options_sort_key(one.options)),
+        failures.sort(
+            key=lambda one: (one.task, one.split, one.episode, options_sort_key(one.options))
         )
         if failures:
             title = f"{counted(len(failures), 'episode')} without success"

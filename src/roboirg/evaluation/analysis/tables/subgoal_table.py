@@ -22,7 +22,7 @@ _NOTE = (
     "count (the right act at another time), or lost (an act that was not due). Shares are of the "
     "cell's subgoals."
 )
-_COSTS: Mapping[str, str] = {
+_COSTS = {
     "calls": "calls",
     "input_tokens": "tokens in",
     "output_tokens": "tokens out",
@@ -37,10 +37,10 @@ _UNKNOWN_IF_ABSENT = ("input_tokens", "output_tokens", "cost_usd")
 """What a service may not report, so that the records of its replies lack it."""
 
 
-def _usage(record: Record) -> tuple[tuple[str, float], ...]:
+def _usage(record: Record) -> dict[str, float]:
     """Return the usage of a record, with NaN for what is unknown of the models that it asked."""
     unknown = dict.fromkeys(_UNKNOWN_IF_ABSENT, math.nan) if "calls" in record.usage else {}
-    return tuple({**unknown, **record.usage}.items())
+    return {**unknown, **record.usage}
 
 
 _READ: Mapping[str, Callable[[Record], object]] = {
@@ -63,7 +63,7 @@ def make_subgoal_table(data: RunData, records: Iterable[Record]) -> Table:
         if usage is not None:  # else the episode was not played
             counts = found[CellKey(run, task, options)]
             counts.update(("episodes", *verdicts))
-            counts.update({name: value for name, value in usage if name in _COSTS})
+            counts.update({name: value for name, value in usage.items() if name in _COSTS})
             if failure:
                 counts[failure] += 1
     known = (*SUBGOAL_VERDICTS, *PLANNER_FAILURES)

@@ -99,11 +99,12 @@ def _blocks(table: Table) -> Iterator[list[Row]]:
     most = _LINES // max([1 + len(row.name) // _NAME for row in table.rows], default=1)
     block: list[Row] = []
     for group in table.groups():
-        for piece in (group[at : at + most] for at in range(0, len(group), most)):
+        for at in range(0, len(group), most):
+            piece = group[at : at + most]
             if block and len(block) + len(piece) > most:
                 yield block
                 block = []
-            block = [*block, *piece]
+            block += piece
     yield block
 
 
