@@ -37,6 +37,8 @@ from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.word_pools import POOLS
 from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.plan.option_parsing import (
+    Names,
+    Numbers,
     name_and_spec,
     parse_arms,
     parse_episodes,
@@ -87,7 +89,7 @@ def _policies(given: object) -> object:
     return tuple(dict.fromkeys(found))
 
 
-def _tasks(given: object) -> tuple[str, ...]:
+def _tasks(given: object) -> Names:
     """Return names of tasks and suites as tasks; `Plan.checked` refuses unknown ones."""
     names = parse_names("task", given)
     with contextlib.suppress(InvalidValueError):
@@ -95,7 +97,7 @@ def _tasks(given: object) -> tuple[str, ...]:
     return names
 
 
-def _settings(given: object) -> tuple[str, ...]:
+def _settings(given: object) -> Names:
     """Return names of settings, or the one word that stands for the same ones."""
     names = parse_names("setting", given)
     words = tuple(one.lower() if one.lower() in SETTING_GROUPS else one for one in names)
@@ -129,10 +131,6 @@ def _open_wordings(given: object) -> object:
     return ChosenWordings(file, str(open_wordings(file)))
 
 
-Seeds = Annotated[tuple[int, ...], BeforeValidator(partial(parse_numbers, "policy seed"))]
-StageSets = Annotated[tuple[tuple[int, ...], ...], BeforeValidator(parse_stage_sets)]
-
-
 def _option(default: Any, text: str) -> Any:  # noqa: ANN401 - as it may be typed
     return Field(default=default, description=text)
 
@@ -153,34 +151,36 @@ class Plan(BaseModel):
         description="Built-in names, package.module:Class, or addresses; NAME=SPEC gives one a "
         "name of its own."
     )
-    tasks: Annotated[tuple[str, ...], BeforeValidator(_tasks)] = _option(
+    tasks: Annotated[Names, BeforeValidator(_tasks)] = _option(
         "all", "Tasks or suites; all for the whole benchmark."
     )
-    settings: Annotated[tuple[str, ...], BeforeValidator(_settings)] = _option(
+    settings: Annotated[Names, BeforeValidator(_settings)] = _option(
         "all",
         "Settings; all for every setting that can express the episode, except the harder ones; "
         "every adds these. Next to names, tasks may lack any of them: all,grounded.",
     )
-    in_turns: Annotated[tuple[str, ...], names_of("setting")] = _option(
+    in_turns: Annotated[Names, names_of("setting")] = _option(
         (), "Settings that are also played with the utterances one after another."
     )
-    forms: Annotated[tuple[str, ...], BeforeValidator(partial(parse_names, "form"))] = _option(
+    forms: Annotated[Names, BeforeValidator(partial(parse_names, "form"))] = _option(
         "implicit", "implicit, resolved or both."
     )
     split: str = _option("test", "train, val, test, random, or the name of a private split.")
-    episodes: tuple[int, ...] = _option(
+    episodes: Numbers = _option(
         "4",
         "Positions in the split, from 0: a list such as 0,3,5-9; 4 for the first four; all; or "
         "easy, medium, hard.",
     )
-    policy_seeds: Seeds = _option("0", "Every seed plays every episode.")
-    arms: Annotated[tuple[str, ...], BeforeValidator(parse_arms)] = _option(
+    policy_seeds: Annotated[Numbers, BeforeValidator(partial(parse_numbers, "policy seed"))] = (
+        _option("0", "Every seed plays every episode.")
+    )
+    arms: Annotated[Names, BeforeValidator(parse_arms)] = _option(
         TOLD,
         "told, and control arms of the same scenes: other-goal, silent, silent-empty, scrambled, "
         "paraphrase:N (N other texts), again (another policy seed). Scenes without such an arm "
         "are left out.",
     )
-    stages: StageSets = _option(
+    stages: Annotated[tuple[Numbers, ...], BeforeValidator(parse_stage_sets)] = _option(
         "1-5",
         "Sets of stages of the contextual setting, separated by semicolons: 1,5;1-5; every set is "
         "played.",
@@ -219,7 +219,8 @@ class Plan(BaseModel):
             section = found.get(name)
             check_names(f"key of {name}", section if isinstance(section, Mapping) else (), keys)
         for name in FLAT.keys() & found.keys():
-            value, section = found.pop(name), found.get(FLAT[name], {})
+            value = found.pop(name)
+            section = found.get(FLAT[name], {})
             if is_dataclass(section) and not isinstance(section, type):
                 section = asdict(section)
             if isinstance(section, Mapping):
@@ -228,14 +229,16 @@ class Plan(BaseModel):
 
     @field_validator("episodes", mode="before")
     @classmethod
-    def _parse_episodes(cls, given: object, info: ValidationInfo) -> tuple[int, ...]:
+    def _parse_episodes(cls, given: object, info: ValidationInfo) -> Numbers:
         return parse_episodes(given, info.data.get("split", "test"), info.data.get("tasks", ()))
 
     @field_validator("environment", mode="before")
     @classmethod
     def _check_frames(cls, given: object) -> object:
         frames = given.get("demonstration_frames") if isinstance(given, Mapping) else None
-        return given if frames is None or check_demonstration_frames(frames) else None
+        if frames is not None:
+            check_demonstration_frames(frames)
+        return given
 
     @field_serializer("instruction")
     def _write_instruction(
@@ -267,7 +270,7 @@ class Plan(BaseModel):
         return self
 
     @property
-    def setting_names(self) -> tuple[str, ...]:
+    def setting_names(self) -> Names:
         """The settings that may be played."""
         return expand_settings(self.settings)
 
@@ -383,7 +386,7 @@ class Plan(BaseModel):
 
     def settings_of(
         self, task: str, episode: int, said: Collection[tuple[str, int, str]] = ()
-    ) -> tuple[str, ...]:
+    ) -> Names:
         """Return the settings in which an episode is played.
 
         `said` has task, episode and setting of what is known to be expressible.
@@ -405,8 +408,8 @@ class Plan(BaseModel):
         task: str,
         episode: int,
         settings: Iterable[str],
-        arms: tuple[str, ...],
-        seeds: tuple[int, ...],
+        arms: Names,
+        seeds: Numbers,
     ) -> Iterator[Job]:
         said = [options for setting in settings for options in self._options_of(setting)]
         file, wordings = self.wordings or (None, None)
@@ -436,7 +439,8 @@ class Plan(BaseModel):
 
         An option that the setting does not read keeps its default, so that equal words are one job.
         """
-        rule, usual = all_settings()[setting], InstructionOptions(setting)
+        rule = all_settings()[setting]
+        usual = InstructionOptions(setting)
         chosen = {option: getattr(self.instruction, option) for option in rule.reads - {"stages"}}
         for form in self.forms if rule.implicit else (usual.form,):
             for stages in self.stages if "stages" in rule.reads else (usual.stages,):
@@ -455,8 +459,7 @@ class Plan(BaseModel):
             return False
         found = splits.get_episode(task, self.split, episode)
         easier = replace(options, setting=plain)
-        refused = [find_refusal(found, one) is not None for one in (options, easier)]
-        return refused == [True, False]
+        return find_refusal(found, options) is not None and find_refusal(found, easier) is None
 
     def _instruction_jobs(self) -> Iterator[Job]:
         """Yield one job for each instruction that the language may not be able to express."""
@@ -508,7 +511,8 @@ class PlanOption(NamedTuple):
     help: str
 
     def value_in(self, plan: Plan) -> object:
-        return getattr(plan if self.section is None else getattr(plan, self.section), self.name)
+        holder = getattr(plan, self.section) if self.section else plan
+        return getattr(holder, self.name)
 
 
 def plan_options() -> Iterator[PlanOption]:
@@ -521,7 +525,8 @@ def plan_options() -> Iterator[PlanOption]:
         types = get_type_hints(SECTIONS[name])
         for option in fields(SECTIONS[name]):
             if option.name in FLAT:
-                words, default = option.metadata["help"], option.default
+                words = option.metadata["help"]
+                default = option.default
                 default = ",".join(default) if isinstance(default, tuple) else default
                 yield PlanOption(option.name, name, types[option.name], default, words)
 

@@ -59,7 +59,7 @@ def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
             f"The plan {name!r} is of type {type(data).__name__}; it must be a mapping such as "
             "'tasks: all'."
         )
-    check_names(f"plan key (in {name!r})", data, (*PLAN_KEYS, *([section] if section else [])))
+    check_names(f"plan key (in {name!r})", data, filter(None, (*PLAN_KEYS, section)))
     found = dict(data)
     policies = found.get("policies")
     if isinstance(policies, list):

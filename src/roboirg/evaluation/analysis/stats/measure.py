@@ -17,6 +17,7 @@ from roboirg.evaluation.analysis.results.option_labels import reference_of
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import (
     NOTHING,
+    TRIAL,
     ByTask,
     Cell,
     Cells,
@@ -30,7 +31,6 @@ from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
 
 ALL_TASKS = "all tasks"
-TRIAL_OF = ("task", "episode", "policy_seed", "outcome")
 KEPT_APART = (
     *("policy", "form", "arm", "delivery", "split", "wordings", "max_steps", "meshes"),
     *("observe_every", "demonstration_frames", "language_version", "environment_version"),
@@ -116,7 +116,7 @@ def measure(
     changed = against or {}
     _check(frame, by, changed, family, pool)
     apart = [name for name in KEPT_APART if name in frame and name not in (*by, *pool)]
-    names = (*by, *apart, *pool, *TRIAL_OF)
+    names = (*by, *apart, *pool, *TRIAL)
     rows = {name: [_known(value) for value in frame[name]] for name in names}
     _check_apart(rows, by, apart)
     # What is pooled distinguishes trials of an episode, as the policy seed does.
@@ -165,7 +165,7 @@ def _check(
     family: Sequence[str],
     pool: Sequence[str],
 ) -> None:
-    columns = (*by, *family, *against, *pool, *TRIAL_OF)
+    columns = (*by, *family, *against, *pool, *TRIAL)
     check_names("column", columns, map(str, frame))
     for name in (*family, *against):
         if name not in by:
@@ -244,19 +244,23 @@ class ScopeKey(NamedTuple):
     options: InstructionOptions
 
 
+ScopeSummary = Measured[ScopeKey]
+"""What was measured in a scope."""
+Summaries = Mapping[ScopeKey, ScopeSummary]
+
+
 def by_scope(cells: Cells) -> Mapping[ScopeKey, ByTask]:
     """Group cells by scope, in their order: tasks, then suites, then all tasks."""
-    levels: tuple[dict[ScopeKey, dict[str, Cell]], ...] = ({}, {}, {})
-    for (policy_run, task, options), cell in cells.items():
-        for level, scope in zip(levels, (task, suite(task), ALL_TASKS), strict=True):
+    found: dict[ScopeKey, dict[str, Cell]] = {}
+    for scope_of in (str, suite, lambda _task: ALL_TASKS):
+        for (policy_run, task, options), cell in cells.items():
+            scope = scope_of(task)
             if scope is not None:
-                level.setdefault(ScopeKey(policy_run, scope, options), {})[task] = cell
-    return {key: own for level in levels for key, own in level.items()}
+                found.setdefault(ScopeKey(policy_run, scope, options), {})[task] = cell
+    return found
 
 
-def summarize(
-    cells: Cells, wanted: Collection[str] | None = None
-) -> Mapping[ScopeKey, Measured[ScopeKey]]:
+def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
     """Measure each policy run and set of options in each scope, or in those that are wanted.
 
     The gap is to explicit, the second gap is the implicit form less the resolved one. P-values are
