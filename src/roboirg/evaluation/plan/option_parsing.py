@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import cast
 
 from roboirg import language
@@ -34,8 +34,10 @@ def parse_names(kind: str, given: object) -> tuple[str, ...]:
         given: as typed, or several of these, or a number alone.
 
     Raises:
-        InvalidValueError: there is none.
+        InvalidValueError: there is none, or they are in a mapping, whose values would be lost.
     """
+    if isinstance(given, Mapping):
+        raise InvalidValueError(f"{_shorten(str(given))} is not a valid {kind}; write a list.")
     names = tuple(dict.fromkeys(word for word in _words(given) if word))
     if not names:
         raise InvalidValueError(f"No {kind} was given.")
@@ -61,8 +63,8 @@ def parse_arms(given: object) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def parse_policies(given: str | Iterable[str]) -> tuple[str, ...]:
-    """Parse policies; one text may hold several names separated by commas.
+def parse_policies(given: Iterable[str]) -> tuple[str, ...]:
+    """Parse policies; each text may hold several names separated by commas.
 
     Raises:
         InvalidValueError: there is none, or ``NAME=SPEC`` has a name that is not allowed.
@@ -70,7 +72,7 @@ def parse_policies(given: str | Iterable[str]) -> tuple[str, ...]:
     # Addresses and their options may contain commas.
     parts = (
         (spec.strip(),) if "://" in spec or "?" in spec else parse_names("policy", spec)
-        for spec in ([given] if isinstance(given, str) else map(str, given))
+        for spec in given
     )
     policies = tuple(dict.fromkeys(name for names in parts for name in names))
     if not policies:
@@ -160,7 +162,7 @@ def parse_stage_sets(given: object) -> tuple[tuple[int, ...], ...]:
     sets: Iterable[object] = [given]
     if isinstance(given, str):
         sets = given.split(";")
-    elif isinstance(given, Iterable) and not all(isinstance(one, int) for one in given):
+    elif isinstance(given, list | tuple) and not all(isinstance(stage, int) for stage in given):
         sets = given
     return tuple(dict.fromkeys(map(parse_stages, sets)))
 
