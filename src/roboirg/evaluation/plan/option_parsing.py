@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import cast
 
 from roboirg import language
@@ -39,8 +39,10 @@ def parse_names(kind: str, given: object) -> Names:
         given: as typed, or several of these, or a number alone.
 
     Raises:
-        InvalidValueError: there is none.
+        InvalidValueError: there is none, or they are in a mapping, whose values would be lost.
     """
+    if isinstance(given, Mapping):
+        raise InvalidValueError(f"{_shorten(str(given))} is not a valid {kind}; write a list.")
     names = tuple(dict.fromkeys(word for word in _words(given) if word))
     if not names:
         raise InvalidValueError(f"No {kind} was given.")
@@ -168,7 +170,7 @@ def parse_stage_sets(given: object) -> tuple[Numbers, ...]:
     sets: Iterable[object] = [given]
     if isinstance(given, str):
         sets = given.split(";")
-    elif isinstance(given, Iterable) and not all(isinstance(one, int) for one in given):
+    elif isinstance(given, list | tuple) and not all(isinstance(stage, int) for stage in given):
         sets = given
     return tuple(dict.fromkeys(map(parse_stages, sets)))
 

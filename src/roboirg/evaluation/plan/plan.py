@@ -11,7 +11,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict, fields, is_dataclass, replace
 from functools import partial
-from typing import Annotated, Any, Literal, NamedTuple, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple
 
 import msgspec
 from pydantic import (
@@ -31,7 +31,7 @@ from roboirg.core.arms import TOLD
 from roboirg.core.delivery import TURNS
 from roboirg.core.environment_options import EnvironmentOptions, check_demonstration_frames
 from roboirg.core.errors import InvalidValueError, check_names
-from roboirg.core.field_types import CONTROLS, LABEL, LABEL_RULE
+from roboirg.core.field_types import CONTROLS, check_policy_name
 from roboirg.core.instruction_options import DEFAULT_FRAME, InstructionOptions, identifying
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.word_pools import POOLS
@@ -217,12 +217,22 @@ class Plan(BaseModel):
         check_names("plan key", found, PLAN_KEYS)
         for name, keys in SECTION_KEYS.items():
             section = found.get(name)
-            check_names(f"key of {name}", section if isinstance(section, Mapping) else (), keys)
+            options = section if isinstance(section, Mapping) else {}
+            check_names(f"key of {name}", options, keys)
+            for option in options:
+                if option in found:
+                    raise InvalidValueError(
+                        f"{option} is {found[option]!r}, but stands in {name}, too; leave one out."
+                    )
         for name in FLAT.keys() & found.keys():
             value = found.pop(name)
             section = found.get(FLAT[name], {})
             if is_dataclass(section) and not isinstance(section, type):
                 section = asdict(section)
+            if isinstance(value, str) and re.fullmatch(r"[\d._]*_[\d._]*", value):
+                raise InvalidValueError(
+                    f"{name} is {value!r}; write the number without underscores."
+                )
             if isinstance(section, Mapping):
                 found[FLAT[name]] = {**section, name: value}
         return found
@@ -282,7 +292,10 @@ class Plan(BaseModel):
     @property
     def fingerprint(self) -> str:
         """Hash of all fields but names of variables and what follows from the others."""
-        left_out = {"hosting": {"policy_env"}, "policies": {"__all__": {"makeup"}}}
+        left_out: Mapping[str, Any] = {
+            "hosting": {"policy_env"},
+            "policies": {"__all__": {"makeup"}},
+        }
         return short_hash(self.model_dump_json(context=_HASHED, exclude=left_out))
 
     def checked(self) -> Plan:
@@ -297,10 +310,7 @@ class Plan(BaseModel):
         find_settings(self.settings)
         specs: dict[str, str] = {}
         for one in self.policies:
-            if not re.fullmatch(LABEL, one.name):
-                raise InvalidValueError(
-                    f"Policy {one.name[:80]!r} has no valid name for records: {LABEL_RULE}."
-                )
+            check_policy_name(one.name)
             if specs.setdefault(one.name, one.spec) != one.spec:
                 raise InvalidValueError(
                     f"Two policies are named {one.name!r}: {specs[one.name]} and {one.spec}."
@@ -499,14 +509,12 @@ class PlanOption(NamedTuple):
     Attributes:
         name: as it stands alone.
         section: None if it is in none.
-        type: its annotation.
         default: as it may be typed; None if there is none.
         help: what it means.
     """
 
     name: str
     section: str | None
-    type: Any
     default: object
     help: str
 
@@ -520,15 +528,14 @@ def plan_options() -> Iterator[PlanOption]:
     for name, one in Plan.model_fields.items():
         if name not in FLAT.values():
             default = None if one.is_required() or name in SECTIONS else one.default
-            yield PlanOption(name, None, one.annotation, default, str(one.description))
+            yield PlanOption(name, None, default, str(one.description))
             continue
-        types = get_type_hints(SECTIONS[name])
         for option in fields(SECTIONS[name]):
             if option.name in FLAT:
                 words = option.metadata["help"]
                 default = option.default
                 default = ",".join(default) if isinstance(default, tuple) else default
-                yield PlanOption(option.name, name, types[option.name], default, words)
+                yield PlanOption(option.name, name, default, words)
 
 
 @functools.lru_cache(maxsize=65_536)

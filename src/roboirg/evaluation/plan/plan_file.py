@@ -69,9 +69,11 @@ def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
 
 def _named(policy: object) -> str:
     """Return a policy as typed; what a run's plan.json knew of it may have changed."""
-    if isinstance(policy, Mapping):
-        return f"{policy.get('name')}={policy.get('spec')}"
-    return str(policy)
+    if not isinstance(policy, Mapping):
+        return str(policy)
+    if "spec" not in policy:
+        raise InvalidValueError(f"The plan has {policy!r} as a policy; write NAME=SPEC.")
+    return f"{policy.get('name')}={policy['spec']}"
 
 
 class _PlanLoader(yaml.SafeLoader):

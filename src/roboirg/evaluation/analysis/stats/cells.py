@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.intervals import (
@@ -67,13 +68,22 @@ class Cell:
     missing: int = 0
 
     def add(self, trial: Trial, outcome: str) -> None:
-        """Count a trial: ``success``, ``failure``, ``error``, or ``missing``."""
-        if outcome == "error":
+        """Count a trial: ``success``, ``failure``, ``error``, or ``missing``.
+
+        Raises:
+            InvalidValueError: the outcome is none of these.
+        """
+        if outcome in ("success", "failure"):
+            self.verdicts[trial] = outcome == "success"
+        elif outcome == "error":
             self.errors += 1
         elif outcome == "missing":
             self.missing += 1
         else:
-            self.verdicts[trial] = outcome == "success"
+            raise InvalidValueError(
+                f"The column 'outcome' has {outcome!r}; it must be success, failure, error or "
+                "missing."
+            )
 
     @property
     def counts(self) -> Counts:

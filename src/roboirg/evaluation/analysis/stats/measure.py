@@ -110,14 +110,18 @@ def measure(
 
     Raises:
         UnknownNameError: the frame has no such column, or a column no such value.
-        InvalidValueError: a column is not in `by`, a group has several policies, words or
-            conditions, or rows of a group are about the same trial.
+        InvalidValueError: a column is not in `by` or stands twice, a row has no task, episode or
+            policy seed, an outcome is none, a group has several policies, words or conditions, or
+            rows of a group are about the same trial.
     """
     changed = against or {}
     _check(frame, by, changed, family, pool)
     apart = [name for name in KEPT_APART if name in frame and name not in (*by, *pool)]
     names = (*by, *apart, *pool, *TRIAL)
     rows = {name: [_known(value) for value in frame[name]] for name in names}
+    for name in TRIAL:
+        if None in rows[name]:
+            raise InvalidValueError(f"The column {name!r} has no value in some row; fill it in.")
     _check_apart(rows, by, apart)
     # What is pooled distinguishes trials of an episode, as the policy seed does.
     rows["policy_seed"] = list(zip(*(rows[name] for name in ("policy_seed", *pool)), strict=True))
@@ -166,7 +170,11 @@ def _check(
     pool: Sequence[str],
 ) -> None:
     columns = (*by, *family, *against, *pool, *TRIAL)
-    check_names("column", columns, map(str, frame))
+    known_columns = list(map(str, frame))
+    check_names("column", columns, known_columns)
+    for name in known_columns:
+        if known_columns.count(name) > 1:
+            raise InvalidValueError(f"The frame has several columns {name!r}; keep one.")
     for name in (*family, *against):
         if name not in by:
             raise InvalidValueError(f"The column {name!r} is not in by: {', '.join(by)}.")
