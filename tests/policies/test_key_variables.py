@@ -8,7 +8,10 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.by_name.key_variables import environment_for, forget_secrets
 
-SECRETS = ("GOOGLE_API_KEY", "OPENAI_API_KEY", "LAB_KEY", "HF_TOKEN", "MY_PASSWORD", "AWS_SECRET")
+SECRETS = (
+    *("GOOGLE_API_KEY", "OPENAI_API_KEY", "LAB_KEY", "HF_TOKEN", "MY_PASSWORD", "AWS_SECRET"),
+    *("HF_TOKENS", "OPENAI_API_KEY2", "HTTP_AUTHORIZATION", "MY_CREDS", "SESSION_COOKIE", "DB_PW"),
+)
 
 
 @pytest.fixture(autouse=True)

@@ -14,7 +14,9 @@ from roboirg.policies.by_name.policy_kinds import split_spec, system_of
 from roboirg.policies.vlm.models import ModelOptions
 
 _SECRET = re.compile(
-    "(KEYS?|TOKEN|SECRETS?|PASS|PASSWORD|PASSWD|PASSPHRASE|CREDENTIALS?|AUTH|_PWD|_PAT)(_|$)", re.I
+    "(KEYS?|TOKENS?|SECRETS?|PASS|PASSWORDS?|PASSWD|PASSPHRASE|PASSCODE|CREDENTIALS?|CREDS"
+    r"|AUTH|AUTHORIZATION|COOKIES?|_PWD?|_PAT)\d*(_|$)",
+    re.IGNORECASE,
 )
 """In the names of variables that hold secrets, such as HF_TOKEN or AWS_ACCESS_KEY_ID."""
 _HUB_KEYS = {"lerobot": "HF_TOKEN"}
