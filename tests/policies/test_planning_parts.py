@@ -58,7 +58,7 @@ def test_a_pixel_is_floored_and_stays_in_the_picture(value):
     "text",
     [
         *("", "  \n", "go at <1001, 3>", "go at <3>", "go at <|box_start|>(3)<|box_end|>", "{}"),
-        *("<y, x>", "x" * (MOST_SUBGOAL_LETTERS + 1), "go at (1001,3)"),
+        *("<y, x>", "x" * (MOST_SUBGOAL_LETTERS + 1), "go at (1001,3)", "go \ud800"),
     ],
 )
 def test_broken_subgoals_are_unparsable(text):

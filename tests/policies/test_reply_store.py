@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import math
@@ -118,6 +119,14 @@ def without_tokens(words: str) -> Garbage:
     return Garbage(json.dumps({"choices": [{"message": {"content": words}}]}).encode())
 
 
+def with_tokens(count: int) -> Garbage:
+    message = {"choices": [{"message": {"content": "one"}}], "usage": {"prompt_tokens": count}}
+    return Garbage(json.dumps(message).encode())
+
+
+NO_CHOICES = Garbage(json.dumps({"choices": [], "usage": {"prompt_tokens": 7}}).encode())
+
+
 def test_costs_that_are_unknown_end_a_run_with_a_limit_and_no_reply_is_lost(
     tmp_path: Path,
 ) -> None:
@@ -130,6 +139,31 @@ def test_costs_that_are_unknown_end_a_run_with_a_limit_and_no_reply_is_lost(
         assert len(server.requests) == 2
     assert math.isnan(counts["input_tokens"])
     assert math.isnan(counts["cost_usd"])
+
+
+@pytest.mark.parametrize("reply", [with_tokens(10**9), with_tokens(-(10**5)), NO_CHOICES])
+def test_a_run_with_a_limit_asks_nothing_more_after_tokens_that_cannot_be(
+    tmp_path: Path, reply: Garbage
+) -> None:
+    """Nor after a reply that cannot be read, which may have been paid, too."""
+    limited = ReplySettings(tmp_path, 1e-6)
+    with fake_vlm([reply]) as server:
+        vlm = VLMQuery(model_options(server, **PRICES), Template(""))
+        with contextlib.suppress(PolicyReplyError), use_replies(limited, "a"):
+            vlm.ask(query("words"), str)
+        assert math.isnan(vlm.usage()["cost_usd"])
+        for episode in "bc":
+            with pytest.raises(BudgetError, match="what 1 reply cost is unknown"):
+                play(server, limited, episode, "words", **PRICES)
+        assert len(server.requests) == 1
+
+
+def test_half_a_surrogate_pair_in_a_reply_is_stored_and_paid_once(tmp_path: Path) -> None:
+    with fake_vlm(["\ud800 fine"]) as server:
+        for stored in (0, 1):
+            replies, counts = play(server, ReplySettings(tmp_path), "a", "words", **PRICES)
+            assert replies == [r"\ud800 fine"]
+            assert (counts["cost_usd"], counts["stored"]) == (COST, stored)
 
 
 @pytest.mark.parametrize("count", [-(10**6), 10**12])

@@ -24,8 +24,14 @@ _ANSWER_ENDS = re.compile(
 )
 """Where thoughts begin, or a token at the end of a reply."""
 
-_OBJECT_BEGINS = re.compile(r"""\{(?=\s*(?:["'}]|$))|\[(?=\s*\{)""")
-"""*{this}* is none; *{'this': 1}* is a malformed one."""
+_JSON_BEGINS = re.compile(
+    r"""(?mx)
+    \{(?!\s*[^\s{}"'“”:=,/][^{}"'“”:=,/]*[{}])
+    | \[(?=\s*\{)
+    | ^[ \t]*\}
+    """
+)
+"""An object, a list of objects, or a stray brace; not braces around words, as in *\\boxed{B}*."""
 
 _DECISIVE = re.compile(
     r"""(?imx)
@@ -57,6 +63,22 @@ _SUGGESTED = re.compile(
     """
 )
 """A letter at the beginning of a line, or in bold."""
+
+_CLAUSE_ENDS = re.compile(r"[,;]|(?<=[.!?])\s+|(?<![:\s])\s*\n")
+_DOUBTS = re.compile(
+    r"""(?x)
+    \?|~~|n['’]t\b
+    | (?i:\b(?:cannot|hmm|neither|never|no|none|nor|not|wait)\b)
+    | (?i:\b(?:eliminated|excluded|false|incorrect|invalid|least|ruled|unlikely|wrong)\b)
+    | (?i:\b(?:except|if|unless)\b)
+    # A letter on its own; *A cube* has none.
+    | (?<![\w'’-])(?:A(?![ \t]+[a-z])|[B-D])(?![\w'’-])
+    """
+)
+"""Questions, negations, conditions and letters."""
+_UNSURE = "?"
+_WINDOW = 500
+"""Characters before and after a letter in which its clause and its line are searched."""
 
 
 class UnparsableReplyError(Exception):
@@ -105,42 +127,66 @@ def last_json(text: str) -> Any:  # noqa: ANN401 - JSON
     """Return the last JSON object in a reply, or the last list of objects; None without any.
 
     Raises:
-        UnparsableReplyError: an object breaks off or is malformed, so that none is sure to be last.
+        UnparsableReplyError: a brace belongs to no well-formed object, so that none is sure to be
+            last.
     """
     answer = answer_of(text)
-    decoder = json.JSONDecoder(strict=False)  # texts may have line breaks
+    # Texts may have line breaks.
+    decoder = json.JSONDecoder(strict=False, object_pairs_hook=_distinct_fields)
     found = None
-    begin = _OBJECT_BEGINS.search(answer)
+    begin = _JSON_BEGINS.search(answer)
     while begin is not None:
         try:
             found, end = decoder.raw_decode(answer, begin.start())
         except (ValueError, RecursionError):
             raise UnparsableReplyError("A JSON object breaks off or is malformed.") from None
-        begin = _OBJECT_BEGINS.search(answer, end)
+        begin = _JSON_BEGINS.search(answer, end)
     return found
+
+
+def _distinct_fields(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return a JSON object from its fields; raise `ValueError` if it has one of them twice."""
+    fields = dict(pairs)
+    if len(fields) < len(pairs):
+        raise ValueError("a field is given twice")
+    return fields
 
 
 def chosen_letter(text: str, letters: str) -> str:
     """Return the letter that a reply chooses, in upper case.
 
-    A field of a JSON object decides, else the letters alone on their lines, after *answer* and in
+    The fields of a JSON object decide, else the letters alone on their lines, after *answer* and in
     boxes, else those that begin a line or are set in bold.
 
     Raises:
-        UnparsableReplyError: it names none of the letters from A to D, several different ones, or
-            one that is not among `letters`.
+        UnparsableReplyError: it names none of the letters from A to D, several different ones, one
+            in doubt, or one that is not among `letters`.
     """
     found = last_json(text)
     answer = answer_of(text)
     if isinstance(found, dict):
-        answer = str(found.get("choice", found.get("answer", answer)))
+        fields = [str(found[name]) for name in ("choice", "answer") if name in found]
+        answer = "\n".join(fields) or answer
     for pattern in (_DECISIVE, _SUGGESTED):
-        named = {match["letter"].upper() for match in pattern.finditer(answer)}
+        named = {_sure_letter(match) for match in pattern.finditer(answer)}
         if named:
             break
     if len(named) != 1 or not named <= set(letters):
         raise UnparsableReplyError("The reply has to name one of the letters.")
     return named.pop()
+
+
+def _sure_letter(named: re.Match[str]) -> str:
+    """Return the letter of a match in upper case; `_UNSURE` if words around it cast doubt on it.
+
+    The words are those of its clause, and the rest of its line.
+    """
+    letter = named["letter"].upper()
+    begin, end = named.span("letter")
+    before = _CLAUSE_ENDS.split(named.string[max(0, begin - _WINDOW) : begin])[-1]
+    after = named.string[end : end + _WINDOW].split("\n")[0]
+    doubts = set(_DOUBTS.findall(f"{before} {after}"))
+    return _UNSURE if doubts - {letter} else letter
 
 
 def whole_number(value: object) -> int | None:

@@ -149,6 +149,13 @@ def test_letters_are_read(reply, right, understood):
     assert verdict.right == (right == item.choice)
 
 
+def test_the_words_of_no_choice_cast_doubt_on_its_letter():
+    for item in items():
+        for letter, choice in zip("ABCD", item.choices, strict=False):
+            for reply in (f"{letter}. {choice}", f"The answer is {letter}: {choice}"):
+                assert judge_reply(item, "choice", reply).understood == letter
+
+
 def test_of_forty_replies_those_without_one_letter_are_counted_as_unreadable():
     letters = [reply for reply in FORTY if reply.question == "letter"]
     asked = [item for item in items() if len(item.choices) == 3][: len(letters)]
@@ -218,7 +225,9 @@ def test_points_of_amounts_have_no_order():
 
 @pytest.mark.parametrize(
     "reply", ["", "[1, 2]", '{"points": 3}', '{"points": []}', '{"x": true, "y": 1}',
-              '{"points": [{"x": "a", "y": 2}]}']
+              '{"points": [{"x": "a", "y": 2}]}', '{"points": [{"x": NaN, "y": 2}]}',
+              '{"points": [{"x": "nan", "y": 2}]}', '{"points": [{"x": 2, "y": 1e400}]}',
+              '{"points": [{"x": "Infinity", "y": 2}]}', '{"x": 1, "y": 2, "x": 3}']
 )  # fmt: skip
 def test_replies_that_point_nowhere_are_no_answer(reply):
     verdict = judge_reply(item_of("PickXtimes"), "points", reply)

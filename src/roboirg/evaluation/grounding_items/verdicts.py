@@ -6,7 +6,7 @@ import itertools
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import msgspec
 
@@ -19,12 +19,15 @@ from roboirg.evaluation.grounding_items.grounding_item import (
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.util.reply_reading import UnparsableReplyError, chosen_letter, last_json
 
+Coordinate = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
+"""Columns or rows of a picture. No bound holds for NaN."""
+
 
 class Pixel(msgspec.Struct, frozen=True):
     """A place in a picture: `x` columns from the left, `y` rows from the top."""
 
-    x: float
-    y: float
+    x: Coordinate
+    y: Coordinate
 
 
 class ReplyVerdict(NamedTuple):

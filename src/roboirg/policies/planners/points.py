@@ -19,6 +19,8 @@ SCALE = 1000
 _POINT = re.compile(
     r"(?:<\|box_start\|>)?\(\s*(\d+)\s*,\s*(\d+)\s*\)(?:<\|box_end\|>)?|<\s*(\d+)\s*,\s*(\d+)\s*>"
 )
+_NO_WORDS = re.compile(r"[<>|{}\ud800-\udfff]")
+"""Signs of points and of JSON, and halves of surrogate pairs, which are no text."""
 _FINISHED = re.compile(r"\b(?:complete|completed|finished|done)\b")
 
 
@@ -45,7 +47,7 @@ def parse_points(text: str) -> str:
     if len(subgoal) > MOST_SUBGOAL_LETTERS:
         raise UnparsableReplyError(f"A subgoal has at most {MOST_SUBGOAL_LETTERS} characters.")
     rest = re.sub(r"<\d+, \d+>", "", subgoal)
-    if any(sign in rest for sign in "<>|{}"):
+    if _NO_WORDS.search(rest):
         raise UnparsableReplyError("The subgoal holds signs that are part of no point.")
     return subgoal
 

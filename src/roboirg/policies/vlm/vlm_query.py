@@ -10,12 +10,11 @@ from dataclasses import dataclass, field
 from string import Template
 from typing import TypeVar
 
-from roboirg.core.errors import ModelBusyError, PolicyConnectionError, PolicyReplyError
-from roboirg.core.plain_text import clip_text
+from roboirg.core.errors import ModelBusyError, PolicyConnectionError, UnknownCostError
 from roboirg.core.waiting import waiting
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, ModelReply, make_model
-from roboirg.policies.vlm.models.model import MOST_TOKENS
+from roboirg.policies.vlm.models.model import tokens_of
 from roboirg.policies.vlm.models.reply_store import ReplyStore, current_store, digest
 from roboirg.util.reply_reading import UnparsableReplyError, answer_of
 
@@ -23,10 +22,11 @@ Value = TypeVar("Value")
 
 SILENCE = "(no answer)"
 """Stands for an empty reply when it is quoted back; services refuse empty turns."""
+UNREAD = ModelReply("")
+"""Stands for a reply that could not be read: its tokens are unknown."""
 TRIES = 2
 FIRST_PAUSE_S = 1.0
 LONGEST_PAUSE_S = 60.0
-MAX_COUNT_LENGTH = 20
 ALWAYS = ("calls", "input_tokens", "output_tokens", "unparsed", "cost_usd")
 """Counts that stand in records even if they are 0; the cost only if prices are known."""
 
@@ -56,8 +56,7 @@ class VLMQuery:
         Raises:
             PolicyConnectionError: the service cannot be reached or is overloaded.
             PolicyTimeoutError: there was no reply in time.
-            PolicyReplyError: the service replied with an error or with something else, or reports
-                tokens that cannot be.
+            PolicyReplyError: the service replied with an error or with something else.
             BudgetError: the run has spent what it may.
         """
         for _ in range(TRIES):
@@ -100,11 +99,15 @@ class VLMQuery:
     def _request(self, query: ModelQuery) -> ModelReply:
         self._counts["calls"] += 1
         reply = self._find_or_send(query)
+        self._count(reply)
+        return reply
+
+    def _count(self, reply: ModelReply) -> None:
+        """Add the tokens and the cost of a reply to the counts."""
         self._counts["input_tokens"] += reply.input_tokens
         self._counts["output_tokens"] += reply.output_tokens
         if self.options.has_prices:
             self._counts["cost_usd"] += self.options.cost_usd(reply)
-        return reply
 
     def _find_or_send(self, query: ModelQuery) -> ModelReply:
         """Return the run's reply to a query; a new one is stored before anything sees it."""
@@ -123,16 +126,6 @@ class VLMQuery:
         store.calls += 1
         return reply
 
-    def _check_tokens(self, reply: ModelReply) -> None:
-        """Raise an error if a count of tokens cannot be true."""
-        for count in (reply.input_tokens, reply.output_tokens):
-            if count < 0 or count > MOST_TOKENS:
-                shown = clip_text(str(count), MAX_COUNT_LENGTH)
-                raise PolicyReplyError(
-                    f"Model {self._service} reports {shown} tokens; there can be 0 to "
-                    f"{MOST_TOKENS:,}."
-                )
-
     def _send(self, query: ModelQuery, store: ReplyStore | None) -> ModelReply:
         """Send a query, again while the service is busy or, a few times, cannot be reached."""
         model = self._model = self._model or self.connect(self.options)
@@ -145,16 +138,26 @@ class VLMQuery:
             try:
                 with self._timed("answered_s"):
                     reply = model.answer(query)
-                self._check_tokens(reply)
-                return reply
+                return _as_stored(reply)
             except PolicyConnectionError as error:
                 is_busy = isinstance(error, ModelBusyError)
                 unreachable += not is_busy
                 seconds = getattr(error, "retry_after_s", None) or pause
                 if unreachable > self.options.retries or time.monotonic() + seconds > end:
                     raise
+            except UnknownCostError:
+                self._count(UNREAD)
+                if store is not None:
+                    store.keep_unread()
+                raise
             if store is not None and is_busy:  # makes the other processes of the run wait, too
                 store.pause(self._service, seconds)
             with self._timed("waited_s"), waiting(f"{self._service}, which is busy", is_queue=True):
                 time.sleep(seconds)
             pause = min(2 * pause, LONGEST_PAUSE_S)
+
+
+def _as_stored(reply: ModelReply) -> ModelReply:
+    """Return a reply that can be stored: halves of surrogate pairs are escaped in its text."""
+    text = reply.text.encode(errors="backslashreplace").decode()
+    return ModelReply(text, tokens_of(reply.input_tokens), tokens_of(reply.output_tokens))

@@ -17,13 +17,13 @@ from roboirg.core.errors import (
     PolicyConnectionError,
     PolicyReplyError,
     PolicyTimeoutError,
+    UnknownCostError,
 )
 from roboirg.core.extras import extra_needed
 from roboirg.core.handed_keys import without_keys
 from roboirg.core.waiting import waiting
-from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
+from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply, tokens_of
 from roboirg.util.proxies import proxy_of
-from roboirg.util.reply_reading import whole_number
 
 with extra_needed("Models need httpx", "vlm"):
     import httpx
@@ -67,7 +67,7 @@ class HttpModel(ABC):
 
     @abstractmethod
     def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
-        """Return a reply in JSON as ours; token counts that are no whole numbers are unknown.
+        """Return a reply in JSON as ours; token counts that cannot be are unknown.
 
         It may raise any error of a missing or wrong text.
         """
@@ -99,7 +99,7 @@ class HttpModel(ABC):
                 f"{self._name} cannot be reached ({type(error).__name__}: {self._quote(error)})."
             ) from None
         except MALFORMED as error:
-            raise PolicyReplyError(
+            raise UnknownCostError(
                 f"{self._name} replied with something else ({type(error).__name__}: "
                 f"{self._quote(error)})."
             ) from None
@@ -148,8 +148,9 @@ def reported_count(usage: object, name: str, absent: int | None = None) -> float
         name: of the count.
         absent: the count if there is none of that name.
     """
-    number = whole_number(usage.get(name, absent)) if isinstance(usage, dict) else None
-    return math.nan if number is None else number
+    if not isinstance(usage, dict):
+        return math.nan
+    return tokens_of(usage.get(name, absent))
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:

@@ -15,6 +15,7 @@ from roboirg.core.errors import MissingDependencyError
 from roboirg.core.handed_keys import remember_key
 from roboirg.policies.contract.option_checking import NOT_COMPARED, Seconds
 from roboirg.policies.vlm.model_content import ChatTurn
+from roboirg.util.reply_reading import whole_number
 from roboirg.util.short_hash import short_hash
 
 Provider = Literal["openai", "google"]
@@ -156,6 +157,17 @@ class ModelReply(NamedTuple):
     output_tokens: float = math.nan
 
 
+def tokens_of(count: object) -> float:
+    """Return a number of tokens as a service reports it; NaN, which is unknown, if it is none.
+
+    Such a number is whole and at most `MOST_TOKENS`.
+    """
+    number = whole_number(count)
+    if number is None or not 0 <= number <= MOST_TOKENS:
+        return math.nan
+    return number
+
+
 class Model(Protocol):
     """A connection to a model, which ends with this object."""
 
@@ -165,7 +177,8 @@ class Model(Protocol):
         Raises:
             PolicyConnectionError: the service cannot be reached or is overloaded.
             PolicyTimeoutError: there was no reply in time.
-            PolicyReplyError: the service replied with an error or with something else.
+            PolicyReplyError: the service replied with an error.
+            UnknownCostError: it replied with something else.
         """
 
 

@@ -11,6 +11,7 @@ import contextlib
 import functools
 import hashlib
 import json
+import math
 import sqlite3
 import time
 from collections.abc import Iterator
@@ -23,7 +24,13 @@ from roboirg.core.errors import BudgetError
 from roboirg.core.handed_keys import without_keys
 from roboirg.core.plain_text import counted
 from roboirg.core.waiting import waiting
-from roboirg.policies.vlm.models.model import MOST_TOKENS, ModelOptions, ModelQuery, ModelReply
+from roboirg.policies.vlm.models.model import (
+    MOST_TOKENS,
+    ModelOptions,
+    ModelQuery,
+    ModelReply,
+    tokens_of,
+)
 from roboirg.util.media import Clip, Picture
 
 REPLIES_FILE = "models.sqlite"
@@ -38,14 +45,11 @@ CREATE TABLE IF NOT EXISTS replies (
 CREATE TABLE IF NOT EXISTS services (name TEXT PRIMARY KEY, next_at REAL) WITHOUT ROWID;
 """
 
-# Older stores may hold counts and costs that cannot be, which are unknown.
 _REPLIES = """
-SELECT
-    sent, text,
-    CASE WHEN input_tokens BETWEEN 0 AND :most THEN input_tokens ELSE 'nan' END,
-    CASE WHEN output_tokens BETWEEN 0 AND :most THEN output_tokens ELSE 'nan' END
-FROM replies WHERE episode = :episode AND call = :call
+SELECT sent, text, input_tokens, output_tokens
+FROM replies WHERE episode = ? AND call = ? AND sent NOT LIKE 'unread %'
 """
+# Older stores may hold costs that cannot be, which are unknown.
 _SPENT = """
 SELECT total(cost_usd), count(*) - count(CASE WHEN cost_usd >= 0 THEN 1 END) FROM replies
 """
@@ -105,16 +109,17 @@ class ReplyStore:
     def replies(self) -> dict[str, ModelReply]:
         """Return the stored replies to the next call, by the digest of what was sent.
 
-        There are none in a run that passes them over. Earlier versions stored keys in them.
+        There are none in a run that passes them over. Earlier versions stored keys in them, and
+        counts that cannot be.
         """
         if self.settings.anew:
             return {}
-        rows = self._database.execute(
-            _REPLIES, {"episode": self.episode, "call": self.calls, "most": MOST_TOKENS}
-        )
+        rows = self._database.execute(_REPLIES, (self.episode, self.calls))
         replies: dict[str, ModelReply] = {}
-        for sent, text, *tokens in rows:
-            replies[sent] = ModelReply(without_keys(text), *map(float, tokens))
+        for sent, text, input_tokens, output_tokens in rows:
+            replies[sent] = ModelReply(
+                without_keys(text), tokens_of(input_tokens), tokens_of(output_tokens)
+            )
         return replies
 
     def keep(self, sent: str, reply: ModelReply, cost_usd: float) -> None:
@@ -126,6 +131,10 @@ class ReplyStore:
             "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?, ?, ?, ?)",
             (self.episode, self.calls, sent, *reply, cost_usd),
         )
+
+    def keep_unread(self) -> None:
+        """Store that a reply to the next call could not be read: what it cost is unknown."""
+        self.keep(f"unread {time.time()}", ModelReply(""), math.nan)
 
     def check_budget(self, model: ModelOptions) -> None:
         """Raise if the run may not ask a model.
@@ -145,8 +154,9 @@ class ReplyStore:
         if unknown:
             raise BudgetError(
                 f"--max-cost cannot be kept: what {counted(unknown, 'reply', 'replies')} cost is "
-                f"unknown, as the service of model {model.model!r} did not report the tokens; run "
-                "the same command without --max-cost to go on."
+                f"unknown, as the service of model {model.model!r} did not report its tokens in "
+                f"whole numbers from 0 to {MOST_TOKENS:,}; run the same command without --max-cost "
+                "to go on."
             )
         if spent >= most:
             raise BudgetError(
