@@ -279,7 +279,7 @@ class Plan(BaseModel):
     @property
     def fingerprint(self) -> str:
         """Hash of all fields but names of variables and what follows from the others."""
-        left_out = {"hosting": {"policy_env"}, "policies": {"__all__": {"makeup"}}}
+        left_out: Any = {"hosting": {"policy_env"}, "policies": {"__all__": {"makeup"}}}
         return short_hash(self.model_dump_json(context=_HASHED, exclude=left_out))
 
     def checked(self) -> Plan:
