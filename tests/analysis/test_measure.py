@@ -133,6 +133,26 @@ def test_a_wrong_question_is_one_sentence(played: pd.DataFrame, asked, words) ->
         roboirg.measure(pd.concat([played, played]), **asked)
 
 
+@pytest.mark.parametrize("outcome", ["Success", "success ", True, 1, None])
+def test_an_outcome_that_is_none_is_no_failure(played: pd.DataFrame, outcome: object) -> None:
+    frame = played.astype({"outcome": object})
+    frame.loc[0, "outcome"] = outcome
+    with pytest.raises(InvalidValueError, match=f"'outcome' has (no value|{outcome!r};)"):
+        roboirg.measure(frame, ["policy", "setting"])
+
+
+@pytest.mark.parametrize("name", ["task", "episode", "policy_seed"])
+def test_a_row_of_no_trial_is_refused(played: pd.DataFrame, name: str) -> None:
+    with pytest.raises(InvalidValueError, match=f"{name!r} has no value in some row"):
+        roboirg.measure(played.assign(**{name: pd.NA}), ["policy", "setting"])
+
+
+def test_a_column_that_stands_twice_is_refused(played: pd.DataFrame) -> None:
+    frame = pd.concat([played, played[["task"]]], axis=1)
+    with pytest.raises(InvalidValueError, match="several columns 'task'"):
+        roboirg.measure(frame, ["policy", "setting"])
+
+
 def test_averages_are_unweighted_and_suites_stand_by_themselves(result) -> None:
     results = [
         *(result("success", episode, task="PickXtimes") for episode in range(9)),

@@ -7,6 +7,7 @@ import msgspec
 import pytest
 import yaml
 
+from roboirg.cli import run_commands
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.plan_file import named_plans, read_plan_file
@@ -94,7 +95,7 @@ def test_the_standard_protocol_has_every_setting_and_direct_in_turns() -> None:
         ("stages: [[1, 5], [1, 2, 5]]", {"stages": "1,5;1,2,5"}),
         ("video: off", {"video": "off"}),
         ("max_steps: 20", {"environment": {"max_steps": "20"}}),
-        ("{max_steps: 20, environment: {max_steps: 30, meshes: light}}",
+        ("{max_steps: 20, environment: {meshes: light}}",
          {"max_steps": 20, "meshes": "light"}),
         ("actions: null", {}),
         ("settings: [direct, spatial]", {"settings": "direct,spatial"}),
@@ -120,6 +121,7 @@ def test_values_are_those_that_would_be_typed(
         ("", r"is of type NoneType"),
         ("tasks: [", r"is not valid YAML"),
         ("settings: &same direct\nforms: *same", r"line 2 has an alias"),
+        ("policies: [mine: oracle]", r"has \{'mine': 'oracle'\} as a policy; write NAME=SPEC"),
         ("tasks: all\nsplit: val\ntasks:\n  - real", r"line 3 has the key 'tasks' again"),
     ],
 )
@@ -143,6 +145,14 @@ def test_what_yaml_takes_for_something_else_than_it_looks_is_refused(
     with pytest.raises(InvalidValueError, match=r"line \d ") as caught:
         read_plan_file(write(tmp_path, text), "training")
     assert "\n" not in str(caught.value)
+
+
+def test_what_is_typed_replaces_the_option_in_a_section_of_the_file(tmp_path: Path) -> None:
+    path = write(tmp_path, "environment: {max_steps: 100, meshes: light}\nepisodes: 1")
+    typed = {"policies": ["random"], "max_steps": "200", "max_cost": "0.5"}
+    plan = run_commands._plan(path, typed, ())
+    options = plan.environment
+    assert (options.max_steps, options.meshes, plan.models.max_cost) == (200, "light", 0.5)
 
 
 def test_a_refused_number_of_a_plan_is_named_with_its_line(tmp_path: Path) -> None:

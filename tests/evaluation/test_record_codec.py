@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.records.record import Job, Summary
-from roboirg.evaluation.records.record_codec import identity_key, read_summary
+from roboirg.evaluation.records.record_codec import StoreError, identity_key, read_summary
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     RecordStore,
@@ -45,6 +45,26 @@ def test_a_damaged_line_loses_only_its_episode_and_is_reported(
     assert len(records) == 8
     # Whole records are found behind the damage, too.
     assert tuple(index.records(index.newest)) == records
+
+
+def test_an_unfinished_line_is_reported_to_readers(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
+    lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
+    write(tmp_path, *lines[:-1], lines[-1][:40])
+    run = StoredRun(tmp_path, read_summary)
+    assert len(run.newest) == 7
+    (warning,) = caplog.messages
+    assert warning == (
+        f"{tmp_path / RECORDS_FILE} ends in an unfinished line (a run may be writing it); "
+        "roboirg records merge copies all others."
+    )
+    with pytest.raises(StoreError, match="ends in an unfinished line"):
+        run.file.refuse_damage()
+    run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
+    StoredRun(tmp_path, read_summary).file.refuse_damage()
+    assert caplog.messages == [warning]
 
 
 def test_results_are_records_without_the_course(tmp_path: Path) -> None:

@@ -62,8 +62,8 @@ def learn_listener(
     from roboirg_learn.learn_support import check_learn_support
 
     check_learn_support()
-    own = ("scenes", "goals", "detector_epochs", "reader_epochs", "seed", "seeds", "encoders")
-    training = _listener_plan(PlanWords(context, plan, TRAINING, own), without)
+    own = "scenes goals detector_epochs reader_epochs seed seeds encoders"
+    training = _listener_plan(PlanWords(context, plan, TRAINING, own.split()), without)
     if study:
         _run_study(training, out, worker_count())
         return
@@ -150,10 +150,10 @@ def learn_policy(
     from roboirg_learn.learn_support import check_learn_support
 
     own = (
-        *("scenes", "drawn", "goals", "detector_epochs", "body_epochs", "reader_epochs", "seed"),
-        *("encoders", "memories", "parts", "played"),
+        "scenes drawn goals detector_epochs body_epochs reader_epochs seed encoders memories parts "
+        "played"
     )
-    words = PlanWords(context, plan, TRAINING, own)
+    words = PlanWords(context, plan, TRAINING, own.split())
     training = _policy_plan(words, tasks, settings, memory)
     if paper and memory != USUAL_MEMORY:
         raise InvalidValueError("--paper has its memories from the plan: training.memories.")

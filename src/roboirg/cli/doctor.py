@@ -152,7 +152,7 @@ def _check_package(name: str, specifier: SpecifierSet) -> Check:
 def _check_files() -> tuple[Check, ...]:
     """Check what lies outside the packages: files, folders and proxies."""
     return (
-        _try("model files", lambda: str(look_for_model_files().root)),
+        _try("model files", lambda: str(look_for_model_files())),
         _try("temporary files", lambda: _write_to(tempfile.gettempdir())),
         _try("cache", lambda: _write_to(str(cache_folder() or "")), "all is made anew"),
         _try("shared memory", lambda: _write_to("/dev/shm"), "runs do without it"),  # noqa: S108

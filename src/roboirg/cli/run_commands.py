@@ -185,11 +185,17 @@ def _plan(name: str | None, typed: dict[str, Any], usual: Sequence[str]) -> Plan
 
     `usual` are its policies if it has none.
     """
+    from roboirg.evaluation.plan.plan import FLAT
     from roboirg.evaluation.plan.plan_file import read_plan_file
     from roboirg.evaluation.plan.plan_maker import make_plan
     from roboirg.tasks.splits.private_splits import drawn_split
 
-    chosen = {**({} if name is None else read_plan_file(name)), **typed}
+    chosen = {} if name is None else read_plan_file(name)
+    for option in FLAT.keys() & typed.keys():
+        section = chosen.get(FLAT[option])
+        if isinstance(section, dict):
+            section.pop(option, None)
+    chosen |= typed
     policies = chosen.pop("policies", None) or usual
     if not policies:
         raise InvalidValueError("No policy given; name one with --policy, such as oracle.")

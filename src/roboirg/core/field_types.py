@@ -16,10 +16,19 @@ CONTROLS = "\\x00-\\x1f\\x7f-\\x9f\\u200e\\u200f\\u202a-\\u202e\\u2066-\\u2069"
 NAME = f"^[^{CONTROLS}]{{0,{MOST_NAME_LETTERS}}}\\Z"
 """A name in a record: text without characters that control a terminal or reorder what is read."""
 
-LABEL = NAME.replace("^", "^(?![=+@-])", 1)
-"""A name that heads a row or column: spreadsheets compute what begins with such a sign."""
+_READ_AS_NO_TEXT = (
+    r"(?i:[\d., ]*(?:\de[+-]?\d+)?|true|false|inf(?:inity)?"
+    r"|<?nan?>?|#?n/?a(?: n/a)?|null|none|1\.#(?:ind|qnan))\Z"
+)
+"""What programs that read a table take for a number, a flag or a missing value."""
+LABEL = NAME.replace("^", f"^(?![=+@-])(?!{_READ_AS_NO_TEXT})", 1)
+"""A name that heads a row or column.
+
+Spreadsheets compute what begins with such a sign; other programs change ``007``, and lose ``NA``.
+"""
 LABEL_RULE = (
-    "at most 1,000 characters, none of = + - @ at the beginning, and without control characters"
+    "at most 1,000 characters, none of = + - @ at the beginning, without control characters, and "
+    "nothing that is read as a number, a flag or a missing value, such as 007, true or NA"
 )
 SUBGOAL = f"^[^{CONTROLS}]{{1,{MOST_SUBGOAL_LETTERS}}}\\Z"
 Subgoal = Annotated[str, msgspec.Meta(pattern=SUBGOAL)]
@@ -49,6 +58,18 @@ def check_whole(name: str, value: object, least: int = 1, most: int = MOST_COUNT
     raise InvalidValueError(
         f"{name} is {value!r}; it must be a whole number from {least} to {most:,}."
     )
+
+
+def check_policy_name(name: str) -> None:
+    """Check the name of a policy, which heads rows of tables.
+
+    Raises:
+        InvalidValueError: it is not a `LABEL`.
+    """
+    if not re.fullmatch(LABEL, name):
+        raise InvalidValueError(
+            f"Policy {name[:80]!r} has no valid name for records: {LABEL_RULE}."
+        )
 
 
 def described(text: str) -> dict[str, str]:

@@ -9,13 +9,12 @@ from typing import cast
 from roboirg.core.episode import Episode, Goal, SlotValue, values_in
 from roboirg.language.instruction import Instruction
 from roboirg.reader import interpret
-from roboirg.tasks import get_task
+from roboirg.tasks import get_task, goals_of
 
 
 def fitting_goals(text: str, episode: Episode) -> tuple[Goal, ...]:
     """Return the goals that fit a text in an episode's scene; all possible goals if none does."""
-    task = get_task(episode.task)
-    return interpret(text, episode.scene, task.name).goals or task.goals(episode.scene)
+    return interpret(text, episode.scene, episode.task).goals or goals_of(episode)
 
 
 def blind_goals(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
@@ -31,7 +30,7 @@ def blind_goals(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
     shapes = [_shape(goal, candidates) for goal in fitting]
     return tuple(
         goal
-        for goal in get_task(episode.task).goals(episode.scene)
+        for goal in goals_of(episode)
         if _shape(goal, candidates) in shapes
         and all(set(values_in(goal[slot])) <= set(values) for slot, values in candidates.items())
     )

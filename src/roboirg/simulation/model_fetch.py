@@ -52,7 +52,7 @@ def fetch_model_files(wheel: Path | None, say: Callable[[str], None]) -> Path:
         problem = f"not {WHEEL}" if wheel.is_file() else "not a file"
         raise InvalidValueError(f"'{wheel}' is {problem} (SHA-256 {WHEEL_SHA256[:12]}...).")
     try:
-        return look_for_model_files().root
+        return look_for_model_files()
     except MissingDependencyError:
         folder = fetched_folder()
     try:
@@ -64,7 +64,7 @@ def fetch_model_files(wheel: Path | None, say: Callable[[str], None]) -> Path:
             f"Cannot write the model files to '{folder}' ({error.strerror or error}); "
             f"{FOLDER_VARIABLE} names another folder."
         ) from error
-    return look_for_model_files().root
+    return look_for_model_files()
 
 
 def _unpack(wheel: Path, folder: Path) -> None:

@@ -86,12 +86,9 @@ class ScoreRow:
     def corrected(self) -> float | None:
         """The rate on a scale from random answers, 0, to 1; None if random answers are right."""
         rate = self.summary.rate
-        return None if rate is None else above_chance(float(rate), self.chance)
-
-
-def above_chance(rate: float, chance: float) -> float | None:
-    """Return a rate on a scale on which chance is 0 and all right is 1; None if chance is 1."""
-    return None if chance >= 1 else (rate - chance) / (1 - chance)
+        if rate is None or self.chance >= 1:
+            return None
+        return (float(rate) - self.chance) / (1 - self.chance)
 
 
 def score_answers(

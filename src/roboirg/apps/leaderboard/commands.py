@@ -86,15 +86,15 @@ def _share(text: str) -> float:
 
 
 def _print(found: Verification) -> None:
-    from roboirg.apps.leaderboard.record_check import TOLERANCE, ReplayVerdict
+    from roboirg.apps.leaderboard.record_check import TOLERANCE
 
-    played = found.records - found.verdicts[ReplayVerdict.NOT_REPLAYED]
+    played = found.records - found.verdicts["not replayed"]
     verb = verb_for(played, "were")
     typer.echo(
         f"{counted(found.records, 'record')}; {played:,} {verb} played again from stored actions."
     )
-    typer.echo(f"End states equal bit for bit: {found.verdicts[ReplayVerdict.EXACT]:,}.")
-    if tolerant := found.verdicts[ReplayVerdict.TOLERANT]:
+    typer.echo(f"End states equal bit for bit: {found.verdicts['exact']:,}.")
+    if tolerant := found.verdicts["tolerant"]:
         typer.echo(
             f"End states from other processors equal within {TOLERANCE:g} (m, rad, s): "
             f"{tolerant:,}; the largest difference is {found.deviation:.1g}."

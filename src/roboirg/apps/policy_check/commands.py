@@ -25,7 +25,6 @@ def check_policy(
     """
     from rich.console import Console
 
-    from roboirg.apps.policy_check.check_result import FAIL
     from roboirg.apps.policy_check.expert_episode import record_expert
     from roboirg.apps.policy_check.policy_check import check_policy as check
     from roboirg.apps.policy_check.policy_check import print_check_results
@@ -35,7 +34,7 @@ def check_policy(
     forget_secrets(policy, policy_env)
     results = check(policy, record_expert=record_expert if expert else None)
     print_check_results(results, Console())
-    if any(result.verdict == FAIL for result in results):
+    if any(result.verdict == "fail" for result in results):
         raise typer.Exit(USAGE_ERROR)
 
 

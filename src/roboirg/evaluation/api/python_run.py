@@ -21,13 +21,13 @@ from roboirg.util.console_width import progress_console
 
 AnyPolicy = str | type[Any] | object
 """A spec as on the command line, a class, or an object with ``reset`` and ``act``."""
+AnyPolicies = AnyPolicy | Sequence[AnyPolicy] | Mapping[str, AnyPolicy]
+"""One, several, or several by name."""
 
 RUNS = Path("runs")
 
 
-def python_plan(
-    policies: AnyPolicy | Sequence[AnyPolicy] | Mapping[str, AnyPolicy], **options: object
-) -> Plan:
+def python_plan(policies: AnyPolicies, **options: object) -> Plan:
     """Return a checked plan; the options are those of `make_plan`."""
     refs = _named(policies)
     if any(one.place == "python" for one in refs):
@@ -73,9 +73,7 @@ def play_plan(
     return folder
 
 
-def _named(
-    policies: AnyPolicy | Sequence[AnyPolicy] | Mapping[str, AnyPolicy],
-) -> list[PolicyRef]:
+def _named(policies: AnyPolicies) -> list[PolicyRef]:
     if isinstance(policies, Mapping):
         return [policy_of(policy, name) for name, policy in policies.items()]
     given = policies if isinstance(policies, (list, tuple)) else [policies]

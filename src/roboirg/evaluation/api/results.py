@@ -25,6 +25,7 @@ from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.analysis.tables.table_notes import with_mixtures
 from roboirg.evaluation.plan.sources import Source, opened_sources
 from roboirg.evaluation.records.record import Record, Summary
+from roboirg.evaluation.records.run_files import run_folder
 from roboirg.evaluation.records.store import read_records
 
 if TYPE_CHECKING:
@@ -70,10 +71,14 @@ class Results:
     """What a run yielded. Notebooks show its main table, or that of all tasks it has.
 
     Attributes:
-        folder: of the run, with ``records.jsonl``; `roboirg` commands take it, too.
+        folder: of the run, with ``records.jsonl``, which may be given as a text; `roboirg`
+            commands take it, too.
     """
 
     folder: Path
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "folder", run_folder(self.folder))
 
     @property
     def errors(self) -> int:

@@ -59,7 +59,7 @@ def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
             f"The plan {name!r} is of type {type(data).__name__}; it must be a mapping such as "
             "'tasks: all'."
         )
-    check_names(f"plan key (in {name!r})", data, (*PLAN_KEYS, *([section] if section else [])))
+    check_names(f"plan key (in {name!r})", data, filter(None, (*PLAN_KEYS, section)))
     found = dict(data)
     policies = found.get("policies")
     if isinstance(policies, list):
@@ -69,9 +69,11 @@ def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
 
 def _named(policy: object) -> str:
     """Return a policy as typed; what a run's plan.json knew of it may have changed."""
-    if isinstance(policy, Mapping):
-        return f"{policy.get('name')}={policy.get('spec')}"
-    return str(policy)
+    if not isinstance(policy, Mapping):
+        return str(policy)
+    if "spec" not in policy:
+        raise InvalidValueError(f"The plan has {policy!r} as a policy; write NAME=SPEC.")
+    return f"{policy.get('name')}={policy['spec']}"
 
 
 class _PlanLoader(yaml.SafeLoader):

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field
 from roboirg.core.errors import check_names
 from roboirg.core.field_types import MOST_COUNT, described
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
-from roboirg.evaluation.plan.option_parsing import parse_names
+from roboirg.evaluation.plan.option_parsing import Names, parse_names
 from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
 from roboirg.policies.contract.option_checking import Seconds
 
@@ -21,7 +21,7 @@ RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure
 """Kinds of errors that may not occur again when the episode is retried."""
 
 
-def _names_if_any(kind: str, given: object) -> tuple[str, ...]:
+def _names_if_any(kind: str, given: object) -> Names:
     """Return names of a kind; none for an empty list, which 0 and an empty text are not."""
     is_empty = isinstance(given, list | tuple) and not given
     return () if is_empty else parse_names(kind, given)
@@ -32,7 +32,7 @@ def names_of(kind: str) -> BeforeValidator:
     return BeforeValidator(partial(_names_if_any, kind))
 
 
-def _error_kinds(given: object) -> tuple[str, ...]:
+def _error_kinds(given: object) -> Names:
     names = _names_if_any("kind of error", given)
     if {name.lower() for name in names} <= {"none"}:
         return ()
@@ -59,14 +59,14 @@ class Hosting:
         default=DEFAULT_BATCH,
         metadata=described("Largest number of episodes that a policy is asked about at once."),
     )
-    devices: Annotated[tuple[str, ...], names_of("device")] = field(
+    devices: Annotated[Names, names_of("device")] = field(
         default=(),
         metadata=described(
             "GPUs, such as 0,1; each policy gets a process on each. If empty, one process on any "
             "GPU."
         ),
     )
-    policy_env: Annotated[tuple[str, ...], names_of("environment variable")] = field(
+    policy_env: Annotated[Names, names_of("environment variable")] = field(
         default=(),
         metadata=described(
             "Environment variables with secrets, such as HF_TOKEN, that policies in processes of "
@@ -139,7 +139,7 @@ class WorkerNeeds:
     gpus: Annotated[float, Field(ge=0)] = 0.0
     memory_gb: Annotated[float, Field(ge=0, le=MOST_COUNT)] = 0.0
     labels: Mapping[str, str] = field(default_factory=dict)
-    variables: tuple[str, ...] = ()
+    variables: Names = ()
     working_dir: str | None = None
 
     def slots(self, node: Mapping[str, Any]) -> int:

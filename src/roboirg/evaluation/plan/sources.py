@@ -117,11 +117,10 @@ def opened_sources(
 def _split(text: str) -> tuple[Path, str | None]:
     """Return the path of a run, and the policy that follows it after a colon."""
     run_folder(text)
-    ends = [len(text), *(place for place in reversed(range(len(text))) if text[place] == ":")]
-    end = next((end for end in ends if Path(text[:end]).exists()), None)
-    path, colon, policy = (
-        text.partition(":") if end is None else (text[:end], text[end : end + 1], text[end + 1 :])
-    )
-    if colon and not policy:
+    path = text
+    while ":" in path and not Path(path).exists():
+        path = path.rpartition(":")[0]
+    policy = text[len(path) + 1 :]
+    if path != text and not policy:
         raise InvalidValueError(f"The name of the policy after {text!r} is empty.")
     return Path(path), policy or None

@@ -48,7 +48,8 @@ class LineFile:
         place: of the line that `parse` yielded last.
         torn: bytes of an unfinished last line, set by `parse`.
         damaged: numbers of lines that are not JSON, set by `parse`.
-        damage: a sentence about them at the end of `parse`; empty without any.
+        damage: a sentence about them, or else about an unfinished last line, at the end of `parse`;
+            empty without any.
     """
 
     def __init__(self, path: Path) -> None:
@@ -95,16 +96,21 @@ class LineFile:
                     yield parse_line(content, self._path, number)
                 except DamagedLineError:
                     self.damaged.append(number)
+        if self.torn:
+            self.damage = (
+                f"{self._path} ends in an unfinished line (a run may be writing it); "
+                "roboirg records merge copies all others."
+            )
         if self.damaged:
             lines = counted(len(self.damaged), "damaged line")
             self.damage = (
                 f"{self._path} has {lines}, the first is line {self.damaged[0]}; "
                 "roboirg records merge copies all others."
             )
-            _warn_once(self.damage)
+            warn_once(self.damage)
 
     def refuse_damage(self) -> None:
-        """Raise if `parse` found a damaged line.
+        """Raise if `parse` found a damaged or an unfinished line.
 
         Raises:
             StoreError: it did.
@@ -199,7 +205,8 @@ class AppendFile:
 
 
 @functools.cache
-def _warn_once(sentence: str) -> None:
+def warn_once(sentence: str) -> None:
+    """Log a warning, unless this process has logged the same before."""
     logging.getLogger(__name__).warning("%s", sentence)
 
 

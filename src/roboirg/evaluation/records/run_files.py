@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -30,11 +31,11 @@ def run_folder(path: str | Path) -> Path:
     """Return the path of a run's folder, which need not exist.
 
     Raises:
-        InvalidValueError: its name is empty, or has NUL.
+        InvalidValueError: it is no path, or its name is empty or has NUL.
     """
-    text = str(path)
+    text = str(path) if isinstance(path, str | os.PathLike) else ""
     if not text.strip() or "\0" in text:
-        raise InvalidValueError(f"The run's folder is {text!r}; it must be a path like runs/first.")
+        raise InvalidValueError(f"The run's folder is {path!r}; it must be a path like runs/first.")
     return Path(path)
 
 

@@ -20,7 +20,7 @@ from typing import Generic, Self, TypeVar
 import msgspec
 
 from roboirg.core.versions import Mismatch
-from roboirg.evaluation.records.line_file import AppendFile, LineFile, LinePlace
+from roboirg.evaluation.records.line_file import AppendFile, LineFile, LinePlace, warn_once
 from roboirg.evaluation.records.record import Record, Summary
 from roboirg.evaluation.records.record_codec import (
     RecordKey,
@@ -158,7 +158,7 @@ def read_index(folder: Path) -> dict[RecordKey, Summary]:
 class StoredRun(Generic[Stored]):
     """The newest record of each identity in a run's folder, of which memory may hold a summary.
 
-    Takes no lock, so a run may be writing to the folder.
+    Takes no lock, so a run may be writing to the folder; a warning names an unfinished last line.
 
     Args:
         folder: of the run.
@@ -178,6 +178,8 @@ class StoredRun(Generic[Stored]):
         kept: dict[RecordKey, tuple[Stored, LinePlace]] = {}
         for result in self.file.parse(parse_line):
             kept[identity_key(result)] = (result, self.file.place)
+        if self.file.torn:
+            warn_once(self.file.damage)
         if not kept:
             self.file.refuse_damage()
             raise StoreError(

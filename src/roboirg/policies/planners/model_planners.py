@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.observations import Observation
 from roboirg.core.subgoal_text import split_point
 from roboirg.policies.planners.planner import WHEN_DONE
 from roboirg.policies.planners.points import normalize_subgoal, parse_points
@@ -56,9 +56,8 @@ class QwenPlanner(VLMPlanner[QwenOptions]):
     ButtonUnmaskSwap, by the text of the subgoal, as a policy does not know its task. Only these
     tasks have such subgoals."""
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode."""
-        super().reset(instruction, demonstration)
+    def forget(self) -> None:
+        """Forget the subgoals."""
         self._history: list[str] = []
 
     def query(self, observation: Observation) -> ModelQuery:
@@ -105,9 +104,8 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
         super().__init__(options, kind, seed)
         self.demonstration_frames = "all" if options.observe_every == 1 else options.observe_every
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+    def forget(self) -> None:
         """Begin a new conversation, without frames of the last episode."""
-        super().reset(instruction, demonstration)
         self._frames: list[Pixels] = []
         self._turns: list[ChatTurn] = []
         self._quoted = ""
@@ -136,15 +134,19 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
         if self.finishes(subgoal):
             subgoal = str(self.subgoal)
         self._turns += [self._turn, ChatTurn("model", (text,))]
-        self._quoted, self._frames = self.instruction, []
+        self._quoted = self.instruction
+        self._frames = []
         return subgoal
 
     def _parts(self, when: str) -> Iterator[Part]:
-        frames, has_clip = self._frames, len(self._frames) >= MIN_CLIP_FRAMES
+        frames = self._frames
+        has_clip = len(self._frames) >= MIN_CLIP_FRAMES
         clip = "clip"
         if when == "first":
-            clip, has_clip = "video", self.video is not None
-            frames = [*(() if self.video is None else self.video), *frames]
+            clip = "video"
+            has_clip = self.video is not None
+            if self.video is not None:
+                frames = [*self.video, *frames]
         if self._quoted != self.instruction:  # the first turn, or more has been said since
             yield self.goal()
         yield self.fill(f"{when}_{clip}" if has_clip else f"{when}_picture")
@@ -180,9 +182,8 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
 
     options_type = MemerOptions
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+    def forget(self) -> None:
         """Clear the memory."""
-        super().reset(instruction, demonstration)
         self.frames: dict[int, Pixels] = {}
         self._recent: dict[int, Pixels] = {}
         self._last_step = 0
@@ -211,7 +212,8 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
 
     def take(self, text: str) -> str:
         """Return the subgoal; add the chosen frames, which are counted from 1."""
-        reply, count = json_object(text), len(self._recent)
+        reply = json_object(text)
+        count = len(self._recent)
         subgoal = parse_points(text_of(reply, "current_subtask"))
         positions = reply.get("keyframe_positions")
         if not isinstance(positions, list):
@@ -264,9 +266,8 @@ class StatelessPlanner(VLMPlanner[StatelessOptions]):
 
     options_type = StatelessOptions
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode."""
-        super().reset(instruction, demonstration)
+    def forget(self) -> None:
+        """Forget the pictures."""
         self._past: list[Pixels] = []
 
     def watch(self, observation: Observation, step: int) -> None:  # noqa: ARG002

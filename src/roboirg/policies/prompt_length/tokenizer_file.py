@@ -96,11 +96,9 @@ def prompt_limit(needs: PolicyNeeds) -> PromptLimit | None:
     """Return the limit that a policy declares; None if it declares none."""
     if needs.prompt_tokens is None:
         return None
-    path = needs.tokenizer
-    return PromptLimit(
-        needs.prompt_tokens,
-        needs.prompt_added,
-        None if path is None else read_tokenizer(str(Path(path).absolute())),
-        None if path is None else Path(path).name,
-        needs.lowers_prompt,
-    )
+    limit = PromptLimit(needs.prompt_tokens, needs.prompt_added, lowers=needs.lowers_prompt)
+    if needs.tokenizer is None:
+        return limit
+    path = Path(needs.tokenizer)
+    tokenize = read_tokenizer(str(path.absolute()))
+    return limit._replace(tokenize=tokenize, tokenizer=path.name)

@@ -19,7 +19,7 @@ import numpy as np
 from roboirg.apps.real.study.counterbalancing import counterbalanced_episodes, target_kind
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError, check_names
-from roboirg.core.field_types import MOST_WHOLE, check_whole
+from roboirg.core.field_types import MOST_WHOLE, check_policy_name, check_whole
 from roboirg.core.instruction_options import InstructionOptions, identifying
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.plan.option_parsing import name_and_spec
@@ -295,6 +295,8 @@ def _check(
     check_whole("trials", trials)
     check_whole("demonstrations", demonstrations, least=0)
     check_whole("seed", seed, least=0, most=MOST_WHOLE)
+    for policy in policies:
+        check_policy_name(policy)
     for task in tasks:
         target_kind(task)
         available = settings_of(get_task(task))

@@ -16,7 +16,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from urllib.parse import quote
 
 import msgspec
@@ -27,7 +27,7 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.core.fact_traits import fact_traits
 from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import words_label
-from roboirg.evaluation.analysis.page.episodes import PageEpisode
+from roboirg.evaluation.analysis.page.episodes import JsonObject, PageEpisode
 from roboirg.evaluation.play.job_instruction import instruct_job, other_versions
 from roboirg.evaluation.records.record import EventRecord, Job, Record, SubgoalRecord
 from roboirg.judging.episode_replay import Event, completed_stages
@@ -41,8 +41,6 @@ EMBEDDED = "#"
 
 _KINDS = {"shuttle": "the moving cube", "site": "the spot on the table"}
 """Words for objects that causes do not name."""
-
-Details = dict[str, Any]
 
 
 @dataclass
@@ -83,7 +81,7 @@ class EpisodeDetails:
                 self.links_videos |= name in media
         self.lines.append(msgspec.json.encode(details).decode())
 
-    def details_of(self, record: Record) -> Details:
+    def details_of(self, record: Record) -> JsonObject:
         """Return the details of an episode, with texts as indices; empty ones are left out."""
         index = self._index
         # Of the job only what decides the words, which all policies and seeds share.
@@ -95,8 +93,9 @@ class EpisodeDetails:
         scene = _PlayedScene(None, {}, {})
         if record.environment_version == ENVIRONMENT_VERSION:
             scene = _played_scene(job.task, job.split, job.episode, job.arm)
-        cause, audit = record.attribution, record.prompt
-        found: Details = {
+        cause = record.attribution
+        audit = record.prompt
+        found: JsonObject = {
             "turns": [[index(turn.stage), index(turn.text)] for turn in record.instruction],
             "reached": audit.reached if audit and record.prompt_verdict == "cut" else None,
             "prompt": self._optional(_prompt(record)),
@@ -244,7 +243,8 @@ def _named(record: Record) -> str | None:
 
     None if nothing was named, and if no model names anything.
     """
-    goal, cause = record.policy_metadata.get("understood"), record.attribution
+    goal = record.policy_metadata.get("understood")
+    cause = record.attribution
     if isinstance(goal, dict):
         return describe_goal(goal)
     end = record.steps if cause is None or cause.step is None else cause.step

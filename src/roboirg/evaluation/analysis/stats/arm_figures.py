@@ -86,7 +86,7 @@ def arm_figures(frame: Frame) -> tuple[ArmFigure, ...]:
 
 
 def _figure(key: ArmKey, trials: Iterable[Arms], rng: np.random.Generator) -> ArmFigure | None:
-    cells: tuple[dict[str, Cell], dict[str, Cell]] = {}, {}
+    cells: list[dict[str, Cell]] = [{}, {}]
     for arms in trials:
         for side, results in zip(cells, key.contrast.sides(arms) or (), strict=False):
             for one in results:
@@ -117,7 +117,8 @@ def _against(other: str) -> Callable[[Arms], Sides | None]:
 
 
 def _language_use(arms: Arms) -> Sides | None:
-    told, other = arms.get(TOLD), arms.get(OTHER_GOAL)
+    told = arms.get(TOLD)
+    other = arms.get(OTHER_GOAL)
     if told is None or other is None or told.goals is None or other.goals is None:
         return None
     own_twice = _won(told) and other.goals.original == "success"

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
-from roboirg.evaluation.analysis.results.frame import MISSING, Frame
-from roboirg.evaluation.analysis.results.policy_run import PolicyRun
-from roboirg.evaluation.analysis.stats.cells import Key
-from roboirg.evaluation.analysis.stats.rates import whole_percent
+from roboirg.evaluation.analysis.results.frame import MISSING, Frame, RunNames
+from roboirg.evaluation.analysis.stats.cells import Key, rows_of
+from roboirg.evaluation.analysis.stats.rates import percent_range
 
 HeardCounts = Counter[str]
 """Numbers of ``episodes`` that were played, those that ended in an error, too; and of them by what
@@ -18,20 +17,17 @@ became of the prompt: ``heard`` whole, ``cut``, or perhaps cut (``unknown``)."""
 
 def count_heard(frame: Frame, by: Sequence[str]) -> Mapping[Key, HeardCounts]:
     """Count episodes by some columns; policies that declare no limit are left out."""
-    found: dict[Key, HeardCounts] = {}
+    found: defaultdict[Key, HeardCounts] = defaultdict(Counter)
     declared = set()
-    names = ("run", "prompt", "outcome", *by)
-    for run, prompt, outcome, *key in zip(*(frame[name] for name in names), strict=True):
-        if outcome == MISSING:
-            continue
-        if prompt != "unknown":
-            declared.add(run)
-        counts = found.setdefault((run, *key), Counter())
-        counts.update(("episodes", prompt))
+    for run, *key, prompt, outcome in rows_of(frame, "run", *by, "prompt", "outcome"):
+        if outcome != MISSING:
+            found[run, *key].update(("episodes", prompt))
+            if prompt != "unknown":
+                declared.add(run)
     return {key: counts for key, counts in found.items() if key[0] in declared}
 
 
-def heard_notes(frame: Frame, names: Mapping[PolicyRun, str]) -> list[str]:
+def heard_notes(frame: Frame, names: RunNames) -> list[str]:
     """Return a sentence for each policy of which some prompts were cut, or may have been."""
     counts = count_heard(frame, ())
     found = {run: one for (run,), one in counts.items() if one["cut"] or one["unknown"]}
@@ -48,10 +44,6 @@ def cut_text(tasks: Sequence[HeardCounts]) -> str:
 
     Of several tasks it is the mean of their shares.
     """
-    least = most = Fraction(0)
-    for counts in tasks:
-        cut = Fraction(counts["cut"], counts["episodes"])
-        least += cut
-        most += cut + Fraction(counts["unknown"], counts["episodes"])
-    low, high = whole_percent(least / len(tasks)), whole_percent(most / len(tasks))
-    return low if low == high else f"{low}–{high}"
+    least = sum(Fraction(counts["cut"], counts["episodes"]) for counts in tasks)
+    most = least + sum(Fraction(counts["unknown"], counts["episodes"]) for counts in tasks)
+    return percent_range(Fraction(least, len(tasks)), Fraction(most, len(tasks)))

@@ -32,6 +32,10 @@ Rows = NDArray[np.int64]
 """A row for each episode with k pairs of successes and trials, shape (episodes, 2 k)."""
 
 
+Draws = NDArray[np.float64]
+"""A rate, a gap or several for each resample, shape (draws,) or (draws, k)."""
+
+
 class Interval(NamedTuple):
     """A 95 % confidence interval."""
 
@@ -46,7 +50,8 @@ class Interval(NamedTuple):
 
 def wilson_interval(successes: int, trials: int) -> Interval:
     """Return Wilson's score interval of a proportion, of one trial or more, all independent."""
-    rate, weight = successes / trials, Z_95 * Z_95 / trials
+    rate = successes / trials
+    weight = Z_95 * Z_95 / trials
     center = (rate + weight / 2) / (1 + weight)
     half = Z_95 * math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials)) / (1 + weight)
     # The formula gives exactly 0 and 1 at the ends; floating point may not.
@@ -55,9 +60,7 @@ def wilson_interval(successes: int, trials: int) -> Interval:
     return Interval(low, high)
 
 
-def resampled_rates(
-    tasks: Sequence[Rows], rng: np.random.Generator, draws: int = DRAWS
-) -> NDArray[np.float64]:
+def resampled_rates(tasks: Sequence[Rows], rng: np.random.Generator, draws: int = DRAWS) -> Draws:
     """Return success rates over resampled episodes, as unweighted means over tasks.
 
     Draws equal rows together, as multinomial counts. The distribution is that of drawing single
@@ -81,7 +84,7 @@ def resampled_rates(
     return np.asarray(np.mean(rates, axis=0), dtype=np.float64)
 
 
-def percentile_interval(values: NDArray[np.float64], sizes: Sequence[int]) -> Interval | None:
+def percentile_interval(values: Draws, sizes: Sequence[int]) -> Interval | None:
     """Return the middle 95 % of resampled values; None with too few episodes.
 
     Args:
@@ -99,9 +102,7 @@ def percentile_interval(values: NDArray[np.float64], sizes: Sequence[int]) -> In
     )
 
 
-def resampled_interval(
-    values: NDArray[np.float64], sizes: Sequence[int], least: float = 0.0
-) -> Interval | None:
+def resampled_interval(values: Draws, sizes: Sequence[int], least: float = 0.0) -> Interval | None:
     """Return `percentile_interval`, or `without_spread` if all resamples have the same value.
 
     None with too few episodes: also if so many resamples have no trial that an end is not bounded,

@@ -17,6 +17,7 @@ from roboirg.evaluation.analysis.results.option_labels import reference_of
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import (
     NOTHING,
+    TRIAL,
     ByTask,
     Cell,
     Cells,
@@ -30,7 +31,6 @@ from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
 
 ALL_TASKS = "all tasks"
-TRIAL_OF = ("task", "episode", "policy_seed", "outcome")
 KEPT_APART = (
     *("policy", "form", "arm", "delivery", "split", "wordings", "max_steps", "meshes"),
     *("observe_every", "demonstration_frames", "language_version", "environment_version"),
@@ -110,14 +110,18 @@ def measure(
 
     Raises:
         UnknownNameError: the frame has no such column, or a column no such value.
-        InvalidValueError: a column is not in `by`, a group has several policies, words or
-            conditions, or rows of a group are about the same trial.
+        InvalidValueError: a column is not in `by` or stands twice, a row has no task, episode or
+            policy seed, an outcome is none, a group has several policies, words or conditions, or
+            rows of a group are about the same trial.
     """
     changed = against or {}
     _check(frame, by, changed, family, pool)
     apart = [name for name in KEPT_APART if name in frame and name not in (*by, *pool)]
-    names = (*by, *apart, *pool, *TRIAL_OF)
+    names = (*by, *apart, *pool, *TRIAL)
     rows = {name: [_known(value) for value in frame[name]] for name in names}
+    for name in TRIAL:
+        if None in rows[name]:
+            raise InvalidValueError(f"The column {name!r} has no value in some row; fill it in.")
     _check_apart(rows, by, apart)
     # What is pooled distinguishes trials of an episode, as the policy seed does.
     rows["policy_seed"] = list(zip(*(rows[name] for name in ("policy_seed", *pool)), strict=True))
@@ -165,8 +169,12 @@ def _check(
     family: Sequence[str],
     pool: Sequence[str],
 ) -> None:
-    columns = (*by, *family, *against, *pool, *TRIAL_OF)
-    check_names("column", columns, map(str, frame))
+    columns = (*by, *family, *against, *pool, *TRIAL)
+    known_columns = list(map(str, frame))
+    check_names("column", columns, known_columns)
+    for name in known_columns:
+        if known_columns.count(name) > 1:
+            raise InvalidValueError(f"The frame has several columns {name!r}; keep one.")
     for name in (*family, *against):
         if name not in by:
             raise InvalidValueError(f"The column {name!r} is not in by: {', '.join(by)}.")
@@ -244,19 +252,23 @@ class ScopeKey(NamedTuple):
     options: InstructionOptions
 
 
+ScopeSummary = Measured[ScopeKey]
+"""What was measured in a scope."""
+Summaries = Mapping[ScopeKey, ScopeSummary]
+
+
 def by_scope(cells: Cells) -> Mapping[ScopeKey, ByTask]:
     """Group cells by scope, in their order: tasks, then suites, then all tasks."""
-    levels: tuple[dict[ScopeKey, dict[str, Cell]], ...] = ({}, {}, {})
-    for (policy_run, task, options), cell in cells.items():
-        for level, scope in zip(levels, (task, suite(task), ALL_TASKS), strict=True):
+    found: dict[ScopeKey, dict[str, Cell]] = {}
+    for scope_of in (str, suite, lambda _task: ALL_TASKS):
+        for (policy_run, task, options), cell in cells.items():
+            scope = scope_of(task)
             if scope is not None:
-                level.setdefault(ScopeKey(policy_run, scope, options), {})[task] = cell
-    return {key: own for level in levels for key, own in level.items()}
+                found.setdefault(ScopeKey(policy_run, scope, options), {})[task] = cell
+    return found
 
 
-def summarize(
-    cells: Cells, wanted: Collection[str] | None = None
-) -> Mapping[ScopeKey, Measured[ScopeKey]]:
+def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
     """Measure each policy run and set of options in each scope, or in those that are wanted.
 
     The gap is to explicit, the second gap is the implicit form less the resolved one. P-values are

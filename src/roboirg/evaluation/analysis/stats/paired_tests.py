@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from roboirg.evaluation.analysis.stats.cells import Cell
 from roboirg.evaluation.analysis.stats.intervals import (
     DRAWS,
+    Draws,
     Interval,
     Rows,
     percentile_interval,
@@ -64,26 +66,28 @@ class Pairs:
     @classmethod
     def of(cls, first: Cell, second: Cell) -> Pairs:
         """Pair two cells of the same task."""
-        ours, theirs = first.by_episode(), second.by_episode()
+        ours = first.by_episode()
+        theirs = second.by_episode()
         rows = []
         for episode in sorted(ours.keys() & theirs.keys()):
-            here, there = ours[episode], theirs[episode]
+            here = ours[episode]
+            there = theirs[episode]
             shared = here.keys() & there.keys()
             ours_shared = [won for seed, won in here.items() if seed in shared or not shared]
             theirs_shared = [won for seed, won in there.items() if seed in shared or not shared]
             rows.append(
                 (sum(ours_shared), len(ours_shared), sum(theirs_shared), len(theirs_shared))
             )
-        trials = [
-            (won, second.verdicts[at])
-            for at, won in first.verdicts.items()
-            if at in second.verdicts
-        ]
+        counts = Counter(
+            (won, second.verdicts[trial])
+            for trial, won in first.verdicts.items()
+            if trial in second.verdicts
+        )
         overlap = Overlap(
-            both=trials.count((True, True)),
-            only_first=trials.count((True, False)),
-            only_second=trials.count((False, True)),
-            neither=trials.count((False, False)),
+            both=counts[True, True],
+            only_first=counts[True, False],
+            only_second=counts[False, True],
+            neither=counts[False, False],
         )
         return cls(np.array(rows, dtype=np.int64).reshape(-1, 4), overlap)
 
@@ -140,7 +144,8 @@ def paired_rates(tasks: Sequence[Pairs]) -> PairedRates | None:
     if not sums:
         return None
     counts = np.array(sums, dtype=np.float64)
-    successes, trials = counts[:, 0::2], counts[:, 1::2]
+    successes = counts[:, 0::2]
+    trials = counts[:, 1::2]
     return PairedRates._make(np.mean(successes / trials, axis=0).tolist())
 
 
@@ -154,6 +159,7 @@ def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = D
     rows = [pairs.rows for pairs in paired]
     sizes = [len(each) for each in rows]
     drawn = resampled_rates(rows, rng, draws)
+    counts = zip(*(pairs.overlap for pairs in paired), strict=True)
     return Gap(
         value=first - second,
         interval=resampled_interval(drawn[:, 0] - drawn[:, 1], sizes, least=-1.0),
@@ -163,14 +169,8 @@ def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = D
         tasks=len(paired),
         episodes=sum(sizes),
         trials=int(np.concatenate(rows)[:, 1::2].sum()),
-        overlap=pooled_overlap(paired),
+        overlap=Overlap._make(map(sum, counts)),
     )
-
-
-def pooled_overlap(tasks: Sequence[Pairs]) -> Overlap:
-    """Add the overlaps of several tasks."""
-    counts = zip(*(pairs.overlap for pairs in tasks), strict=True)
-    return Overlap._make(map(sum, counts)) if tasks else Overlap(0, 0, 0, 0)
 
 
 def sign_flip_test(differences: NDArray[np.int64]) -> float:
@@ -196,9 +196,7 @@ def sign_flip_test(differences: NDArray[np.int64]) -> float:
     return min(1.0, float(chances[as_far].sum()))
 
 
-def _retention_interval(
-    drawn: NDArray[np.float64], sizes: Sequence[int], rates: PairedRates
-) -> Interval | None:
+def _retention_interval(drawn: Draws, sizes: Sequence[int], rates: PairedRates) -> Interval | None:
     with np.errstate(divide="ignore", invalid="ignore"):
         values = drawn[:, 0] / drawn[:, 1]
     interval = percentile_interval(values, sizes)

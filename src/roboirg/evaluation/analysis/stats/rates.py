@@ -41,6 +41,11 @@ def whole_percent(rate: float | Fraction) -> str:
     return f"{100 * float(rate):.0f}"
 
 
+def percent_range(low: Fraction, high: Fraction) -> str:
+    """Return two rates as whole percentages, one if they are equal then: ``3–7``."""
+    return "–".join(dict.fromkeys((whole_percent(low), whole_percent(high))))
+
+
 def points(gap: float, decimals: int = 0) -> str:
     """Return a gap in signed percentage points, with a proper minus: ``−12``, ``+3``, ``±0``."""
     text = f"{100 * gap:+.{decimals}f}".replace("-", "−")
@@ -64,7 +69,8 @@ def gap_words(gap: Gap | None, p_value: float | None) -> tuple[str, str, str]:
     """Return a gap in points, its interval, and its corrected p-value; dashes without one."""
     if gap is None:
         return NOT_APPLICABLE, NOT_APPLICABLE, NOT_APPLICABLE
-    ends, p_words = TOO_FEW, NOT_APPLICABLE
+    ends = TOO_FEW
+    p_words = NOT_APPLICABLE
     if gap.interval is not None:
         ends = " to ".join(points(end, 1) for end in gap.interval)
     if p_value is not None:

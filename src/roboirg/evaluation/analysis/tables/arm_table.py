@@ -59,14 +59,14 @@ def make_arm_table(data: RunData) -> Table:
         columns=named_columns(
             "episodes", "first, %", "second, %", "chance", "difference", "95 % interval", "p"
         ),
-        rows=tuple(
+        rows=[
             Row(
                 f"{names[one.key.run]}, {options_label(one.key.options)}",
                 f"{one.key.contrast.name}: {one.key.contrast.first} − {one.key.contrast.second}",
                 _words(one),
             )
             for one in found
-        ),
+        ],
         notes=(_NOTE,),
     )
 
@@ -92,8 +92,8 @@ def language_use_sentences(first: Frame, second: Frame, names: tuple[str, str]) 
 
 
 def _words(one: ArmFigure) -> Sequence[str]:
-    sides = ((one.cells, one.interval), (one.others, one.other_interval))
-    rates = [_rate_text(*side) for side in sides]
+    first = _rate_text(one.cells, one.interval)
+    second = _rate_text(one.others, one.other_interval)
     chance = NOT_APPLICABLE
     if one.key.contrast.name == WORDS_WORTH:
         split = one.key.run.conditions.split
@@ -103,7 +103,7 @@ def _words(one: ArmFigure) -> Sequence[str]:
         ]
         chance = f"{100 * float(np.mean(chances)):.1f}"
     episodes = one.gap.episodes if one.gap else 0
-    return (str(episodes), *rates, chance, *gap_words(one.gap, one.p_holm))
+    return (str(episodes), first, second, chance, *gap_words(one.gap, one.p_holm))
 
 
 def _rate_text(cells: ByTask, interval: Interval | None) -> str:
