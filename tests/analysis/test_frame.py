@@ -14,6 +14,7 @@ from page_text import store
 
 import roboirg
 from roboirg.apps.leaderboard.packing import pack_run
+from roboirg.core.versions import Versions
 from roboirg.evaluation.analysis.results.frame import COLUMNS, make_frame
 from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS, with_columns
 from roboirg.evaluation.analysis.stats.cells import cells_of
@@ -147,7 +148,8 @@ def test_the_same_episode_in_two_runs_stays_apart(result) -> None:
 def test_a_policy_that_has_not_begun_is_there(result) -> None:
     frame = make_frame([], [result(policy="late").identity], named="mine")
     ((key, cell),) = cells_of(frame).items()
-    assert (key.policy_run[0], *key.policy_run[2:4], cell.missing) == ("late", None, "mine", 1)
+    expected = ("late", Versions(), "mine", 1)
+    assert (key.policy_run[0], *key.policy_run[2:4], cell.missing) == expected
 
 
 def test_the_page_lists_the_columns() -> None:

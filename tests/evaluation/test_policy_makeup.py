@@ -22,6 +22,7 @@ from roboirg.evaluation.records.mixing import mixtures
 from roboirg.evaluation.records.record import Record
 from roboirg.evaluation.records.record_codec import StoreError
 from roboirg.evaluation.records.store import RecordStore
+from roboirg.evaluation.run.ray_machines import MachineAgent, MachineVersions
 from roboirg.evaluation.run.runner import check_run
 from roboirg.policies import vlm
 from roboirg.policies.builtin import BUILTIN
@@ -172,6 +173,17 @@ def test_a_checkpoint_with_other_bytes_is_another(tmp_path: Path) -> None:
         file.write_text(content)
         found.add(read_policy(f"lerobot://{tmp_path}").makeup)
     assert len(found) == 2
+
+
+def test_a_machine_with_other_bytes_at_the_path_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "config.json"
+    file.write_text("{}")
+    versions = MachineVersions.expected((read_policy(f"lerobot://{tmp_path}"),))
+    agent = MachineAgent(tmp_path / "agent", None)
+    assert agent.check(versions).fault is None
+    file.write_text('{"n_action_steps": 1}')
+    assert str(agent.check(versions).fault).startswith("the policy of lerobot://")
+    agent.close()
 
 
 OTHER_TEXTS = {

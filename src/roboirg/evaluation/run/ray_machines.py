@@ -77,8 +77,8 @@ class MachineVersions(NamedTuple):
             if mine != theirs:
                 return f"{what} has version {theirs} there and {mine} here"
         for policy, other in zip(self.policies, there.policies, strict=True):
-            if policy.version != UNKNOWN_VERSION:
-                for what, mine, theirs in policy.versions.differences(other.versions):
+            for what, mine, theirs in policy.versions.differences(other.versions):
+                if mine != UNKNOWN_VERSION:
                     return f"the {what} of {policy.spec} is {theirs} there and {mine} here"
         return None
 
