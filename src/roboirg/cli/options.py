@@ -122,7 +122,7 @@ class PlanWords:
         """Return the plan's forms, or the usual ones if it has none."""
         from roboirg.language import FORMS
 
-        return known_names("form", self.fields.get("forms", ",".join(usual)), FORMS)
+        return known_names("form", self.fields.get("forms", usual), FORMS)
 
     def form(self) -> str:
         """Return the plan's only form."""

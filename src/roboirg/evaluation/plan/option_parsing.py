@@ -41,17 +41,17 @@ def parse_names(kind: str, given: object) -> Names:
     Raises:
         InvalidValueError: there is none, or they are in a mapping, whose values would be lost.
     """
-    if isinstance(given, Mapping):
-        raise InvalidValueError(f"{_shorten(str(given))} is not a valid {kind}; write a list.")
-    names = tuple(dict.fromkeys(word for word in _words(given) if word))
+    names = tuple(dict.fromkeys(word for word in _words(kind, given) if word))
     if not names:
         raise InvalidValueError(f"No {kind} was given.")
     return names
 
 
-def _words(given: object) -> list[str]:
+def _words(kind: str, given: object) -> list[str]:
     if given is None:
         return []
+    if isinstance(given, Mapping):
+        raise InvalidValueError(f"{_shorten(str(given))} is not a valid {kind}; write a list.")
     is_one = isinstance(given, str) or not isinstance(given, Iterable)
     parts: Iterable[object] = [given] if is_one else cast("Iterable[object]", given)
     return [word.strip() for one in parts for word in str(one).split(",")]
@@ -103,7 +103,7 @@ def name_and_spec(policy: str) -> tuple[str, str]:
 
 def means_all(given: object) -> bool:
     """Return whether names contain ``all``."""
-    return ALL in (word.lower() for word in _words(given))
+    return ALL in (word.lower() for word in _words("name", given))
 
 
 def parse_splits(text: str) -> tuple[Split, ...]:

@@ -100,10 +100,12 @@ def _tasks(given: object) -> Names:
 def _settings(given: object) -> Names:
     """Return names of settings, or the one word that stands for the same ones."""
     names = parse_names("setting", given)
-    words = tuple(one.lower() if one.lower() in SETTING_GROUPS else one for one in names)
+    words = tuple(name.lower() if name.lower() in SETTING_GROUPS else name for name in names)
     found = {*expand_settings(words)}
-    same = (one for one in words if one in SETTING_GROUPS and {*expand_settings([one])} == found)
-    return next(((one,) for one in same), words)
+    for word in words:
+        if word in SETTING_GROUPS and {*expand_settings([word])} == found:
+            return (word,)
+    return words
 
 
 class ChosenWordings(NamedTuple):
