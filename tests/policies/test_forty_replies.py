@@ -93,6 +93,11 @@ def test_a_rejected_reply_is_quoted_without_its_thoughts():
         assert server.requests[1]["messages"][2]["content"] == "no idea"
 
 
+@pytest.mark.parametrize("tag", ["<think>", "</think>"])
+def test_a_tag_that_ends_a_text_in_json_cuts_no_answer(tag):
+    assert letter_in(f'<think>A</think>{{"answer": "C", "note": "{tag}"}}') == "C"
+
+
 @pytest.mark.parametrize("thoughts", [["</think> B"], [{"a": "<think>"}], []])
 def test_tags_in_thoughts_end_nothing(thoughts):
     assert answer_of(with_thoughts("A", thoughts)) == "A"

@@ -14,19 +14,20 @@ from typing import Any
 import msgspec
 
 _THOUGHTS_END = re.compile(
-    r"(?i)</(?:think|thinking|thought|thoughts|reasoning)>|\[/THINK\]|◁/think▷"
-    r"|<\|channel\|>final<\|message\|>"
+    # Not at the end of a text in JSON.
+    r"""(?i)(?:</(?:think|thinking|thought|thoughts|reasoning)>|\[/THINK\])(?!"\s*[,\]}])"""
+    r"|◁/think▷|<\|channel\|>final<\|message\|>"
 )
 _ANSWER_ENDS = re.compile(
-    r"(?i)<(?:think|thinking|thought|thoughts|reasoning)>|\[THINK\]|◁think▷"
-    r"|<\|channel\|>(?:analysis|commentary)\b"
+    r"""(?i)(?:<(?:think|thinking|thought|thoughts|reasoning)>|\[THINK\])(?!"\s*[,\]}])"""
+    r"|◁think▷|<\|channel\|>(?:analysis|commentary)\b"
     r"|<\|(?:im_end|endoftext|end|return|eot_id)\|>|</s>"
 )
 """Where thoughts begin, or a token at the end of a reply."""
 
 _JSON_BEGINS = re.compile(
     r"""(?mx)
-    \{(?!\s*[^\s{}"'“”:=,/][^{}"'“”:=,/]*[{}])
+    \{(?!\s*[^\s{}"'“”:=,/][^{}"'“”:=,/]*(?:\}|(?<=\w)\{))
     | \[(?=\s*\{)
     | ^[ \t]*\}
     """
@@ -144,7 +145,7 @@ def last_json(text: str) -> Any:  # noqa: ANN401 - JSON
     return found
 
 
-def _distinct_fields(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _distinct_fields(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
     """Return a JSON object from its fields; raise `ValueError` if it has one of them twice."""
     fields = dict(pairs)
     if len(fields) < len(pairs):
