@@ -10,8 +10,6 @@ only the tables, from that file. Tasks that the language does not speak of are l
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -37,6 +35,7 @@ from roboirg.shortcuts.shortcut_tables import (
     tabulate,
 )
 from roboirg.tasks import all_tasks
+from roboirg.util.csv_text import csv_lines
 
 PAGE = Path(__file__).parent.parent / "docs" / "floors.md"
 SCENES = 400
@@ -67,10 +66,8 @@ def measure(
 
 def file_text(rows: Sequence[ShortcutRow]) -> str:
     """Return the rows as a file that `measured_floors` reads."""
-    file = io.StringIO()
     heads = (*FloorKey._fields, "texts", *stored.NAMES, *(f"{one} goals" for one in stored.NAMES))
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow((*heads, "excess", "error"))
+    lines: list[tuple[object, ...]] = [(*heads, "excess", "error")]
     for row in rows:
         shares = dict(row.shares)
         best = max(SURFACE_RULES, key=lambda name: shares[name].slots or 0)
@@ -80,8 +77,8 @@ def file_text(rows: Sequence[ShortcutRow]) -> str:
             *(shares[name].goals for name in stored.NAMES),
             *(row.excess or ()),
         ]
-        writer.writerow((*row.group, row.count, *(f"{number:.4f}" for number in numbers)))
-    return file.getvalue()
+        lines.append((*row.group, row.count, *(f"{number:.4f}" for number in numbers)))
+    return csv_lines(lines)
 
 
 def tables(floors: Floors) -> str:
@@ -105,7 +102,11 @@ def _by_setting(floors: Floors) -> str:
         cells = (f"{_percent(one, name)} ({_percent(test, name)})" for name in stored.NAMES)
         excess = excess_text(one.excess, len(keys))
         lines.append(f"| `{key.setting}` | {one.count:,} | {' | '.join(cells)} | {excess} |")
-    return "\n".join(lines)
+    note = (
+        "Over chance: points above the larger of chance and majority, with 95 % intervals, "
+        f"Bonferroni-adjusted for {counted(len(keys), 'row')}."
+    )
+    return "\n".join([*lines, "", note])
 
 
 def _by_task(floors: Floors) -> str:
@@ -147,7 +148,7 @@ def _claims(floors: Floors) -> str:
     exceed = f"{len(above) or 'none'} {'exceeds' if len(above) < 2 else 'exceed'}"  # noqa: PLR2004
     return (
         f"Words alone are at most {100 * MARGIN:.0f} points above chance in "
-        f"{names or 'no setting'}, over all tasks. After correction for the "
+        f"{names or 'no setting'}, over all tasks. After Bonferroni adjustment for the "
         f"{counted(len(tested), 'slot')} of their tasks, on random scenes and on the test split, "
         f"{exceed} this threshold{listed}."
     )

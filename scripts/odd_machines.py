@@ -220,7 +220,7 @@ def play(machine: Machine, asked: int, place: Path) -> tuple[str, list[str]]:
     (place / "still.py").write_text(POLICY, encoding="utf-8")
     package = ROOT / "src" / "roboirg"
     variables = {"PLACE": place, "PYTHON": sys.executable, "BASE": sys.base_prefix, "CLOCK": CLOCK}
-    variables |= {"MODELS": find_model_files().root, "PACKAGE": package, "RUN": RUN}
+    variables |= {"MODELS": find_model_files(), "PACKAGE": package, "RUN": RUN}
     variables |= {"SITE": Path(sapien.__file__).parents[1], "ASKED": asked, "SERVED": asked + 1}
     script = (
         f'set -e\nas() {{ {machine.user} {machine.variables} "$@"; }}\n{machine.prepare}\n'

@@ -16,6 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
+from roboirg.evaluation.analysis.stats.intervals import without_spread
+
 DRAWS = 10_000
 LOWEST, HIGHEST = 1, 5
 LANGUAGE = "4"
@@ -51,7 +53,14 @@ def read_ratings(path: Path, known: Mapping[str, object]) -> dict[str, float]:
 
 
 def interval(means: Sequence[float]) -> tuple[float, float]:
-    """Return the 95 % interval of a mean by a bootstrap over frames."""
+    """Return the 95 % interval of a mean by a bootstrap over frames.
+
+    If all frames have the same mean, as many others may have any as for shares of 0 or 1.
+    """
+    mean, scale = float(np.mean(means)), HIGHEST - LOWEST
+    if np.ptp(means) == 0:
+        low, high = without_spread((mean - LOWEST) / scale, len(means))
+        return LOWEST + scale * low, LOWEST + scale * high
     rng = np.random.default_rng(0)
     drawn = rng.choice(np.asarray(means), size=(DRAWS, len(means))).mean(axis=1)
     low, high = np.percentile(drawn, (2.5, 97.5))

@@ -1,5 +1,6 @@
 """Actions are checked once, with one sentence for each fault."""
 
+from decimal import Decimal
 from unittest.mock import MagicMock
 
 import numpy as np
@@ -69,6 +70,44 @@ def test_values_that_are_not_finite_are_named(bad, column):
 def test_what_is_not_an_array_of_numbers_is_refused(bad, got):
     with pytest.raises(InvalidActionError, match=f"got {got}"):
         check_chunk(bad)
+
+
+def masked(place):
+    array = np.ma.array(np.zeros((3, 8)))
+    array[place] = np.ma.masked
+    return array
+
+
+@pytest.mark.parametrize(
+    ("bad", "got"),
+    [
+        (np.zeros((2, 8)) > 0, "got ndarray of dtype bool"),
+        ([[0.0] * 8, [0.0] * 7 + [True]], "Action value 7 of row 1 is True"),
+        ([True] * 8, "Action value 0 is True"),
+        ([np.zeros(8), np.zeros(8) > 0], "Action value 0 of row 1 is False"),
+        (masked((1, 3)), "Action value 3 of row 1 is masked"),
+        (list(masked((1, 3))), "Action value 3 of row 1 is masked"),
+        (masked((1, 3))[1], "Action value 3 is masked"),
+        ([0.0] * 7 + [None], "Action value 7 is None"),
+        ([[0.0] * 8, [Decimal("0.5")] + [0.0] * 7], r"Action value 0 of row 1 is Decimal\('0.5'\)"),
+    ],
+)
+def test_flags_masked_values_and_what_is_no_number_are_named(bad, got):
+    with pytest.raises(InvalidActionError, match=got):
+        check_chunk(bad)
+
+
+def test_a_masked_array_without_masked_values_is_an_action():
+    assert np.array_equal(check_chunk(np.ma.array(np.ones((2, 8)))), np.ones((2, 8)))
+
+
+def test_a_tensor_of_flags_is_refused():
+    tensor = MagicMock()
+    cpu = tensor.detach.return_value.cpu.return_value
+    cpu.is_floating_point.return_value = False
+    cpu.numpy.return_value = np.ones((2, 8), bool)
+    with pytest.raises(InvalidActionError, match="of dtype bool"):
+        check_chunk(tensor)
 
 
 @pytest.mark.parametrize("space", ACTION_SPACES.values(), ids=ACTION_SPACES)

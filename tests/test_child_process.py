@@ -21,6 +21,7 @@ import pytest
 from roboirg.core.errors import RoboIRGError
 from roboirg.util.child_process import ChildExit, ChildProcess, serve
 from roboirg.util.parallel_map import parallel_map
+from roboirg.util.process_guard import descendants
 
 
 def answer(connection: Connection) -> None:
@@ -105,6 +106,33 @@ def test_what_a_child_has_started_ends_with_it() -> None:
     child.end()
     assert child.exit == ChildExit(-signal.SIGKILL)
     assert wait_for(lambda: not is_alive(grandchild))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_a_guard_ends_only_when_nothing_is_left_even_of_what_a_look_at_all_processes_misses() -> (
+    None
+):
+    script = (
+        "import subprocess\nfrom roboirg.util import process_guard\n"
+        "child = subprocess.Popen(['sleep', '3600'], stdout=-3, start_new_session=True)\n"
+        "looks = [process_guard.descendants, lambda pid: []]\n"
+        "process_guard.descendants = lambda pid: (looks.pop() if looks[1:] else looks[0])(pid)\n"
+        f"process_guard._end_descendants({2**30})\n"
+        "print(child.pid)\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", script], stdout=subprocess.PIPE, check=True)
+    assert not is_alive(int(ended.stdout))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_processes_are_found_whatever_their_names() -> None:
+    name = r"b'\xff) R 1\n(\xfe'"
+    script = f"import ctypes; ctypes.CDLL(None).prctl(15, {name}); print(flush=True); input()"
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", script], **pipes) as child:  # type: ignore[call-overload]
+        assert child.stdout.readline()
+        assert child.pid in descendants(os.getpid())
+        child.kill()
 
 
 def test_children_do_not_outlive_a_parent_that_is_killed(tmp_path: Path) -> None:

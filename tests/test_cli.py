@@ -86,7 +86,12 @@ def planned(**fields: object) -> tuple[str, ...]:
         ((*RUN, "--settings", "spatail"), "Did you mean 'spatial'?"),
         ((*RUN, "--episodes", "9" * 5000), "…' is not a valid episode; write numbers and ranges"),
         ((*RUN, "--stages", "5-1"), "the possible lists are 1,5;"),
-        ((*RUN, "--out", ""), "folder is empty"),
+        ((*RUN, "--out", ""), "The run's folder is ''; it must be a path"),
+        ((*RUN, "--episodes", "010"), "'010' is not a valid episode"),
+        ((*RUN, "--tasks", ""), "No task was given"),
+        ((*RUN, "--out", "o", "--max-steps", f"{10**22}"), f"max_steps is {10**22}; it must be"),
+        ((*RUN, "--out", "o", "--max-cost", "inf"), "max_cost is 'inf'; it must be finite"),
+        (("report", "x" * 260), "xxx' cannot be used: File name too long."),
         ((*RUN, "--out", "o", "--max-steps", "0"), "max_steps is 0"),
         ((*RUN, "--episodes", "50,"), "no episode 50: split 'test' has episodes 0 to 49."),
         ((*RUN, "--policy", "../../x=random"), "is '../../x' (in '../../x=random')"),
@@ -122,6 +127,25 @@ def test_what_is_wrong_is_one_sentence_and_exit_code_2(
     assert said.err.startswith("roboirg: ")
     assert sentence in said.err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("words", ["tasks", "--help", "tables --published --which main",
+                                   "tables --published --format csv"])  # fmt: skip
+def test_an_output_that_cannot_be_written_is_one_sentence(words: str) -> None:
+    command = [sys.executable, "-m", "roboirg", *words.split()]
+    with Path("/dev/full").open("w") as full:
+        child = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert child.stderr == "roboirg: The output cannot be written: No space left on device.\n"
+    assert child.returncode == 2
+
+
+def test_a_reader_that_leaves_is_no_error() -> None:
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, "-m", "roboirg", "tasks"]
+    child = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(write)
+    assert (child.returncode, child.stderr) == (1, "")
 
 
 def test_help_and_version_are_answered(roboirg) -> None:

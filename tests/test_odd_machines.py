@@ -9,12 +9,12 @@ import pytest
 from roboirg import main as cli
 from roboirg.cli import doctor
 from roboirg.cli.doctor import Check
-from roboirg.core.errors import MissingDependencyError
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.evaluation.play.watchdog import Watchdog
 from roboirg.policies.vlm.models import ModelOptions, make_model
 from roboirg.util.child_process import ChildProcess
 from roboirg.util.proxies import proxy_of
-from roboirg.util.user_folders import user_folder
+from roboirg.util.user_folders import temporary_folder, user_folder
 
 PROXIES = {
     "http_proxy": "http://user:secret@proxy:9",
@@ -73,6 +73,17 @@ def test_without_a_home_folders_are_temporary(monkeypatch, tmp_path):
     folder = tmp_path / f"roboirgbench-{os.getuid()}"
     assert user_folder("data", below="servers") == folder / "servers"
     assert folder.stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="only root gives a link to another user")
+def test_a_temporary_folder_that_another_user_made_a_link_is_refused(monkeypatch, tmp_path):
+    (tmp_path / "ours").mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    link = tmp_path / f"roboirgbench-{os.getuid()}"
+    link.symlink_to("ours")
+    os.chown(link, 12345, -1, follow_symlinks=False)
+    with pytest.raises(InvalidValueError, match="belongs to another user"):
+        temporary_folder()
 
 
 def hang(connection, watchdog):

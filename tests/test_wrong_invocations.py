@@ -106,3 +106,25 @@ def test_a_wrong_invocation_is_one_sentence(name, words, home, monkeypatch, caps
     assert told.err.startswith("roboirg: ")
     assert told.err.count("\n") == 1
     assert sorted(home.rglob("*")) == before
+
+
+NO_FOLDERS = "a" * 260, "run/records.jsonl"
+"""A name that is too long for a file, and a file."""
+WRITING = [
+    pytest.param(name, words, id=f"{name}: {folder[:9]}")
+    for folder in NO_FOLDERS
+    for name, words in words_of(folder, "run").items()
+    # One that plays before it writes is enough for both.
+    if "--out" in words and (name, folder) != ("show", NO_FOLDERS[1])
+]
+
+
+@pytest.mark.parametrize(("name", "words"), WRITING)
+def test_a_place_that_cannot_be_written_is_one_sentence(name, words, home, monkeypatch, capsys):
+    monkeypatch.chdir(home)
+    monkeypatch.setattr(sys, "argv", ["roboirg", *name.split(), *words])
+    with pytest.raises(SystemExit) as left:
+        cli.main()
+    told = capsys.readouterr()
+    assert left.value.code == 2, told
+    assert told.err.splitlines()[-1].startswith("roboirg: ")

@@ -52,7 +52,7 @@ def main() -> None:
             _unpack_tree(commit, kit / "trees" / name)
         _download_wheels(kit / "wheels", options.python, options.there.split(","))
         _unpack_loader(kit / "loader")
-        shutil.copytree(find_model_files().root, kit / "models")
+        shutil.copytree(find_model_files(), kit / "models")
         _run(
             *(sys.executable, str(Path(__file__).with_name("measure.py")), "draw"),
             str(kit / "expected.npz"),

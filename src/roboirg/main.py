@@ -6,6 +6,8 @@ Exit codes: 0 success; 2 invalid usage, or episodes ended in errors (one sentenc
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import importlib.metadata
 import importlib.util
 import io
@@ -42,6 +44,8 @@ _WrongUsage: type[Exception] = next(
     if kind.__name__ == "ClickException" and issubclass(kind, Exception)
 )
 _MAX_MESSAGE_LENGTH = 300
+_UNWRITTEN = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+"""Errors of writing, which name no file."""
 COMMANDS = "roboirg.commands"
 """Entry points of other packages: a function is a command, a `typer.Typer` a group of them."""
 
@@ -151,8 +155,11 @@ def main() -> None:
         code = INTERRUPTED
     except Exception as error:
         message = describe_missing(error)
-        if message is None and is_of_others(error) and not sys.flags.dev_mode:
-            message = f"{printable(one_line(error))}; PYTHONDEVMODE=1 shows the traceback."
+        if message is None and not sys.flags.dev_mode:
+            if is_of_others(error):
+                message = f"{printable(one_line(error))}; PYTHONDEVMODE=1 shows the traceback."
+            elif isinstance(error, OSError):
+                message = _describe_refused(error)
         if message is None:
             raise
         typer.echo(f"roboirg: {message}", err=True)
@@ -177,6 +184,17 @@ def _print_usage_error(error: Exception) -> int:
     command = getattr(context, "command_path", "roboirg")
     typer.echo(f"roboirg: {words}; see {command} --help.", err=True)
     return USAGE_ERROR
+
+
+def _describe_refused(error: OSError) -> str | None:
+    """Return one sentence about a file, or the output, that the system refuses; None for others."""
+    if error.filename is not None:
+        return f"{printable(str(error.filename))!r} cannot be used: {error.strerror}."
+    if error.errno not in _UNWRITTEN:
+        return None
+    with contextlib.suppress(OSError):
+        sys.stdout.close()  # Python would try again at its end
+    return f"The output cannot be written: {error.strerror}."
 
 
 def describe_missing(error: Exception) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -163,8 +164,29 @@ def test_options_are_those_of_a_plan(unplayed: None, tmp_path: Path) -> None:
     for wrong, right in {"max_stps": "max_steps", "worker": "workers", "task": "tasks"}.items():
         with pytest.raises(UnknownNameError, match=f"{wrong}.*mean '{right}'"):
             roboirg.evaluate("oracle", **{wrong: 3}, **QUICK)
-    with pytest.raises(InvalidValueError, match="workers is '2'; it must be a whole number"):
-        roboirg.evaluate("oracle", **{**QUICK, "workers": "2"})
+    for workers in ("2", True, 2.0, 10**22):
+        with pytest.raises(InvalidValueError, match=f"workers is {workers!r}; it must be a whole"):
+            roboirg.evaluate("oracle", **{**QUICK, "workers": workers})
+
+
+@pytest.mark.parametrize("name", [5, b"runs", True])
+def test_what_is_no_path_is_no_folder(unplayed: None, name: Any) -> None:
+    with pytest.raises(InvalidValueError, match=f"The run's folder is {name}; it must be a path"):
+        roboirg.evaluate("oracle", out=name, **QUICK)
+    with pytest.raises(InvalidValueError, match=f"The run's folder is {name}; it must be a path"):
+        Results(name)
+
+
+@pytest.mark.parametrize("name", ["", " ", "runs/\0"])
+def test_a_folder_that_is_none_is_refused_and_nothing_is_written(
+    unplayed: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InvalidValueError, match=r"The run's folder is '.*'; it must be a path"):
+        roboirg.evaluate("oracle", out=name, **QUICK)
+    with pytest.raises(InvalidValueError, match=r"The run's folder is '.*'; it must be a path"):
+        roboirg.results(name)
+    assert not list(tmp_path.iterdir())
 
 
 def test_without_pandas_the_rest_works(
@@ -174,7 +196,8 @@ def test_without_pandas_the_rest_works(
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(MissingDependencyError, match="needs pandas"):
         _ = results.frame
-    assert Results(tmp_path).rates()["oracle", "explicit"] == 1.0
+    assert Results(str(tmp_path)).rates()["oracle", "explicit"] == 1.0
+    assert Results(str(tmp_path)) == Results(tmp_path)
 
 
 @pytest.mark.sim

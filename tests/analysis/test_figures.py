@@ -96,6 +96,14 @@ def test_all_figures_that_apply_are_written_and_are_the_same_again(tmp_path: Pat
         assert first.read_bytes() == second.read_bytes(), first.name
 
 
+def test_figures_are_not_written_through_links(tmp_path: Path) -> None:
+    (tmp_path / "victim").write_text("mine")
+    (tmp_path / "gaps.png").symlink_to(tmp_path / "victim")
+    write_figures(content(), tmp_path, ["gaps"])
+    assert (tmp_path / "victim").read_text() == "mine"
+    assert not (tmp_path / "gaps.png").is_symlink()
+
+
 LIMITS = "Played on the test split, in our own words, with at most 1300 steps."
 
 

@@ -14,6 +14,7 @@ from page_text import store
 
 import roboirg
 from roboirg.apps.leaderboard.packing import pack_run
+from roboirg.core.versions import Versions
 from roboirg.evaluation.analysis.results.frame import COLUMNS, make_frame
 from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS, with_columns
 from roboirg.evaluation.analysis.stats.cells import cells_of
@@ -92,7 +93,7 @@ def test_rows_are_sorted_by_task_then_episode_then_seed(result) -> None:
 def test_what_is_missing_belongs_to_the_version_that_played_first(result) -> None:
     two = [result("success", at, policy_version=name) for at, name in enumerate("ba")]
     cells = cells_of(make_frame([("run", two)], [result("success", 2).identity]))
-    assert {key.policy_run.versions.policy: one.missing for key, one in cells.items()} == {
+    assert {key.policy_run.versions.policy_version: one.missing for key, one in cells.items()} == {
         "a": 0, "b": 1,
     }  # fmt: skip
 
@@ -147,7 +148,8 @@ def test_the_same_episode_in_two_runs_stays_apart(result) -> None:
 def test_a_policy_that_has_not_begun_is_there(result) -> None:
     frame = make_frame([], [result(policy="late").identity], named="mine")
     ((key, cell),) = cells_of(frame).items()
-    assert (key.policy_run[0], *key.policy_run[2:4], cell.missing) == ("late", None, "mine", 1)
+    expected = ("late", Versions(), "mine", 1)
+    assert (key.policy_run[0], *key.policy_run[2:4], cell.missing) == expected
 
 
 def test_the_page_lists_the_columns() -> None:

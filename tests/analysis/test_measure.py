@@ -92,12 +92,26 @@ def test_measure_is_what_pandas_gives(played: pd.DataFrame, data: st.DataObject)
 
 
 def test_rows_of_several_settings_are_pooled_in_any_order(played: pd.DataFrame) -> None:
-    """By policy alone an episode has a row for each setting and form; none gets lost."""
+    """By policy alone an episode has a row for each setting; none gets lost."""
     rates = played.groupby(["policy", "task"])["success"].mean().groupby("policy").mean()
     for frame in (played, played[::-1]):
-        for one in roboirg.measure(frame, ["policy"]):
+        for one in roboirg.measure(frame, ["policy"], pool=["instruction_options"]):
             assert float(one.rate or 0) == pytest.approx(rates[one.key[0]])
             assert one.counts.trials == (played["policy"] == one.key[0]).sum()
+
+
+def test_a_rate_is_over_both_forms_only_if_the_call_names_them(played: pd.DataFrame) -> None:
+    """Implicit ones are won, resolved ones lost: 50 % is no success of either."""
+    resolved = played.assign(form="resolved", outcome="failure", instruction_options="resolved")
+    frame = pd.concat([played, resolved])
+    with pytest.raises(
+        InvalidValueError, match=r"values of form \(implicit, resolved\): add 'form'"
+    ):
+        roboirg.measure(frame, ["policy", "setting"])
+    by_form = roboirg.measure(frame, ["policy", "setting", "form"])
+    assert {(one.key[-1], one.rate) for one in by_form} == {("implicit", 1), ("resolved", 0)}
+    both = roboirg.measure(frame, ["policy", "setting"], pool=["form", "instruction_options"])
+    assert {(one.rate, one.counts.trials) for one in both} == {(Fraction(1, 2), 24)}
 
 
 @pytest.mark.parametrize(
@@ -107,12 +121,36 @@ def test_rows_of_several_settings_are_pooled_in_any_order(played: pd.DataFrame) 
         ({"by": ["policy"], "family": ["task"]}, "The column 'task' is not in by: policy."),
         ({"by": ["policy"], "against": {"setting": "direct"}}, "'setting' is not in by"),
         ({"by": ["setting"], "against": {"setting": "drect"}}, "no row with the setting 'drect'"),
-        ({"by": ["setting"]}, "Several rows of a group are about"),
+        (
+            {"by": ["setting"]},
+            r"over several values of policy \(forgetful, listener\): add 'policy' to by",
+        ),
+        ({"by": ["policy", "setting"]}, "Several rows of a group are about"),
     ],
 )
 def test_a_wrong_question_is_one_sentence(played: pd.DataFrame, asked, words) -> None:
     with pytest.raises(InvalidValueError, match=words):
-        roboirg.measure(pd.concat([played, played.assign(policy="copy")]), **asked)
+        roboirg.measure(pd.concat([played, played]), **asked)
+
+
+@pytest.mark.parametrize("outcome", ["Success", "success ", True, 1, None])
+def test_an_outcome_that_is_none_is_no_failure(played: pd.DataFrame, outcome: object) -> None:
+    frame = played.astype({"outcome": object})
+    frame.loc[0, "outcome"] = outcome
+    with pytest.raises(InvalidValueError, match=f"'outcome' has (no value|{outcome!r};)"):
+        roboirg.measure(frame, ["policy", "setting"])
+
+
+@pytest.mark.parametrize("name", ["task", "episode", "policy_seed"])
+def test_a_row_of_no_trial_is_refused(played: pd.DataFrame, name: str) -> None:
+    with pytest.raises(InvalidValueError, match=f"{name!r} has no value in some row"):
+        roboirg.measure(played.assign(**{name: pd.NA}), ["policy", "setting"])
+
+
+def test_a_column_that_stands_twice_is_refused(played: pd.DataFrame) -> None:
+    frame = pd.concat([played, played[["task"]]], axis=1)
+    with pytest.raises(InvalidValueError, match="several columns 'task'"):
+        roboirg.measure(frame, ["policy", "setting"])
 
 
 def test_averages_are_unweighted_and_suites_stand_by_themselves(result) -> None:

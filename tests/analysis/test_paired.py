@@ -93,6 +93,19 @@ def test_nothing_is_retained_of_nothing() -> None:
     assert (barely.retention, *barely.retention_interval) == (1.0, 0.0, math.inf)
 
 
+def test_resamples_that_are_all_alike_leave_room_for_others() -> None:
+    """Rates differ from resample to resample; their ratio does not, nor their difference."""
+    same = gap_of(cell(*"10" * 20), cell(*"10" * 20))
+    low, high = same.retention_interval
+    assert low < 0.9
+    assert high > 1.1
+    tasks = [("0", "1"), ("110", "110"), ("1010010", "1010010")]
+    pairs = [Pairs.of(cell(*first), cell(*second)) for first, second in tasks]
+    lost = measure_gap(pairs, np.random.default_rng(0))
+    low, high = lost.interval
+    assert low < -0.5 < lost.value < 0 < high, "but for rounding all are −33.3 points"
+
+
 def test_episodes_that_are_all_alike_leave_room_for_others() -> None:
     same = gap_of(cell(*"1" * 50), cell(*"1" * 50))
     assert same.interval == pytest.approx((-0.07135, 0.07135), abs=1e-5)

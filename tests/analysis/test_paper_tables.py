@@ -127,6 +127,22 @@ def test_results_in_another_language_stand_next_to_its_own_explicit_and_floors(r
     assert table_of("main", four, floors=(CHANCE,)).rows[1].name == CHANCE
 
 
+def test_each_split_has_floors_of_its_own(result) -> None:
+    """A mean over both would be no chance of either."""
+    runs = [
+        [result(split=split, task="BinFill", setting="direct", episode=at) for at in range(9)]
+        for split in ("test", "val")
+    ]
+    names = [f"{CHANCE}, split {split}" for split in ("test", "val")]
+    alone = [table_of("main", run, floors=(CHANCE,)) for run in runs]
+    both = table_of("main", *runs, floors=(CHANCE,))
+    first, second = (entries(table, "direct", CHANCE, "chance") for table in alone)
+    assert first["BinFill"].percent != second["BinFill"].percent
+    for level, name in zip((first, second), names, strict=True):
+        found = entries(both, "direct", name, "chance")
+        assert found["BinFill"].percent == level["BinFill"].percent
+
+
 def test_only_informative_tables_are_wanted(result) -> None:
     def wanted(*results: list) -> set[str]:
         return {one for one in WHICH if is_informative(one, RunData(frame_of(*results)))}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 from pathlib import Path
 
@@ -45,6 +46,18 @@ def test_tables_are_written(run: Path, tmp_path: Path) -> None:
     call("tables", "--format", "latex", "--out", out, "--published", "--which", "context")
     assert "29.11" in (out / "context.tex").read_text()
     assert "coverage,ours" in call("tables", "--which", "coverage", "--format", "csv")
+
+
+def test_several_tables_are_one_document_for_programs(run: Path) -> None:
+    """Pandas reads all rows of both tables and every number of them."""
+    pandas = pytest.importorskip("pandas")
+    words = ("tables", run, "--by", "difficulty,slots", "--format")
+    rows = pandas.read_json(io.StringIO(call(*words, "json")))
+    lines = pandas.read_csv(io.StringIO(call(*words, "csv")), na_values="–")
+    assert set(rows["table"]) == set(lines["table"]) == {"by_difficulty", "by_slots"}
+    gaps = lines[lines["column"] == "gap"]["word"].dropna().astype(float)
+    assert gaps.min() == -100.0
+    assert len(rows) == len(lines) / 5, "of each row five columns"
 
 
 def test_a_pack_is_read_like_the_folder_it_was_made_of(
@@ -142,7 +155,7 @@ def test_mixed_render_devices_are_named(run: Path, tmp_path: Path) -> None:
         ("tables RUN --out FILE", "Cannot write"),
         ("figures --out EMPTY", "Figures need a run"),
         ("figures RUN --out EMPTY --which gap", "Did you mean 'gaps'"),
-        ("figures RUN --out FILE --which gaps", "Cannot write to"),
+        ("figures RUN --out FILE --which gaps", "Cannot write "),
         ("figures RUN:listener --out EMPTY --which failures", "nothing to draw for failures"),
         ("figures --published --out EMPTY --which failures", "The paper's tables have nothing to"),
         ("compare RUN nowhere", "There is no run at nowhere;"),

@@ -78,7 +78,7 @@ def test_sub_environments_that_take_chunks_equal_single_ones():
 
 
 def test_a_chunk_of_another_shape_is_refused_before_anything_moves():
-    with pytest.raises(InvalidValueError, match="length is 0; it must be an integer >= 1"):
+    with pytest.raises(InvalidValueError, match="length is 0; it must be a whole number from 1"):
         ActionChunks(roboirg.make("PickXtimes", cameras=()), 0)
     env = ActionChunks(roboirg.make("PickXtimes", cameras=(), actions="ee_pose"), 3)
     assert env.action_space.shape == (3, 7)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
+import fcntl
 import gc
 import os
 import signal
@@ -301,6 +303,32 @@ class GuardStopper(Forker):
         actions = super().act(observation)
         os.kill(os.getppid(), signal.SIGSTOP)
         return actions
+
+
+class Chain(Hostile):
+    """Leaves a process that starts the next one and exits, again and again; they hold a lock."""
+
+    def act(self, observation: Any) -> Any:
+        lock = Path(os.environ["HOSTILE_NOTES"], "lock").open("w")  # noqa: SIM115 - theirs
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if os.fork() == 0:
+            signal.signal(signal.SIGTERM, signal.SIG_IGN)
+            while True:
+                os.setsid()
+                if os.fork():
+                    os._exit(0)
+        return super().act(observation)
+
+
+class OutOfMemory(Forker):
+    """Is killed as the kernel kills for memory, and leaves a process whose name is no text."""
+
+    def act(self, observation: Any) -> Any:
+        ctypes.CDLL(None).prctl(
+            15, b"\xff) R 1\n(\xfe"
+        )  # the name of this process and its children
+        super().act(observation)
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
 class Aborter(Forker):

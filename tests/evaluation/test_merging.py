@@ -107,10 +107,14 @@ def test_logs_are_copied_with_the_records_that_are_kept(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("field", "value", "words"),
     [
-        ("language_version", "0.9", "language version is '0.9' in the first"),
+        ("language_version", "0.9", "language version of language 3 is 0.9 in the first"),
         ("environment_version", 7, "environment version is 7 in the first"),
-        ("policy_version", "old", "version of policy random is 'old' in the first"),
-        ("server_version", "8", "version of the server of random is '8' in the first and None"),
+        ("policy_version", "old", "policy version of random is old in the first"),
+        (
+            "server_version",
+            "8",
+            "server version of random is 8 in the first and none in the second",
+        ),
         ("seed", 5, "seed of PickXtimes test 0 is 5 in the first"),
     ],
 )

@@ -1,8 +1,20 @@
 from __future__ import annotations
 
+import io
+import math
+import tempfile
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
+import msgspec
+import numpy as np
+import pandas as pd
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from made_records import make_record
 
 from roboirg.apps.demonstrations.export_plan import ExportPlan
 from roboirg.core.errors import InvalidValueError, UnknownNameError
@@ -14,11 +26,16 @@ from roboirg.evaluation.plan.option_parsing import (
 )
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan, word_options
+from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
 from roboirg.evaluation.records.record import Job
-from roboirg.evaluation.records.record_codec import identity_key
+from roboirg.evaluation.records.record_codec import StoreError, identity_key
+from roboirg.evaluation.records.run_files import PLAN_FILE
+from roboirg.evaluation.records.store import RecordStore, read_records
 from roboirg.language import expressible, plain_settings
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.csv_text import csv_lines
 
 
 def test_a_number_is_the_first_episodes_and_a_list_is_a_list() -> None:
@@ -32,8 +49,8 @@ def test_a_number_is_the_first_episodes_and_a_list_is_a_list() -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        "0", "-3", "a", "3-1", "5-0", "1.5", "", ",", "1,,b", "300000000", "0-999999999",
-        "9" * 5000, "0," + "9" * 5000, "a" * 5000,
+        "0", "-3", "010", "0,010", "a", "3-1", "5-0", "1.5", "", ",", "1,,b", "300000000",
+        "0-999999999", "9" * 5000, "0," + "9" * 5000, "a" * 5000,
     ],
 )  # fmt: skip
 def test_what_is_no_list_is_one_sentence(text: str) -> None:
@@ -226,13 +243,87 @@ def test_jobs_are_ordered_and_named_uniquely() -> None:
         ({"frame": "world"}, r"no frame 'world'"),
         ({"settings": "explicit", "delivery": "turn"}, r"no delivery 'turn'.*'turns'"),
         ({"settings": "direct-rivals"}, r"no setting 'direct-rivals'.*'direct-rival'"),
-        ({"max_steps": 0}, r"max_steps is 0; it must be a whole number of at least 1"),
+        ({"max_steps": 0}, r"max_steps is 0; it must be a whole number from 1 to 1,000,000,000"),
+        ({"max_steps": 10**22}, r"max_steps is 10{22}; it must be a whole number from 1"),
+        ({"observe_every": 10**22}, r"observe_every is 10{22}"),
+        ({"demonstration_frames": 10**22}, r"demonstration_frames is 10{22}"),
+        ({"tries": 10**22}, r"tries is 10{22}; it must be at most 1000000000"),
+        ({"policy_seeds": 10**22}, r"'10{22}' is not a valid policy seed"),
+        ({"max_cost": math.inf}, r"max_cost is inf; it must be a finite number"),
+        ({"cluster": {"memory_gb": 1e300}}, r"memory_gb is 1e\+300; it must be at most 1000000000"),
+        ({"max_steps": True}, r"max_steps is 'True'; it must be a whole number"),
+        ({"environment": {"max_steps": np.True_}}, r"max_steps is 'True'"),
+        ({"policy_timeout_s": True}, r"policy_timeout_s is 'True'; it must be a number"),
+        ({"video": False}, r"video is 'False'; it must be 'off'"),
+        ({"tasks": None}, r"No task was given"),
+        ({"tasks": ""}, r"No task was given"),
+        ({"forms": []}, r"No form was given"),
+        ({"episodes": []}, r"No episode was given"),
+        ({"episodes": [True]}, r"'True' is not a valid episode"),
+        ({"episodes": 2.0}, r"'2.0' is not a valid episode"),
+        ({"devices": ""}, r"No device was given"),
         ({"max_steps": "many"}, r"max_steps is 'many'"),
+        ({"max_steps": "1_0"}, r"max_steps is '1_0'; write the number without underscores"),
+        ({"max_cost": "1_0.5"}, r"max_cost is '1_0.5'; write the number without underscores"),
+        ({"max_steps": 9, "environment": {"max_steps": 8}},
+         r"max_steps is 9, but stands in environment, too"),
     ],
-)
-def test_what_cannot_be_played_is_told_up_front(options: dict[str, str], sentence: str) -> None:
+)  # fmt: skip
+def test_what_cannot_be_played_is_told_up_front(options: dict[str, Any], sentence: str) -> None:
     with pytest.raises(InvalidValueError, match=sentence):
         make_plan(["random"], **options)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["tasks", "settings", "in_turns", "forms", "episodes", "policy_seeds", "arms", "stages",
+     "devices", "policy_env", "retry_on"],
+)  # fmt: skip
+@pytest.mark.parametrize("given", [{"1-5": 3}, {1: 3}, {}], ids=str)
+def test_a_mapping_is_no_list(name: str, given: dict[Any, int]) -> None:
+    """Its keys would be taken, and its values lost."""
+    with pytest.raises(InvalidValueError, match=r"\{.*\} is not a valid .*; write a list"):
+        make_plan(["random"], **{name: given})
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    options = {"tasks": "PickXtimes", "settings": "explicit"}
+    plan = make_plan("random", episodes=np.int64(2), max_steps=np.int32(60), **options)
+    assert (plan.episodes, plan.environment.max_steps) == ((0, 1), 60)
+    assert make_plan("random", episodes=np.arange(1, 3), **options).episodes == (1, 2)
+
+
+NUMBERS = st.integers(-(10**25), 10**25) | st.integers(-2, 200) | st.floats() | st.booleans()
+
+
+@given(
+    st.dictionaries(
+        st.sampled_from([
+            "max_steps", "observe_every", "demonstration_frames", "policy_seeds", "tries", "batch",
+            "policy_timeout_s", "episode_timeout_s", "max_cost", "devices", "distractors",
+        ]),
+        NUMBERS | NUMBERS.map(str),
+        min_size=1,
+        max_size=3,
+    )
+)  # fmt: skip
+@example({"max_steps": 10**9, "policy_seeds": 10**18 - 1, "max_cost": 1e308})
+@settings(deadline=None)
+def test_whatever_numbers_a_plan_takes_are_stored_and_read_again(numbers: dict[str, Any]) -> None:
+    usual = {"tasks": "PickXtimes", "settings": "explicit", "episodes": 1}
+    try:
+        plan = make_plan("random", **usual, **numbers)
+    except InvalidValueError:
+        return
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_plan(plan, folder)
+        assert read_plan(folder) == plan
+        stored = [make_record(job) for job in plan.jobs()]
+        with RecordStore(folder) as store:
+            for record in stored:
+                store.append(record)
+        assert list(read_records(folder)) == stored
 
 
 def test_a_record_has_the_slug_of_its_job() -> None:
@@ -269,6 +360,45 @@ def test_a_policy_may_have_a_name_of_its_own() -> None:
         make_plan(["a=oracle", "a=random"])
     with pytest.raises(UnknownNameError, match="Did you mean 'listener'"):
         make_plan(["mine=listner"])
+
+
+def test_names_follow_one_rule_in_plans_and_records() -> None:
+    for policy in ("-x=oracle", "=cmd|' /C calc'!A0"):
+        with pytest.raises(InvalidValueError, match="name"):
+            make_plan(policy, tasks="PickXtimes", episodes="1")
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["", " ", "NA", "<NA>", "n/a", "#N/A N/A", "null", "nan", "None", "007", "7.0", "1,000", ".5",
+     "1e5", "2.5E-3", "inf", "True", "1.#IND"],
+)  # fmt: skip
+def test_what_tables_would_be_read_back_without_is_no_name(name: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidValueError, match=f"Policy '{name}' has no valid name for records"):
+        make_plan([replace(read_policy("random"), name=name)], tasks="PickXtimes", episodes="1")
+    record = make_record(Plan(policies="random", tasks="PickXtimes", episodes=1).jobs()[0])
+    stranger = msgspec.structs.replace(record, policy=name)
+    with RecordStore(tmp_path) as store, pytest.raises(StoreError, match="a missing value"):
+        store.append(stranger)
+
+
+def test_names_with_a_letter_are_read_back_as_they_are() -> None:
+    names = ("e1", "7b", "na1", "pi0.5", "nan-net", "3d", "1e5x")
+    plan = make_plan([f"{name}=random" for name in names], tasks="PickXtimes", episodes="1")
+    assert tuple(policy.name for policy in plan.policies) == names
+    table = csv_lines([["name"], *([name] for name in names)])
+    assert (*pd.read_csv(io.StringIO(table))["name"],) == names
+
+
+@pytest.mark.parametrize("content", ["{", "words", "[]"])
+def test_a_plan_that_cannot_be_read_is_reported(
+    content: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / PLAN_FILE).write_text(content)
+    assert (read_plan(tmp_path), read_plan(tmp_path / "nowhere")) == (None, None)
+    assert caplog.messages == [
+        f"{tmp_path / PLAN_FILE} is not a readable plan, so its missing episodes are not counted."
+    ]
 
 
 def test_a_name_next_to_all_is_added_and_tasks_may_lack_it() -> None:

@@ -7,6 +7,7 @@ import msgspec
 import pytest
 import yaml
 
+from roboirg.cli import run_commands
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.plan_file import named_plans, read_plan_file
@@ -94,11 +95,14 @@ def test_the_standard_protocol_has_every_setting_and_direct_in_turns() -> None:
         ("stages: [[1, 5], [1, 2, 5]]", {"stages": "1,5;1,2,5"}),
         ("video: off", {"video": "off"}),
         ("max_steps: 20", {"environment": {"max_steps": "20"}}),
-        ("{max_steps: 20, environment: {max_steps: 30, meshes: light}}",
+        ("{max_steps: 20, environment: {meshes: light}}",
          {"max_steps": 20, "meshes": "light"}),
         ("actions: null", {}),
         ("settings: [direct, spatial]", {"settings": "direct,spatial"}),
         ("retry_on: []", {"retry_on": "none"}),
+        ("devices: 0", {"devices": ["0"]}),
+        ("max_cost: 5e-1", {"max_cost": 0.5}),
+        ("cluster: {labels: {spot: yes}}", {"cluster": {"labels": {"spot": "yes"}}}),
     ],
 )  # fmt: skip
 def test_values_are_those_that_would_be_typed(
@@ -117,6 +121,7 @@ def test_values_are_those_that_would_be_typed(
         ("", r"is of type NoneType"),
         ("tasks: [", r"is not valid YAML"),
         ("settings: &same direct\nforms: *same", r"line 2 has an alias"),
+        ("policies: [mine: oracle]", r"has \{'mine': 'oracle'\} as a policy; write NAME=SPEC"),
         ("tasks: all\nsplit: val\ntasks:\n  - real", r"line 3 has the key 'tasks' again"),
     ],
 )
@@ -124,6 +129,60 @@ def test_what_is_no_plan_is_one_sentence(tmp_path: Path, text: str, sentence: st
     with pytest.raises(InvalidValueError, match=sentence) as caught:
         read_plan_file(write(tmp_path, text))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "episodes: 010", "episodes: 0x10", "episodes: 1_000", "policy_timeout_s: 1:30",
+        "max_cost: .inf", "max_cost: 1_0.5", "split: 2026-01-31", "episodes: [0, 010]",
+        "tasks:", "tasks:\n  - ", "max_steps: !!int '010'", "training: {seed:}",
+    ],
+)  # fmt: skip
+def test_what_yaml_takes_for_something_else_than_it_looks_is_refused(
+    tmp_path: Path, text: str
+) -> None:
+    with pytest.raises(InvalidValueError, match=r"line \d ") as caught:
+        read_plan_file(write(tmp_path, text), "training")
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_typed_replaces_the_option_in_a_section_of_the_file(tmp_path: Path) -> None:
+    path = write(tmp_path, "environment: {max_steps: 100, meshes: light}\nepisodes: 1")
+    typed = {"policies": ["random"], "max_steps": "200", "max_cost": "0.5"}
+    plan = run_commands._plan(path, typed, ())
+    options = plan.environment
+    assert (options.max_steps, options.meshes, plan.models.max_cost) == (200, "light", 0.5)
+
+
+def test_a_refused_number_of_a_plan_is_named_with_its_line(tmp_path: Path) -> None:
+    path = write(tmp_path, "tasks: all\nepisodes: 010")
+    with pytest.raises(InvalidValueError) as caught:
+        read_plan_file(path)
+    assert str(caught.value) == (
+        f"The plan {path!r} cannot be read: line 2 has 010; write a plain number such as 10 or "
+        "0.5, or a text in quotes, or leave the key out."
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("max_steps: yes", r"max_steps is 'yes'; it must be a whole number\."),
+        ("max_cost: true", r"max_cost is 'true'; it must be a number\."),
+        ("batch: on", r"batch is 'on'; it must be a whole number\."),
+        ("tasks: null", r"No task was given\."),
+        ("tasks: []", r"No task was given\."),
+        ("forms: []", r"No form was given\."),
+        ("devices: ''", r"No device was given\."),
+        ("retry_on: 0", r"There is no kind of error '0'"),
+        ("max_steps: null", r"max_steps is None; it must be a whole number\."),
+        ("models: null", r"models is None; it must be a dictionary\."),
+    ],
+)
+def test_a_word_or_nothing_is_no_value_of_a_plan(tmp_path: Path, text: str, sentence: str) -> None:
+    with pytest.raises(InvalidValueError, match=sentence):
+        make_plan(["random"], **read_plan_file(write(tmp_path, text)))
 
 
 def test_an_unknown_plan_is_told_with_the_nearest() -> None:

@@ -424,7 +424,7 @@ def test_a_host_goes_on_after_worlds_that_die_or_are_interrupted(
 
     hosts, ref = pool.connect(), read_policy("hosting_fakes:Dice")
     with monkeypatch.context() as without:
-        without.setattr(host_pool, "PolicyChild", lambda _variables: os.open("/nonexistent", 0))
+        without.setattr(host_pool, "PolicyChild", lambda _environment: os.open("/nonexistent", 0))
         with pytest.raises(EpisodeLostError, match="could not be started"):
             HostedPolicy(hosts, ref, 0)
     world = HostedPolicy(hosts, ref, 0)
@@ -495,7 +495,7 @@ def test_a_process_is_no_hanging_one_while_it_starts_or_its_world_draws(
     pool: HostPool,
     host: Callable[[str, str], HostedPolicy],
 ) -> None:
-    starting = PolicyChild({})
+    starting = PolicyChild(os.environ)
     starting.check(0.01)
     assert not starting.is_over
     starting.end()
@@ -532,6 +532,38 @@ class It(hostile_policies.Hostile):
     child_of(pool).check(0.1)
     assert child_of(pool).is_over
     world.close()
+
+
+@pytest.mark.parametrize("answer", ["nothing", "half a message", "to take in half a call"])
+def test_a_call_that_is_never_begun_ends_in_an_error_although_its_process_answers_checks(
+    pool: HostPool, write_policy: Write, monkeypatch: pytest.MonkeyPatch, answer: str
+) -> None:
+    text = """
+def answer_checks(supervisor, line, way):
+    if way == "half a message":
+        line.sendall((64).to_bytes(8, "big"))
+    while True:
+        time.sleep(0.05)
+        supervisor.recv(4096)
+        supervisor.send(b"!")
+        if way == "half a message":
+            line.sendall(b"0")
+        if way == "to take in half a call":
+            line.recv(1)
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        host = hostile_policies.host_of(sys._getframe())
+        line = hostile_policies.line_of(host)
+        host._collect = lambda _seconds: answer_checks(host._supervisor, line, instruction)
+"""
+    world = HostedPolicy(pool.connect(), read_policy(write_policy("silent", text)), 0)
+    world.reset(answer, {})
+    world._line._limit_s = 0.5
+    for name, seconds in (("DRAW_S", 1.0), ("MARGIN_S", 60.0)):
+        monkeypatch.setattr(f"roboirg.evaluation.hosting.policy_child.{name}", seconds)
+    picture: Any = {"front_rgb": np.zeros((2000, 2000, 3), np.uint8)}
+    with pytest.raises(EpisodeError, match=r"did not begin the policy's act.., though"):
+        world.act(picture)
 
 
 def test_messages_in_pieces_take_no_longer_than_a_call_may(

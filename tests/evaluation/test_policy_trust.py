@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import resource
@@ -36,6 +37,7 @@ from roboirg.evaluation.records.store import read_records
 from roboirg.evaluation.run.executor import InProcess, LocalProcesses
 from roboirg.evaluation.run.runner import run_plan
 from roboirg.policies.by_name.finding import read_policy
+from roboirg.tasks.splits.private_splits import SALT_VARIABLE
 from roboirg.util.process_guard import descendants
 
 HONEST = "hosting_fakes:Dice"
@@ -126,6 +128,51 @@ def test_what_is_forged_is_an_error_of_its_own_episode_and_nothing_started_survi
     while any(is_alive(int(path.name)) for path in notes.iterdir()):
         assert time.monotonic() < until
         time.sleep(0.1)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="there are subreapers on Linux")
+@pytest.mark.parametrize("name", ["Chain", "OutOfMemory"])
+def test_what_a_policy_started_ends_with_it_whatever_its_names_and_however_fast_it_forks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setenv("HOSTILE_NOTES", str(tmp_path))
+    with HostPool(HostSettings()) as pool:
+        policy = HostedPolicy(pool.connect(), read_policy(hostile_policies.SPEC(name)), 0)
+        policy.reset("Pick it.", {})
+        if name == "Chain":
+            policy.act({})  # type: ignore[typeddict-item]
+        else:  # the machine's error, not the policy's
+            with pytest.raises(EpisodeError, match="died of signal 9") as killed:
+                policy.act({})  # type: ignore[typeddict-item]
+            assert killed.value.kind == "infrastructure"
+    (note,) = tmp_path.iterdir()
+    if name == "Chain":
+        with note.open() as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    else:
+        assert not is_alive(int(note.name))
+
+
+def test_a_policy_gets_no_secrets_but_those_that_are_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("OPENAI_API_KEY", "HF_TOKEN", "AWS_ACCESS_KEY_ID", "TOKENIZERS_PARALLELISM"):
+        monkeypatch.setenv(name, "secret")
+    monkeypatch.setenv(SALT_VARIABLE, "a very secret salt")
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "reader.py").write_text(
+        "import os, numpy as np\nclass It:\n    cameras = ()\n"
+        "    def reset(self, i, d): self.metadata = dict.fromkeys(os.environ)\n"
+        "    def act(self, o): return np.ones((24, 8))\n"
+    )
+    plan = paper_plan("reader:It", 1, policy_env="HF_TOKEN").checked()
+    run_plan(plan, tmp_path / "run", paper_runner(plan, tmp_path / "run"), InProcess())
+    (record,) = read_records(tmp_path / "run")
+    assert record.error is None
+    assert {"HF_TOKEN", "TOKENIZERS_PARALLELISM"} <= record.policy_metadata.keys()
+    assert {"OPENAI_API_KEY", "AWS_ACCESS_KEY_ID", SALT_VARIABLE}.isdisjoint(record.policy_metadata)
+    with pytest.raises(InvalidValueError, match="NOT_SET_HERE is not set here, so policies cannot"):
+        paper_plan("reader:It", 1, policy_env="NOT_SET_HERE").checked()
 
 
 def test_honest_policies_play_alike_beside_a_cheat_in_a_long_folder_with_few_descriptors(

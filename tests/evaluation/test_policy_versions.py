@@ -97,7 +97,7 @@ def test_another_checkpoint_does_not_get_into_the_folder(
     before = read_records(tmp_path / "run")
     assert {record.policy_version for record in before} == {"7.0"}
     monkeypatch.setenv("CKPT", "8")
-    with pytest.raises(StoreError, match=r"version 7.0, but the policy is now vers"):
+    with pytest.raises(StoreError, match=r"mine whose policy version is 7\.0, but now it is 8\.0"):
         play(tmp_path / "run")
     write(made="self.version = 'b'", reset="raise KeyError('front')")
     with pytest.raises(StoreError, match=r"7.0, but the policy cannot be opened .*KeyError"):

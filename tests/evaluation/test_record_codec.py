@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import msgspec
+import pytest
 from evaluation_fakes import FakePlay, small_plan
 from msgspec.structs import replace
 
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.records.record import Job, Summary
-from roboirg.evaluation.records.record_codec import identity_key, read_summary
+from roboirg.evaluation.records.record_codec import StoreError, identity_key, read_summary
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     RecordStore,
@@ -28,18 +29,42 @@ def write(folder: Path, *lines: bytes) -> Path:
     return folder
 
 
-def test_a_damaged_line_loses_only_its_episode(tmp_path: Path) -> None:
+def test_a_damaged_line_loses_only_its_episode_and_is_reported(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
     lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
     write(tmp_path, *lines[:2], lines[2][:40] + b"\x00\xff\n", *lines[3:])
     with RecordStore(tmp_path) as store:
-        assert (len(store.stored), store.damaged, store.torn) == (7, (3,), b"")
+        assert (len(store.stored), store.torn) == (7, b"")
+    (warning,) = caplog.messages
+    assert warning.startswith(f"{tmp_path / RECORDS_FILE} has 1 damaged line, the first is line 3;")
     summary = run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
     assert summary.played == 1
     records, index = read_records(tmp_path), StoredRun(tmp_path, read_summary)
     assert len(records) == 8
     # Whole records are found behind the damage, too.
     assert tuple(index.records(index.newest)) == records
+
+
+def test_an_unfinished_line_is_reported_to_readers(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
+    lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
+    write(tmp_path, *lines[:-1], lines[-1][:40])
+    run = StoredRun(tmp_path, read_summary)
+    assert len(run.newest) == 7
+    (warning,) = caplog.messages
+    assert warning == (
+        f"{tmp_path / RECORDS_FILE} ends in an unfinished line (a run may be writing it); "
+        "roboirg records merge copies all others."
+    )
+    with pytest.raises(StoreError, match="ends in an unfinished line"):
+        run.file.refuse_damage()
+    run_plan(small_plan(), tmp_path, FakePlay(), InProcess())
+    StoredRun(tmp_path, read_summary).file.refuse_damage()
+    assert caplog.messages == [warning]
 
 
 def test_results_are_records_without_the_course(tmp_path: Path) -> None:

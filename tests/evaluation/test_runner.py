@@ -157,7 +157,7 @@ def test_a_folder_may_get_more_and_fewer_jobs(tmp_path: Path) -> None:
         ("environment_version", 99, "of environment version 99, but this roboirg has version 1;"),
         ("language_version", "99.0", r"language version 99\.0, but this roboirg has version \d"),
         ("task", "Gone", r"Gone test/0 .* no such episode"),
-        ("policy_version", "old", r"version old, but the policy is now version built-in"),
+        ("policy_version", "old", r"random whose policy version is old, but now it is built-in"),
     ],
 )
 def test_worlds_of_two_versions_are_not_mixed(
@@ -263,4 +263,4 @@ def test_machines_of_other_versions_are_named() -> None:
             f"its language {language} has version 2.0.1 there and {version} here"
         )
     other = here._replace(policies=(here.policies[0], dataclasses.replace(random, version="old")))
-    assert str(here.difference(other)).startswith("random has version old there")
+    assert str(here.difference(other)).startswith("the policy version of random is old there")

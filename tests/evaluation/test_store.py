@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import errno
 import functools
+import math
 import os
 import resource
 import subprocess
@@ -18,6 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.records.line_file import LOCK_FILE
 from roboirg.evaluation.records.record import EventRecord, Record
@@ -32,7 +34,7 @@ from roboirg.evaluation.records.store import (
     read_results,
 )
 from roboirg.evaluation.run.executor import InProcess
-from roboirg.evaluation.run.runner import run_plan
+from roboirg.evaluation.run.runner import check_run, run_plan
 from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.server_lock import lock_server
 from roboirg.util.atomic_write import locked, write_atomically
@@ -185,6 +187,21 @@ def test_a_line_that_is_no_record_is_told_with_its_number(
             read(tmp_path)
 
 
+@pytest.mark.parametrize(
+    "fields",
+    [{"steps": 2**63}, {"seed": -(2**63) - 1}, {"duration_s": math.nan},
+     {"usage": {"cost_usd": math.inf}}, {"environment": EnvironmentOptions(max_steps=10**22)}],
+    ids=str,
+)  # fmt: skip
+def test_what_could_not_be_read_again_is_not_written(
+    tmp_path: Path, fields: dict[str, Any]
+) -> None:
+    record = replace(some_records()[0], **fields)
+    with RecordStore(tmp_path) as store, pytest.raises(StoreError, match=r"is not a record"):
+        store.append(record)
+    assert (tmp_path / RECORDS_FILE).read_bytes() == b""
+
+
 def test_the_newest_record_of_a_job_wins(tmp_path: Path) -> None:
     first, *others = some_records()
     newer = replace(first, steps=1234)
@@ -218,3 +235,40 @@ def test_a_full_disk_is_one_sentence_and_costs_no_record(tmp_path: Path) -> None
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     with RecordStore(folder) as store:
         assert (len(store.stored), store.torn) == (3, b"")
+
+
+@pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "models.sqlite", "videos/a.jpg"])
+def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path: Path, name: str) -> None:
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    link = tmp_path / "run" / name
+    link.parent.mkdir(parents=True)
+    link.symlink_to(victim)
+    for begin in (RecordStore, lambda run: check_run(small_plan(), run)):
+        with pytest.raises(RoboIRGError, match=f"{link} is a symbolic link, and a run writes"):
+            begin(tmp_path / "run")
+    assert victim.read_text() == "mine"
+
+
+def test_a_folder_of_videos_on_another_disk_is_refused_at_the_start(tmp_path: Path) -> None:
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "videos").symlink_to(tmp_path / "disk")
+    with pytest.raises(RoboIRGError, match="make the folder of the run itself the link"):
+        run_plan(small_plan(), tmp_path / "run", FakePlay(), InProcess())
+    assert not (tmp_path / "run" / RECORDS_FILE).exists()
+
+
+def test_a_folder_of_a_run_may_be_a_link(tmp_path: Path) -> None:
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "run").symlink_to(tmp_path / "disk")
+    fill(tmp_path / "run", some_records())
+    assert read_records(tmp_path / "disk") == some_records()
+
+
+def test_a_lock_that_is_a_link_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "victim").write_text("mine")
+    (tmp_path / "lock").symlink_to(tmp_path / "victim")
+    refused = pytest.raises(RoboIRGError, match=f"Cannot write {tmp_path / 'lock'}")
+    with refused, locked(tmp_path / "lock", "taken"):
+        pass

@@ -79,6 +79,20 @@ def test_the_page_and_the_table_show_them(tmp_path: Path) -> None:
     assert f"{counts} 2 | 3.25 | 1.12 |" in outcome.output
 
 
+def test_the_table_says_unknown_where_a_service_did_not_report_all_tokens(tmp_path: Path) -> None:
+    known = {"calls": 1.0, "input_tokens": 8.0, "output_tokens": 2.0, "cost_usd": 0.5}
+    partly = {"calls": 1.0, "input_tokens": 4.0}
+    played = (("direct", 0, known), ("contextual", 0, known), ("contextual", 1, partly))
+    with RecordStore(tmp_path) as store:
+        for setting, episode, usage in played:
+            job = replace(JOB, episode=episode, options=InstructionOptions(setting))
+            store.append(make_record(job, "failure", "no", subgoals=SAID, usage=usage))
+    words = ["tables", str(tmp_path), "--which", "subgoals", "--format", "markdown"]
+    outcome = CliRunner().invoke(app, words)
+    assert "| 1 | 8 | 2 | 0.5 |" in outcome.output
+    assert "| 1 | 6 | unknown | unknown |" in outcome.output
+
+
 class Planning:
     """Points into a corner, then says nothing new, then points at the thing."""
 

@@ -15,6 +15,7 @@ import numpy as np
 from cause_making import Course, read_courses
 
 from roboirg.core.failures import FAILURE_KINDS, FAILURES
+from roboirg.evaluation.analysis.stats.intervals import without_spread
 from roboirg.judging import DeclaredIntent, FailureAttribution, attribute_failure
 
 HERE = Path(__file__).parent
@@ -79,6 +80,8 @@ def scores(courses: Sequence[Course]) -> Scores:
     rng = np.random.default_rng(0)
     drawn = [share(rng.choice(causes, len(causes))) for _ in range(1000)]
     low, high = np.percentile(drawn, [2.5, 97.5])
+    if low == high:
+        low, high = without_spread(low, len(causes))
     by_cause = [[a == b for cause, a, b in shown if cause == one] for one in causes]
     return Scores(
         share(causes),

@@ -30,8 +30,8 @@ from roboirg.policies.vlm.model_content import summary_clip
 from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
-from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
 from roboirg.util.media import contact_sheets, sample_evenly
+from roboirg.util.reply_reading import UnparsableReplyError, json_object, text_of
 
 thousandths = st.integers(0, 1000)
 PROMPTS = ("listener", "qwen", "gemini", "memer", "subgoals")
@@ -58,7 +58,7 @@ def test_a_pixel_is_floored_and_stays_in_the_picture(value):
     "text",
     [
         *("", "  \n", "go at <1001, 3>", "go at <3>", "go at <|box_start|>(3)<|box_end|>", "{}"),
-        *("<y, x>", "x" * (MOST_SUBGOAL_LETTERS + 1), "go at (1001,3)"),
+        *("<y, x>", "x" * (MOST_SUBGOAL_LETTERS + 1), "go at (1001,3)", "go \ud800"),
     ],
 )
 def test_broken_subgoals_are_unparsable(text):
@@ -135,7 +135,7 @@ def test_a_sheet_shows_frames_in_reading_order_each_with_its_label():
     assert found == [(shade, shade == 50) for shade in (*shades, 0, 0)]
 
 
-@pytest.mark.parametrize("text", ["", "none", "[1]", "{", "{]}", '{"a": {"b": }'])
+@pytest.mark.parametrize("text", ["", "none", "[1]", "{]}"])
 def test_no_object_is_unparsable(text):
     with pytest.raises(UnparsableReplyError, match="no JSON object"):
         json_object(text)

@@ -334,7 +334,7 @@ def test_memer_shows_recent_frames_and_remembers_what_it_chose():
     assert seen == list(range(3, 65, 3))
 
 
-@pytest.mark.parametrize("positions", [[0], [9], ["1"], [True], "1", None])
+@pytest.mark.parametrize("positions", [[0], [9], ["one"], [1.5], [True], "1", None])
 def test_memer_refuses_positions_that_there_are_not(positions):
     with fake_vlm([json.dumps({"current_subtask": GO, "keyframe_positions": positions})]) as server:
         planner = make_planner("memer", server)

@@ -1,5 +1,6 @@
 """The built-in policies, and policies made from names."""
 
+import math
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
@@ -15,6 +16,8 @@ from roboirg.policies import Policy, PrivilegedPolicy, find_policy, make_policy
 from roboirg.policies.builtin import BUILTIN, scripted
 from roboirg.policies.builtin.listeners import ForgetfulPolicy, ListenerPolicy
 from roboirg.policies.builtin.oracle_policy import PreviousGoalPolicy
+from roboirg.policies.contract.policy_calls import policy_usage
+from roboirg.policies.planners.hierarchical_policy import PlannerParts
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 
@@ -24,6 +27,13 @@ def test_built_in_policies_fulfil_the_contract(name):
     policy = make_policy(name, 3)
     assert isinstance(policy, Policy)
     assert isinstance(policy, PrivilegedPolicy) == (name != "random")
+
+
+def test_costs_that_are_unknown_or_beyond_reason_are_left_out_of_a_record():
+    """Also one that no float can hold; and what is unknown in a part makes the sum unknown."""
+    planner = SimpleNamespace(usage=lambda: {"calls": 1, "input_tokens": math.nan})
+    policy = SimpleNamespace(usage=lambda: {"calls": 1, "input_tokens": 5, "x": 10**400, "y": -1})
+    assert policy_usage(PlannerParts(planner, policy)) == {"calls": 2.0}
 
 
 def test_random_actions_are_valid_and_depend_on_seed_and_instruction_alone():
@@ -142,7 +152,7 @@ def test_wrong_specs_are_explained(spec, error, words):
         ("actions", 7, "no action space 7"),
         ("demonstration_frames", "some", "demonstration_frames is 'some'; it must be 'all', 'no"),
         ("demonstration_frames", 0, "demonstration_frames is 0"),
-        ("observe_every", -1, "observe_every is -1; it must be None or a whole number"),
+        ("observe_every", -1, "observe_every is -1; it must be a whole number from 1"),
         ("observe_every", True, "observe_every is True"),
         ("depth", 1, "depth is 1; it must be True or False"),
         ("calibration", "yes", "calibration is 'yes'; it must be True or False"),

@@ -54,7 +54,8 @@ def test_every_need_is_read_and_survives_a_message():
     [
         ({"cameras": ["back"]}, UnknownNameError, "no camera 'back'"),
         ({"cameras": (), "depth": True}, InvalidValueError, "depth is True, but cameras is"),
-        ({"prompt_tokens": 0}, InvalidValueError, "prompt_tokens is 0; it must be a number from 1"),
+        ({"prompt_tokens": 0}, InvalidValueError, "prompt_tokens is 0; it must be a whole number"),
+        ({"prompt_tokens": 10**22}, InvalidValueError, "prompt_tokens is 10{22}; it must be"),
         ({"prompt_added": None}, InvalidValueError, "prompt_added is None"),
         ({"trained_tasks": "BinFill"}, InvalidValueError, "trained_tasks is 'BinFill'; it must"),
         ({"touch": True}, TypeError, "touch"),

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
+import json
+import math
 import random
 import sqlite3
 import subprocess
@@ -110,6 +113,74 @@ def test_a_run_ends_when_it_has_spent_what_it_may_and_can_go_on_with_more(tmp_pa
         replies, counts = play(server, ReplySettings(tmp_path, 9 * COST), "a", *"0123", **PRICES)
         assert (replies, counts["stored"]) == (list("0123"), 2)
         assert len(server.requests) == 4
+
+
+def without_tokens(words: str) -> Garbage:
+    return Garbage(json.dumps({"choices": [{"message": {"content": words}}]}).encode())
+
+
+def with_tokens(count: int) -> Garbage:
+    message = {"choices": [{"message": {"content": "one"}}], "usage": {"prompt_tokens": count}}
+    return Garbage(json.dumps(message).encode())
+
+
+NO_CHOICES = Garbage(json.dumps({"choices": [], "usage": {"prompt_tokens": 7}}).encode())
+
+
+def test_costs_that_are_unknown_end_a_run_with_a_limit_and_no_reply_is_lost(
+    tmp_path: Path,
+) -> None:
+    limited = ReplySettings(tmp_path, 9 * COST)
+    with fake_vlm([without_tokens("one"), "two"]) as server:
+        with pytest.raises(BudgetError, match=r"what 1 reply cost is unknown, .* of model 'fake'"):
+            play(server, limited, "a", "first", "second", **PRICES)
+        replies, counts = play(server, ReplySettings(tmp_path), "a", "first", "second", **PRICES)
+        assert (replies, counts["stored"]) == (["one", "two"], 1)
+        assert len(server.requests) == 2
+    assert math.isnan(counts["input_tokens"])
+    assert math.isnan(counts["cost_usd"])
+
+
+@pytest.mark.parametrize("reply", [with_tokens(10**9), with_tokens(-(10**5)), NO_CHOICES])
+def test_a_run_with_a_limit_asks_nothing_more_after_tokens_that_cannot_be(
+    tmp_path: Path, reply: Garbage
+) -> None:
+    """Nor after a reply that cannot be read, which may have been paid, too."""
+    limited = ReplySettings(tmp_path, 1e-6)
+    with fake_vlm([reply]) as server:
+        vlm = VLMQuery(model_options(server, **PRICES), Template(""))
+        with contextlib.suppress(PolicyReplyError), use_replies(limited, "a"):
+            vlm.ask(query("words"), str)
+        assert math.isnan(vlm.usage()["cost_usd"])
+        for episode in "bc":
+            with pytest.raises(BudgetError, match="what 1 reply cost is unknown"):
+                play(server, limited, episode, "words", **PRICES)
+        assert len(server.requests) == 1
+
+
+def test_half_a_surrogate_pair_in_a_reply_is_stored_and_paid_once(tmp_path: Path) -> None:
+    with fake_vlm(["\ud800 fine"]) as server:
+        for stored in (0, 1):
+            replies, counts = play(server, ReplySettings(tmp_path), "a", "words", **PRICES)
+            assert replies == [r"\ud800 fine"]
+            assert (counts["cost_usd"], counts["stored"]) == (COST, stored)
+
+
+@pytest.mark.parametrize("count", [-(10**6), 10**12])
+def test_stored_tokens_that_cannot_be_are_unknown_and_lower_no_sum(
+    tmp_path: Path, count: int
+) -> None:
+    """As earlier versions may have stored them."""
+    with fake_vlm(["one", "two"]) as server:
+        play(server, ReplySettings(tmp_path), "a", "first", **PRICES)
+        with sqlite3.connect(tmp_path / REPLIES_FILE) as database:
+            change = "UPDATE replies SET output_tokens = ?, cost_usd = ?"
+            database.execute(change, (count, -1e6))
+        replies, counts = play(server, ReplySettings(tmp_path), "a", "first")
+        assert (replies, counts["input_tokens"]) == (["one"], TOKENS[0])
+        assert math.isnan(counts["output_tokens"])
+        with pytest.raises(BudgetError, match="is unknown"):
+            play(server, ReplySettings(tmp_path, 1.0), "b", "second", **PRICES)
 
 
 def test_a_limit_of_costs_needs_prices(tmp_path: Path) -> None:

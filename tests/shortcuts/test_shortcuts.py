@@ -30,7 +30,13 @@ from roboirg.shortcuts.shortcut_scores import (
     score_chance,
     score_rule,
 )
-from roboirg.shortcuts.shortcut_tables import Excess, excess_text, shortcut_rows
+from roboirg.shortcuts.shortcut_tables import (
+    Excess,
+    ShortcutRow,
+    excess_text,
+    shortcut_rows,
+    shortcut_table,
+)
 from roboirg.shortcuts.text_guess import slot_share
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
@@ -356,6 +362,12 @@ def test_an_excess_has_its_signs_and_its_ends_in_order(value, text):
     assert excess_text(Excess(value, 0.02), 1) == text
 
 
+def test_the_note_names_how_the_intervals_of_several_rows_are_adjusted():
+    rows = [ShortcutRow((name,), 9, {}, Excess(0.1, 0.02)) for name in ("direct", "spatial")]
+    caption = str(shortcut_table(rows, "Shortcuts").caption)
+    assert caption.endswith("with 95 % intervals, Bonferroni-adjusted for 2 rows.")
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -364,7 +376,7 @@ def test_an_excess_has_its_signs_and_its_ends_in_order(value, text):
         (("--split", "tset"), "tset"),
         (("--tasks", "StopCube", "--settings", "spatial"), "nothing to score"),
         (("--split", "none"), "nothing to score"),
-        (("--seeds", "-1"), "number of random seeds is -1"),
+        (("--seeds", "-1"), "seeds is -1; it must be a whole number from 0"),
         (("--learned", "--split", "val"), "choose --split test"),
         (("--plan", plan_file(distractors=0)), "distractors"),
     ],

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays, scalar_dtypes
 
-from roboirg.simulation.model_files import find_model_files
+from roboirg.simulation.model_files import TABLE_FILE, find_model_files
 from roboirg.simulation.rendering import mesh_cache, robot_meshes, table_mesh
 from roboirg.simulation.rendering.mesh_cache import cached_arrays, pack_arrays, unpack_arrays
 from roboirg.util.cache import open_cache
@@ -96,7 +96,7 @@ def test_damaged_meshes_are_made_anew_and_told(cache):
 
 @pytest.mark.sim
 def test_the_table_is_the_installed_one():
-    stock = sapien.render.RenderShapeTriangleMesh(str(find_model_files().table))
+    stock = sapien.render.RenderShapeTriangleMesh(str(find_model_files() / TABLE_FILE))
     for ours, theirs in zip(table_mesh.table_shape().parts, stock.parts, strict=True):
         for what in ("vertices", "triangles"):
             assert np.array_equal(getattr(ours, what), getattr(theirs, what))

@@ -17,13 +17,11 @@ from roboirg.core.footprints import Circle, Rectangle, Region, overlap
 from roboirg.core.motions import Away, Glow, Shuttle, Vanish
 from roboirg.tasks import bin_fill, stop_cube, swing_x_times
 from roboirg.tasks.shared.fixtures import (
-    bin_footprint,
     bin_keep_out,
-    button_footprint,
     button_keep_out,
-    cube_footprint,
     cube_obstacle,
     draw_bin,
+    footprint,
 )
 
 SEEDS = 150
@@ -90,19 +88,19 @@ def test_bin_fill_places_are_free(difficulty):
         assert -0.2 <= bin_.position.y <= 0.2
         assert bin_.position.z == 0.025
         assert abs(bin_.yaw) <= math.radians(20)
-        assert not overlap(bin_footprint(bin_), button_footprint(button))
+        assert not overlap(footprint(bin_), footprint(button))
         taken = [button_keep_out(button), bin_keep_out(bin_)]
         for cube in scene.of_kind("cube"):
             assert -0.28 <= cube.position.x <= 0.08
             assert -0.23 <= cube.position.y <= 0.23
             assert cube.position.z == object_sizes.CUBE_HALF
-            assert not overlap(cube_footprint(cube), bin_footprint(bin_))
+            assert not overlap(footprint(cube), footprint(bin_))
             check_free(cube, taken)
 
 
 def check_free(cube, taken):
     """The cube keeps 0.02 from what was placed before, and so will later ones from it."""
-    assert not any(overlap(cube_footprint(cube).grown(0.02), other) for other in taken)
+    assert not any(overlap(footprint(cube).grown(0.02), other) for other in taken)
     taken.append(cube_obstacle(cube))
 
 
@@ -112,7 +110,7 @@ def test_bin_fill_keeps_the_bin_off_the_button(monkeypatch):
     monkeypatch.setattr(bin_fill, "BIN_REGION", Region(-0.05, 0.0, 0.03, 0.03))
     for seed in range(50):
         scene, _ = bin_fill.sample(np.random.default_rng(seed), "easy")
-        assert not overlap(bin_footprint(scene["bin"]), button_footprint(scene["button"]))
+        assert not overlap(footprint(scene["bin"]), footprint(scene["button"]))
 
 
 @each_difficulty

@@ -17,7 +17,7 @@ from roboirg.core.footprints import (
     overlap,
     place,
 )
-from roboirg.tasks.shared.fixtures import cube_footprint, cube_obstacle
+from roboirg.tasks.shared.fixtures import cube_obstacle, footprint
 
 coordinates = st.floats(-0.3, 0.3)
 sizes = st.floats(0.01, 0.15)
@@ -117,8 +117,8 @@ cubes = st.builds(
 @settings(max_examples=40)
 @given(cubes, cubes)
 def test_cubes_never_overlap_although_some_count_as_lines(first, second):
-    if not overlap(cube_footprint(second).grown(0.02), cube_obstacle(first)):
-        assert not overlap(cube_footprint(second).grown(-1e-9), cube_footprint(first))
+    if not overlap(footprint(second).grown(0.02), cube_obstacle(first)):
+        assert not overlap(footprint(second).grown(-1e-9), footprint(first))
 
 
 def test_half_of_the_cubes_count_as_lines_in_either_direction():

@@ -14,7 +14,7 @@ from roboirg.core.episode import DIFFICULTIES, Goal
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.footprints import Circle, overlap
 from roboirg.core.motions import Swap
-from roboirg.tasks.shared.fixtures import button_keep_out, cube_footprint, cube_obstacle
+from roboirg.tasks.shared.fixtures import button_keep_out, cube_obstacle, footprint
 from roboirg.tasks.shared.swapping import nearest
 from roboirg.tasks.video_place_button import TASK as VIDEO_PLACE_BUTTON
 from roboirg.tasks.video_place_order import TASK as VIDEO_PLACE_ORDER
@@ -56,7 +56,7 @@ def shown(stages):
 def test_cubes_touch_nothing_and_keep_clear_of_the_button(task, difficulty):
     for scene in scenes(task, difficulty):
         cubes, (button,) = scene.of_kind("cube"), scene.of_kind("button")
-        squares = [cube_footprint(cube) for cube in cubes]
+        squares = [footprint(cube) for cube in cubes]
         for number, square in enumerate(squares):
             wide = square.grown(0.02 - 1e-9)
             assert not overlap(wide, button_keep_out(button))

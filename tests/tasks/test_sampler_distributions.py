@@ -23,7 +23,7 @@ from scipy.stats import chi2_contingency, ks_2samp
 from roboirg.core.episode import DIFFICULTIES, SPLITS, Goal
 from roboirg.core.motions import Away, Shuttle, Swap
 from roboirg.tasks.shared import fixtures
-from roboirg.tasks.shared.fixtures import cube_footprint
+from roboirg.tasks.shared.fixtures import footprint
 from roboirg.tasks.splits.published_episodes import published_episode
 
 TASKS = (
@@ -206,7 +206,7 @@ def test_random_scenes_are_distributed_as_published_ones(task, difficulty):
 
 
 def test_gaps_around_whole_squares_are_found_out(monkeypatch):
-    monkeypatch.setattr(fixtures, "cube_obstacle", cube_footprint)
+    monkeypatch.setattr(fixtures, "cube_obstacle", footprint)
     draw_anew = sampled.__wrapped__
     assert "nearest cubes" in differing("BinFill", "hard", draw_anew("BinFill", "hard"))
 

@@ -16,9 +16,7 @@ from roboirg.core.motions import Away, Glow, Shuttle, Swap, Vanish
 from roboirg.language.settings import plain_settings
 from roboirg.tasks import every_task, get_task
 from roboirg.tasks.other_goals import other_goals
-from roboirg.tasks.shared.fixtures import bin_footprint, button_footprint, cube_footprint
-from roboirg.tasks.shared.real_table import box_footprint
-from roboirg.tasks.shared.unmask import container_footprint
+from roboirg.tasks.shared.fixtures import footprint
 from roboirg.tasks.splits.splits import SIZES, get_episode, make_episode
 
 TASKS = tuple(every_task())
@@ -185,14 +183,8 @@ def test_stages_and_motions_speak_of_things_that_exist(task):
 
 def solids(scene):
     """The areas that nothing else may stand on."""
-    footprints = {
-        "cube": cube_footprint,
-        "container": container_footprint,
-        "bin": bin_footprint,
-        "button": button_footprint,
-        "box": box_footprint,
-        "tape": lambda tape: Circle(*tape.position[:2], object_sizes.TAPE_RADIUS),
-    }
+    footprints = dict.fromkeys(("cube", "container", "bin", "button", "box"), footprint)
+    footprints["tape"] = lambda tape: Circle(*tape.position[:2], object_sizes.TAPE_RADIUS)
     return [footprints[item.kind](item) for item in scene.objects if item.kind in footprints]
 
 

@@ -62,8 +62,8 @@ def learn_listener(
     from roboirg_learn.learn_support import check_learn_support
 
     check_learn_support()
-    own = ("scenes", "goals", "detector_epochs", "reader_epochs", "seed", "seeds", "encoders")
-    training = _listener_plan(PlanWords(context, plan, TRAINING, own), without)
+    own = "scenes goals detector_epochs reader_epochs seed seeds encoders"
+    training = _listener_plan(PlanWords(context, plan, TRAINING, own.split()), without)
     if study:
         _run_study(training, out, worker_count())
         return
@@ -87,7 +87,7 @@ def _listener_plan(words: PlanWords, without: str) -> TrainingPlan:
         words.tasks(),
         words.settings(),
         words.options().language,
-        words=known_name("pool of words", words.fields.get("wordings", "train"), WORD_POOLS),
+        words=known_name("pool of words", words.fields.get("wordings") or "train", WORD_POOLS),
         without=known_name("variant", without, WITHOUTS),
         **words.choices(TrainingPlan),
     )
@@ -150,10 +150,10 @@ def learn_policy(
     from roboirg_learn.learn_support import check_learn_support
 
     own = (
-        *("scenes", "drawn", "goals", "detector_epochs", "body_epochs", "reader_epochs", "seed"),
-        *("encoders", "memories", "parts", "played"),
+        "scenes drawn goals detector_epochs body_epochs reader_epochs seed encoders memories parts "
+        "played"
     )
-    words = PlanWords(context, plan, TRAINING, own)
+    words = PlanWords(context, plan, TRAINING, own.split())
     training = _policy_plan(words, tasks, settings, memory)
     if paper and memory != USUAL_MEMORY:
         raise InvalidValueError("--paper has its memories from the plan: training.memories.")
@@ -183,7 +183,7 @@ def _policy_plan(words: PlanWords, tasks: str, settings: str, memory: str) -> Po
         words.tasks(tasks),
         words.options().language,
         () if hears_none else words.settings(settings),
-        words=known_name("pool of words", words.fields.get("wordings", "train"), WORD_POOLS),
+        words=known_name("pool of words", words.fields.get("wordings") or "train", WORD_POOLS),
         memory=known_name("memory", memory, MEMORY_NAMES),
         **words.choices(PolicyPlan),
     )

@@ -255,7 +255,7 @@ def test_hands_know_no_goal_and_planners_point_at_what_is_out_of_sight(saved):
         seen, np.ones_like(seen), rng.normal(0, 1, (looks, TOOL_NUMBERS)).astype(np.float32),
     )  # fmt: skip
     planned = replayed(np.array([0, 1]), np.array([2, 5]), 0, size, chooses=True)
-    goal, nothing = np.zeros(model.goal_size, np.float32), np.array([-1, -1])
+    goal, nothing = np.zeros(model.vocabulary.goal_size, np.float32), np.array([-1, -1])
     numbers = EpisodeNumbers(shown, goal, np.array([2, 5]), *[nothing] * 3, planned)
     answer = model.planner(to_batch([numbers]))
     assert (answer.things[0, 1, :, 1] > -1e3).all()

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from functools import partial
-from typing import Annotated, Any, get_args, get_origin
+from typing import Annotated, Any
 
 import typer
 import typer.main
@@ -21,7 +21,7 @@ _PANELS = {
         "policies", "tasks", "settings", "forms", "split", "episodes", "policy_seeds", "arms",
     ),
     WORDS: ("stages", "wordings"),
-    PLAY: ("max_steps", "max_cost", "video"),
+    PLAY: ("max_steps", "max_cost", "policy_env", "video"),
 }  # fmt: skip
 """The fields of a plan that are used daily; a plan file has all."""
 
@@ -93,9 +93,7 @@ class RunCommand(DeclaredCommand):
                 if one.name == "policies":
                     yield one.name, list[str], option("--policy")
                     continue
-                numbers = (int, float) if get_origin(one.type) is not tuple else ()
-                kinds = (one.type, *get_args(one.type))
-                yield one.name, next((kind for kind in numbers if kind in kinds), str), option()
+                yield one.name, str, option()
 
 
 class WordsCommand(DeclaredCommand):
@@ -105,5 +103,4 @@ class WordsCommand(DeclaredCommand):
         """Yield the options of an instruction."""
         for one in fields(InstructionOptions):
             if one.name not in ("setting", "form", "delivery"):
-                kind = int if isinstance(one.default, int) else str
-                yield one.name, kind, typer.Option(help=one.metadata["help"])
+                yield one.name, str, typer.Option(help=one.metadata["help"])

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+import typer
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
@@ -104,7 +105,7 @@ def report(checks: Sequence[Check]) -> str:
 def run_doctor(render_s: int = 0) -> int:
     """Print the report and return the exit code: 0 if every check passed, otherwise 1."""
     checks = run_checks(render_s)
-    sys.stdout.write(report(checks) + "\n")
+    typer.echo(report(checks))
     return 0 if all(check.ok for check in checks) else 1
 
 
@@ -151,7 +152,7 @@ def _check_package(name: str, specifier: SpecifierSet) -> Check:
 def _check_files() -> tuple[Check, ...]:
     """Check what lies outside the packages: files, folders and proxies."""
     return (
-        _try("model files", lambda: str(look_for_model_files().root)),
+        _try("model files", lambda: str(look_for_model_files())),
         _try("temporary files", lambda: _write_to(tempfile.gettempdir())),
         _try("cache", lambda: _write_to(str(cache_folder() or "")), "all is made anew"),
         _try("shared memory", lambda: _write_to("/dev/shm"), "runs do without it"),  # noqa: S108
@@ -210,7 +211,11 @@ def _run_python(*arguments: str, limit_s: int = FRAME_TIMEOUT) -> tuple[bool, st
             timeout=limit_s,
         )
     except subprocess.TimeoutExpired as error:
-        output = error.stdout.decode() if isinstance(error.stdout, bytes) else error.stdout or ""
+        output = (
+            error.stdout.decode(errors="replace")
+            if isinstance(error.stdout, bytes)
+            else error.stdout or ""
+        )
         return False, output, f"no end within {limit_s} s"
     code = child.returncode
     if code < 0:

@@ -8,12 +8,16 @@ from typing import Annotated
 
 import typer
 
+from roboirg.core.field_types import MOST_SECONDS
+
 
 def doctor(
     render: Annotated[
         int,
         typer.Option(
-            min=0, help="Seconds to draw pictures; a driver may draw one and hang only later."
+            min=0,
+            max=MOST_SECONDS,
+            help="Seconds to draw pictures; a driver may draw one and hang only later.",
         ),
     ] = 0,
 ) -> None:

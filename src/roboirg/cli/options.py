@@ -92,7 +92,7 @@ class PlanWords:
         """
         from roboirg.evaluation.plan.plan_maker import as_typed_field
 
-        given = self.fields.get(self._section) or {}
+        given = self.fields.get(self._section, {})
         if not isinstance(given, Mapping):
             raise InvalidValueError(
                 f"{self._section} of the plan is {given!r}; it must be a mapping such as "
@@ -122,7 +122,7 @@ class PlanWords:
         """Return the plan's forms, or the usual ones if it has none."""
         from roboirg.language import FORMS
 
-        return known_names("form", self.fields.get("forms", ",".join(usual)), FORMS)
+        return known_names("form", self.fields.get("forms", usual), FORMS)
 
     def form(self) -> str:
         """Return the plan's only form."""

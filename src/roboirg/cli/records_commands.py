@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from roboirg.cli.run_commands import folder_of
 from roboirg.core.plain_text import counted
 
 records_app = typer.Typer(no_args_is_help=True, help="Merge records.")
@@ -22,8 +21,9 @@ def merge(
     Example: roboirg records merge runs/first runs/second --out runs/all
     """
     from roboirg.evaluation.records.merging import merge_runs
+    from roboirg.evaluation.records.run_files import run_folder
 
-    merged = merge_runs([folder_of(run) for run in runs], folder_of(out))
+    merged = merge_runs([run_folder(run) for run in runs], run_folder(out))
     typer.echo(
         f"Added {counted(merged.added, 'record')} to {out}; {merged.duplicates:,} already there."
     )

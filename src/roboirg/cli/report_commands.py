@@ -187,7 +187,7 @@ def tables(
     with paused_collection(), opened_sources(runs or []) as sources:
         data = RunData(read_frame(sources, words=by is not None))
         found = _tables(which, by, sources, data, published=published, floors=floors)
-    if format in ("csv", "json"):  # without notes
+    if output.is_for_programs:
         warn_of_mixtures(data.frame)
     if out is not None:
         for table in found:
@@ -197,7 +197,8 @@ def tables(
     elif format == "terminal":
         print_tables(found, Console())
     else:
-        typer.echo("\n".join(output.draw(table) for table in found), nl=False)
+        texts = [output.draw(*found)] if output.is_for_programs else map(output.draw, found)
+        typer.echo("\n".join(texts), nl=False)
 
 
 def compare(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -82,6 +83,7 @@ def run(
     from roboirg.evaluation.plan.sources import Source
     from roboirg.evaluation.play.prompt_shares import prompt_shares, warning_lines
     from roboirg.evaluation.play.video_writer import check_video_support
+    from roboirg.evaluation.records.run_files import run_folder
     from roboirg.evaluation.run.runner import check_run
 
     add_working_directory(last=True)
@@ -92,7 +94,7 @@ def run(
     if out is None:
         raise InvalidValueError("No folder given; name one with --out, such as runs/first.")
     # Absolute: a policy in this process may change the working directory.
-    folder = folder_of(out).absolute()
+    folder = run_folder(out).absolute()
     chosen = _executor(made, executor, workers)
     if made.video != "off":
         check_video_support()
@@ -105,17 +107,6 @@ def run(
     summary = play(made, folder, chosen, retry=retry_errors)
     print_tables_of(Source(folder))
     report_problems(summary, folder)
-
-
-def folder_of(text: str) -> Path:
-    """Return the path of a folder.
-
-    Raises:
-        InvalidValueError: the text is empty.
-    """
-    if not text.strip():
-        raise InvalidValueError("The name of the run's folder is empty.")
-    return Path(text)
 
 
 def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummary:
@@ -194,11 +185,17 @@ def _plan(name: str | None, typed: dict[str, Any], usual: Sequence[str]) -> Plan
 
     `usual` are its policies if it has none.
     """
+    from roboirg.evaluation.plan.plan import FLAT
     from roboirg.evaluation.plan.plan_file import read_plan_file
     from roboirg.evaluation.plan.plan_maker import make_plan
     from roboirg.tasks.splits.private_splits import drawn_split
 
-    chosen = {**({} if name is None else read_plan_file(name)), **typed}
+    chosen = {} if name is None else read_plan_file(name)
+    for option in FLAT.keys() & typed.keys():
+        section = chosen.get(FLAT[option])
+        if isinstance(section, dict):
+            section.pop(option, None)
+    chosen |= typed
     policies = chosen.pop("policies", None) or usual
     if not policies:
         raise InvalidValueError("No policy given; name one with --policy, such as oracle.")
@@ -212,7 +209,9 @@ def _executor(plan: Plan, name: str, workers: int | None) -> Executor:
         from roboirg.evaluation.run.ray_cluster import RayCluster
 
         address = os.environ.get("RAY_ADDRESS")
-        return RayCluster(workers, address, plan.attempts.episode_timeout_s, plan.cluster)
+        variables = plan.cluster.variables + plan.hosting.policy_env
+        needs = replace(plan.cluster, variables=variables)
+        return RayCluster(workers, address, plan.attempts.episode_timeout_s, needs)
     from roboirg.evaluation.run.executor import choose_executor
 
     return choose_executor(workers, plan.attempts.episode_timeout_s)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from decimal import Decimal
+from types import NoneType
 from typing import NamedTuple
 
 import numpy as np
@@ -71,6 +73,8 @@ WAYPOINT = ActionSpace(
 )
 """The same pose, reached by a straight move of many steps; then the gripper closes or opens."""
 
+_NO_NUMBERS = bool, np.bool_, NoneType, Decimal, np.ma.core.MaskedConstant
+"""What stands in lists of others for a number, and is none."""
 NO_POINT = -1.0
 CHOICE = ActionSpace(
     "choice",
@@ -126,12 +130,15 @@ def _numbers(action: ArrayLike, space: ActionSpace) -> NDArray[np.float64]:
     got = type(action).__name__
     if hasattr(action, "detach"):
         # NumPy takes no tensor of PyTorch in bfloat16, with a gradient, or on a GPU.
-        action = action.detach().cpu().double().numpy()
+        tensor = action.detach().cpu()
+        action = tensor.double().numpy() if tensor.is_floating_point() else tensor.numpy()
     try:
         numbers = np.asarray(action)
     except ValueError:
         numbers, got = np.asarray(None), "rows of different lengths"
-    if numbers.dtype.kind not in "biuf" and numbers.dtype.name != "bfloat16":  # JAX's
+    if numbers.ndim and numbers is not action:
+        _check_values(np.ma.asarray(action, dtype=object))  # type: ignore[no-untyped-call]
+    if numbers.dtype.kind not in "iuf" and numbers.dtype.name != "bfloat16":  # JAX's
         dtype = f" of dtype {numbers.dtype}" if numbers.ndim else ""
         raise InvalidActionError(
             f"An action ({space.name}) is an array of {space.size} real numbers; got {got}{dtype}."
@@ -139,12 +146,23 @@ def _numbers(action: ArrayLike, space: ActionSpace) -> NDArray[np.float64]:
     return numbers.astype(np.float64)
 
 
+def _check_values(values: NDArray[np.object_]) -> None:
+    """Refuse what NumPy takes for a number in a list: flags, and what is behind a mask."""
+    for place, value in np.ma.ndenumerate(values, compressed=False):  # type: ignore[no-untyped-call]
+        if isinstance(value, _NO_NUMBERS):
+            raise _bad_value(place, repr(value))
+
+
 def _finite(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
     bad = np.argwhere(~np.isfinite(numbers))
     if len(bad):
-        row = f" of row {bad[0][0]}" if len(bad[0]) > 1 else ""
-        raise InvalidActionError(
-            f"Action value {bad[0][-1]}{row} is {numbers[tuple(bad[0])]}; "
-            "every value must be a finite number."
-        )
+        raise _bad_value(bad[0], str(numbers[tuple(bad[0])]))
     return numbers
+
+
+def _bad_value(place: Sequence[int] | NDArray[np.intp], shown: str) -> InvalidActionError:
+    """Return the error of a value; its place is the index in an action or a chunk."""
+    row = f" of row {place[0]}" if len(place) > 1 else ""
+    return InvalidActionError(
+        f"Action value {place[-1]}{row} is {shown}; every value must be a finite number."
+    )

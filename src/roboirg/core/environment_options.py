@@ -7,7 +7,7 @@ from typing import Any, Literal, TypedDict
 
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError, check_names
-from roboirg.core.field_types import Name, Whole, described
+from roboirg.core.field_types import Label, Whole, check_whole, described
 
 MAX_STEPS = 1300
 """Control steps a policy has, as in RoboMME's published experiments."""
@@ -35,7 +35,7 @@ class EnvironmentOptions:
         default=MAX_STEPS,
         metadata=described("Limit of an episode in control steps, 20 per second."),
     )
-    actions: Name | None = field(
+    actions: Label | None = field(
         default=None,
         metadata=described("Required action space; without one, each policy's own."),
     )
@@ -52,7 +52,7 @@ class EnvironmentOptions:
             "Control steps between two observations; without it, as each policy asks."
         ),
     )
-    meshes: Name = field(
+    meshes: Label = field(
         default=DEFAULT_MESHES, metadata=described("Meshes for rendering: faithful or light.")
     )
 
@@ -68,10 +68,7 @@ class EnvironmentOptions:
             UnknownNameError: there is no such action space or kind of meshes.
             InvalidValueError: a number is out of range.
         """
-        if type(self.max_steps) is not int or self.max_steps < 1:
-            raise InvalidValueError(
-                f"max_steps is {self.max_steps!r}; it must be a whole number of at least 1."
-            )
+        check_whole("max_steps", self.max_steps)
         if self.actions is not None:
             find_action_space(self.actions)
         if self.demonstration_frames is not None:
@@ -100,12 +97,14 @@ def check_demonstration_frames(value: object) -> DemonstrationFrames:
     Raises:
         InvalidValueError: it is neither ``"all"`` nor ``"none"`` nor a whole number from 1 on.
     """
-    if value in ("all", "none") or (type(value) is int and value >= 1):
+    if value in ("all", "none"):
         return value
-    raise InvalidValueError(
-        f"demonstration_frames is {value!r}; it must be 'all', 'none' or a whole number of at "
-        "least 1."
-    )
+    if type(value) is not int:
+        raise InvalidValueError(
+            f"demonstration_frames is {value!r}; it must be 'all', 'none' or a whole number of at "
+            "least 1."
+        )
+    return check_whole("demonstration_frames", value)
 
 
 def check_observe_every(value: object) -> int | None:
@@ -114,8 +113,4 @@ def check_observe_every(value: object) -> int | None:
     Raises:
         InvalidValueError: it is neither None nor a whole number from 1 on.
     """
-    if value is None or (type(value) is int and value >= 1):
-        return value
-    raise InvalidValueError(
-        f"observe_every is {value!r}; it must be None or a whole number of at least 1."
-    )
+    return None if value is None else check_whole("observe_every", value)

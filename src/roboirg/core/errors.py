@@ -12,6 +12,7 @@
 | `PolicyConnectionError` | a policy's server or model cannot be reached | recorded as an error |
 | `PolicyTimeoutError` | a policy does not answer in time | recorded as an error |
 | `PolicyReplyError` | a policy's server or model sends an invalid answer | recorded as an error |
+| `UnknownCostError` | a model's reply cannot be read, and may be paid | recorded as an error |
 | `MotionPlanningError` | the oracle finds no path | recorded as an error |
 """
 
@@ -134,3 +135,7 @@ class PolicyTimeoutError(PolicyServerError, TimeoutError):
 
 class PolicyReplyError(PolicyServerError, RuntimeError):
     """The server or model of a policy answered with an error or an invalid reply."""
+
+
+class UnknownCostError(PolicyReplyError):
+    """A model's service answered in another form, so what the reply cost is unknown."""

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypedDict
 
-from roboirg.core.field_types import Name, Stages, Whole, described
+from roboirg.core.field_types import Label, Stages, Whole, described
 
 ALL_STAGES = (1, 2, 3, 4, 5)
 DEFAULT_DISTRACTOR = "neutral"
@@ -32,8 +32,8 @@ class InstructionOptions:
         delivery: see `roboirg.core.delivery`.
     """
 
-    setting: Name = field(default="explicit", metadata=described("Name of the setting."))
-    form: Name = field(
+    setting: Label = field(default="explicit", metadata=described("Name of the setting."))
+    form: Label = field(
         default="implicit",
         metadata=described(
             "implicit; or resolved, with the command's referring expressions replaced by what they "
@@ -47,7 +47,7 @@ class InstructionOptions:
             "3 distractor, 4 cue, 5 command."
         ),
     )
-    distractor: Name = field(
+    distractor: Label = field(
         default=DEFAULT_DISTRACTOR,
         metadata=described("Distractors of the contextual setting: neutral or competing."),
     )
@@ -55,18 +55,18 @@ class InstructionOptions:
         default=DEFAULT_DISTRACTORS,
         metadata=described("Number of distractors in the contextual setting."),
     )
-    frame: Name = field(
+    frame: Label = field(
         default=DEFAULT_FRAME,
         metadata=described("Whose left and right the spatial setting uses: robot or camera."),
     )
-    wordings: Name | None = field(
+    wordings: Label | None = field(
         default=None,
         metadata=described(
             "Wording file whose commands are used instead of our own; or train or test: our words "
             "of that pool in every split."
         ),
     )
-    delivery: Name = field(
+    delivery: Label = field(
         default=DEFAULT_DELIVERY,
         metadata=described(
             "prompt: the whole instruction at once; turns: one utterance after another."

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from roboirg.core.handed_keys import without_keys
+
 
 def printable(text: str) -> str:
-    r"""Return a text whose characters cannot control a terminal.
+    r"""Return a text without keys, whose characters cannot control a terminal.
 
     Others than line ends and tabs are written as escapes: ``\x1b`` begins commands that clear the
     screen, change the window's title or type for the user, and marks of direction reorder what is
     read.
     """
+    text = without_keys(text)
     if text.isprintable():
         return text
     return "".join(

@@ -21,6 +21,7 @@ from roboirg.core.environment_options import (
     check_observe_every,
 )
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.field_types import check_whole
 from roboirg.core.observations import CAMERAS, check_cameras
 
 _MISSING = object()
@@ -68,12 +69,6 @@ def _check_trained_tasks(tasks: object) -> tuple[str, ...]:
 def _check_flag(name: str, value: object) -> bool:
     if not isinstance(value, bool):
         raise InvalidValueError(f"{name} is {value!r}; it must be True or False.")
-    return value
-
-
-def _check_number(name: str, least: int, value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise InvalidValueError(f"{name} is {value!r}; it must be a number from {least}.")
     return value
 
 
@@ -152,10 +147,10 @@ class PolicyNeeds:
     grounded: bool = field(default=False, metadata=need_rules(bool, operator.or_, env=True))
     # A planner's model has a context of its own, which no instruction fills.
     prompt_tokens: int | None = field(
-        default=None, metadata=need_rules(partial(_check_number, "prompt_tokens", 1))
+        default=None, metadata=need_rules(partial(check_whole, "prompt_tokens"))
     )
     prompt_added: int = field(
-        default=0, metadata=need_rules(partial(_check_number, "prompt_added", 0))
+        default=0, metadata=need_rules(partial(check_whole, "prompt_added", least=0))
     )
     tokenizer: str | None = field(default=None, metadata=need_rules(_check_tokenizer))
     lowers_prompt: bool = field(default=False, metadata=need_rules(bool))

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from roboirg.core.field_types import Name
+from roboirg.core.field_types import Label, Name
 from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.core.versions import Makeup, Versions
 
 BUILT_IN = "built-in"
 """Kind and version of policies that come with the package."""
@@ -41,11 +42,12 @@ class PolicyRef:
         is_privileged: whether it may read the simulator's state.
         asks: what of it asks a model, if that is ours.
         version: distinguishes it from an earlier policy of the same name.
+        makeup: what it is besides its version, wherever it is; empty if only its name is known.
         problem: why it could not be opened, in words; its version is not known then.
         needs: what it declares, as far as that is known before it plays.
     """
 
-    name: Name
+    name: Label
     spec: str
     kind: str
     target: str
@@ -55,6 +57,7 @@ class PolicyRef:
     is_privileged: bool = False
     asks: Asker | None = None
     version: Name = UNKNOWN_VERSION
+    makeup: Makeup = ()
     problem: str | None = None
     needs: PolicyNeeds | None = None
 
@@ -72,6 +75,11 @@ class PolicyRef:
     def is_declared(self) -> bool:
         """Whether the user declares it privileged."""
         return self.body != self.spec
+
+    @property
+    def versions(self) -> Versions:
+        """Its version and what it is, for comparison with another one of its name."""
+        return Versions(self.makeup, policy_version=self.version)
 
     @property
     def is_hosted(self) -> bool:

@@ -10,7 +10,8 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from roboirg.core.actions import find_action_space
-from roboirg.core.errors import InvalidActionError, InvalidValueError
+from roboirg.core.errors import InvalidActionError
+from roboirg.core.field_types import check_whole
 from roboirg.envs.environment import RoboIRGEnv
 
 StepResult = tuple[dict[str, Any], float, bool, bool, dict[str, Any]]
@@ -30,13 +31,12 @@ class ActionChunks(gymnasium.Wrapper[dict[str, Any], NDArray[Any], dict[str, Any
         length: number of actions in a chunk.
 
     Raises:
-        InvalidValueError: the length is no positive integer.
+        InvalidValueError: the length is no whole number from 1 on.
     """
 
     def __init__(self, env: gymnasium.Env[dict[str, Any], NDArray[Any]], length: int) -> None:
         super().__init__(env)
-        if not isinstance(length, int) or length < 1:
-            raise InvalidValueError(f"length is {length!r}; it must be an integer >= 1.")
+        check_whole("length", length)
         self._inner = cast("RoboIRGEnv", env.unwrapped)
         one = find_action_space(self._inner.actions)
         low, high = (np.tile(limits, (length, 1)) for limits in (one.low, one.high))

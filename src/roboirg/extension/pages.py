@@ -8,7 +8,7 @@ from roboirg.evaluation.analysis.published import published_rows
 from roboirg.evaluation.analysis.stats.intervals import without_spread
 from roboirg.evaluation.analysis.stats.paired_tests import holm
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
-from roboirg.evaluation.analysis.tables.table import Column, Row, Table
+from roboirg.evaluation.analysis.tables.table import Row, Table, named_columns
 from roboirg.evaluation.plan.plan_file import read_plan_file
 
 __all__ = ["holm", "markdown_table", "published_rows", "read_plan_file", "without_spread"]
@@ -35,8 +35,8 @@ def markdown_table(
         key=title,
         title=title,
         heads=heads,
-        columns=tuple(map(Column, columns)),
-        rows=tuple(Row(group, name, cells) for group, name, cells in rows),
-        notes=tuple(notes),
+        columns=named_columns(*columns),
+        rows=[Row(*row) for row in rows],
+        notes=notes,
     )
     return markdown(made).rstrip("\n")

@@ -54,6 +54,9 @@ SEED = 1
 """Of the disturbance."""
 
 
+Floats = NDArray[np.float32]
+
+
 class LabeledView(NamedTuple):
     """A picture with the centers of its objects.
 
@@ -66,8 +69,8 @@ class LabeledView(NamedTuple):
 
     picture: Pixels
     names: tuple[str, ...]
-    centers: NDArray[np.float32]
-    positions: NDArray[np.float32]
+    centers: Floats
+    positions: Floats
 
 
 def labeled_views(episode: Episode, later: int) -> tuple[LabeledView, ...]:
@@ -89,7 +92,9 @@ def labeled_views(episode: Episode, later: int) -> tuple[LabeledView, ...]:
 
 
 def _view(world: World, episode: Episode) -> LabeledView:
-    names, centers, positions = [], [], []
+    names = []
+    centers = []
+    positions = []
     pixels = pixels_by_object(world)
     for item in episode.scene.objects:
         rows, columns = pixels[item.name]
@@ -137,7 +142,7 @@ def points_of(positions: NDArray[np.floating]) -> NDArray[np.float64]:
     return flat
 
 
-def places_of(points: NDArray[np.floating], heights: NDArray[np.floating]) -> NDArray[np.float32]:
+def places_of(points: NDArray[np.floating], heights: NDArray[np.floating]) -> Floats:
     """Return x and y (n, 2), m, of points (n, 2), column and row, at heights (n,), m."""
     matrix = front_camera_matrix()
     rays = np.column_stack([(points - SIZE / 2) / FOCAL_LENGTH, np.ones(len(points))])
@@ -197,14 +202,14 @@ class ExpertRecording(NamedTuple):
     key: str
     names: tuple[str, ...]
     classes: tuple[str, ...]
-    things: NDArray[np.float32]
+    things: Floats
     visible: NDArray[np.bool_]
-    tool: NDArray[np.float32]
+    tool: Floats
     is_video: NDArray[np.bool_]
     steps: NDArray[np.int32]
     done: NDArray[np.int32]
     looks: NDArray[np.int32]
-    actions: NDArray[np.float32]
+    actions: Floats
     anchors: NDArray[np.int32]
     turns: tuple[str, ...]
     pictures: dict[int, bytes]
@@ -245,7 +250,8 @@ class _LookRecorder(EpisodeLoop):
 
     def __init__(self, env: RoboIRGEnv, policy: WaypointExpert, drawn: range) -> None:
         super().__init__(env, policy)
-        self._expert, self._drawn = policy, drawn
+        self._expert = policy
+        self._drawn = drawn
         self._rows: list[tuple[Any, ...]] = []
         self._decisions: list[tuple[int, ExpertWaypoint]] = []
         self._pictures: dict[int, bytes] = {}

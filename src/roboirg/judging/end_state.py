@@ -219,14 +219,14 @@ def _standing_acts(replay: EpisodeReplay) -> Iterator[FactInterval]:
     that a later stage expects, a press where the stage expects another button, and placing an
     object that was picked up.
     """
-    since, start, roles = replay.acted_since, replay.policy_start_step, FactRole
+    since, roles = replay.acted_since, FactRole
     ahead = replay.stages[replay.expected_stage + 1 :]
     later = {fact for stage in ahead for fact in facts_of(stage.expects)}
     expected = facts_of(replay.stages[replay.expected_stage].expects)
     # An object that was not picked up was there before and has only been touched.
-    raised = {one.fact.subject for one in replay.started(roles.RAISE, after=start)}
+    raised = {one.fact.subject for one in replay.started(roles.RAISE)}
     acts = (roles.GRIP, roles.RAISE, roles.PLACING, roles.PRESS)
-    for interval in replay.started(*acts, after=replay.policy_start_step):
+    for interval in replay.started(*acts):
         fact, traits = interval.fact, interval.fact.traits
         stands = {
             roles.RAISE: not traits.undone_by_release and fact in later,
@@ -266,7 +266,7 @@ def _done_too_early(replay: EpisodeReplay) -> FailureAttribution | None:
     stages, current, since = replay.stages, replay.expected_stage, replay.acted_since
     before = {fact for stage in stages[:current] for fact in facts_of(stage.expects)}
     wanted = set(facts_of(stages[current].expects)) - before
-    acts = replay.started(FactRole.RAISE, FactRole.PRESS, after=replay.policy_start_step)
+    acts = replay.started(FactRole.RAISE, FactRole.PRESS)
     act = next((one for one in acts if one.fact in wanted and one.start < since), None)
     return None if act is None else _describe_act(replay, "wrong_order", act)
 
@@ -284,9 +284,9 @@ def _lingers_since(replay: EpisodeReplay) -> int | None:
 
 def _at_rest(replay: EpisodeReplay) -> FailureAttribution:
     """Return ``stopped``, ``no_attempt`` or ``out_of_time``, as the table says."""
-    start, names = replay.policy_start_step, _meant(replay, range(len(replay.stages)))
-    went = [*replay.tried("above"), *replay.started(FactRole.APPROACH, after=start)]
-    acts = replay.started(FactRole.GRIP, FactRole.RAISE, FactRole.PRESS, after=start)
+    names = _meant(replay, range(len(replay.stages)))
+    went = [*replay.tried("above"), *replay.started(FactRole.APPROACH)]
+    acts = replay.started(FactRole.GRIP, FactRole.RAISE, FactRole.PRESS)
     has_begun = replay.expected_stage > 0 or any(one.fact.place in names for one in went)
     since = _lingers_since(replay)
     failure: FailureName = "out_of_time" if since is None else "stopped"

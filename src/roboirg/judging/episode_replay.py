@@ -92,10 +92,14 @@ class EpisodeReplay:
         pairs = pairwise((*self.expected_stages, self.expected_stage))
         return ((now, step) for step, (now, then) in enumerate(pairs) if then != now >= 0)
 
-    def started(self, *roles: FactRole, after: int) -> Iterator[FactInterval]:
-        """Yield the intervals of facts with some roles that start later than a step."""
+    def started(self, *roles: FactRole, after: int | None = None) -> Iterator[FactInterval]:
+        """Yield the intervals of facts with some roles that start later than a step.
+
+        By default, those that start in the policy's turn.
+        """
+        start = self.policy_start_step if after is None else after
         return (
-            one for one in self.intervals if one.start > after and one.fact.traits.role in roles
+            one for one in self.intervals if one.start > start and one.fact.traits.role in roles
         )
 
     def tried(self, kind: FactKind, *subjects: str) -> Iterator[FactInterval]:
@@ -127,7 +131,7 @@ def rejudge(
 ) -> EpisodeReplay:
     """Judge an episode again by all its events, in order; steps count since the world began."""
     facts = facts_by_step(events, elapsed_steps)
-    judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+    judge = Judge.of(episode)
     expected_stages: list[int] = []
     expected = -len(episode.demonstration)
     for step in _evaluations(judge, events, elapsed_steps):
@@ -140,7 +144,7 @@ def rejudge(
 
 def decide(episode: Episode, events: Sequence[Event], elapsed_steps: int) -> Decision:
     """Judge an episode again up to its verdict; faster than `rejudge`."""
-    judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+    judge = Judge.of(episode)
     for step in _evaluations(judge, events, elapsed_steps):
         if judge.status is not Status.ONGOING:
             return Decision(judge, step)
@@ -151,7 +155,7 @@ def completed_stages(
     episode: Episode, events: Sequence[Event], elapsed_steps: int
 ) -> dict[int, int]:
     """Return the steps that completed stages of the policy, by index; faster than `rejudge`."""
-    judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
+    judge = Judge.of(episode)
     found: dict[int, int] = {}
     for step in _evaluations(judge, events, elapsed_steps):
         found.setdefault(judge.index - len(episode.demonstration) - 1, step)

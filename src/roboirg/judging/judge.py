@@ -13,7 +13,7 @@ from collections.abc import Set as AbstractSet
 from enum import StrEnum
 
 from roboirg.core.conditions import All, Condition, Elapsed, Fact, Rule
-from roboirg.core.episode import Scene, Stage
+from roboirg.core.episode import Episode, Scene, Stage
 from roboirg.judging.fact_history import FactHistory
 
 _PLAINER = {"remain static": "wait"}
@@ -57,6 +57,11 @@ class Judge:
         self._met_since: int | None = None
         self._evaluated = -1
         self._elapsed: tuple[Elapsed, ...] = ()
+
+    @classmethod
+    def of(cls, episode: Episode) -> Judge:
+        """Return a judge of an episode, which follows its demonstration, too."""
+        return cls((*episode.demonstration, *episode.stages), episode.scene)
 
     def next_change(self) -> float:
         """Return the next step at which an evaluation may change something though no fact does."""

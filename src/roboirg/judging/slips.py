@@ -67,24 +67,23 @@ def _missed_grasps(replay: EpisodeReplay) -> Iterator[Slip]:
     Fingers closed on nothing next to it, held it for a while, or were where they take what is
     expected and did not close.
     """
-    closed: dict[int, set[str]] = {}
-    for one in replay.tried("clutched"):
-        closed.setdefault(one.start, set()).add(one.fact.subject)
-    for one in _holds(replay):
-        if not _raises(replay, one):
-            closed.setdefault(one.start, set()).add(one.fact.subject)
-    grips = [*closed, *(one.start for one in replay.started(FactRole.GRIP, after=0))]
-    for one in replay.started(FactRole.TOUCH, after=replay.policy_start_step):
+    missed = [*replay.tried("clutched")]
+    missed += [one for one in _holds(replay) if not _raises(replay, one)]
+    grips = [one.start for one in (*missed, *replay.started(FactRole.GRIP, after=0))]
+    for one in replay.started(FactRole.TOUCH):
         end = replay.last_step if one.end is None else one.end + SETTLED_STEPS
         expected = {fact.subject for fact in facts_of(replay.stage_at(one.start).expects)}
         if one.fact.subject in expected and not any(one.start <= grip <= end for grip in grips):
-            closed.setdefault(one.start, set()).add(one.fact.subject)
+            missed.append(one)
+    closed: dict[int, set[str]] = {}
+    for one in missed:
+        closed.setdefault(one.start, set()).add(one.fact.subject)
     yield from (Slip(step, "missed_grasp", frozenset(names)) for step, names in closed.items())
 
 
 def _holds(replay: EpisodeReplay) -> list[FactInterval]:
     """Return when the fingers held something, until they let it go; not what they still hold."""
-    grips = list(replay.started(FactRole.GRIP, after=replay.policy_start_step))
+    grips = list(replay.started(FactRole.GRIP))
     starts = {(one.fact.subject, one.start) for one in grips}
     return [
         one
@@ -103,7 +102,7 @@ def _raises(replay: EpisodeReplay, hold: FactInterval) -> list[FactInterval]:
 
 
 def _missed_presses(replay: EpisodeReplay) -> Iterator[Slip]:
-    presses = list(replay.started(FactRole.PRESS, after=replay.policy_start_step))
+    presses = list(replay.started(FactRole.PRESS))
     for one in replay.tried("pressed_beside"):
         end = replay.last_step if one.end is None else one.end
         if not any(
@@ -155,7 +154,7 @@ def _places_near(
 
 def _passes(replay: EpisodeReplay) -> Iterator[Slip]:
     """Yield where an object was carried past a place over which it was expected."""
-    over = list(replay.started(FactRole.CARRY, after=replay.policy_start_step))
+    over = list(replay.started(FactRole.CARRY))
     for one in replay.tried("beside"):
         end = replay.last_step if one.end is None else one.end
         expected = facts_of(replay.stage_at(one.start).expects)

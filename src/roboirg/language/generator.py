@@ -10,6 +10,7 @@ from typing import Unpack
 from roboirg.core.delivery import DELIVERIES
 from roboirg.core.episode import Episode, describe_goal
 from roboirg.core.errors import InvalidValueError, check_names
+from roboirg.core.field_types import check_whole
 from roboirg.core.instruction_options import (
     DEFAULT_FRAME,
     DEFAULT_LANGUAGE,
@@ -195,11 +196,7 @@ def check_options(options: InstructionOptions) -> None:
     if options.stages not in STAGE_SETS:
         sets = ", ".join(str(one) for one in STAGE_SETS)
         raise InvalidValueError(f"The stages {options.stages} must be one of {sets}.")
-    count: object = options.distractors
-    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_DISTRACTORS:
-        raise InvalidValueError(
-            f"distractors is {count!r}; it must be a whole number from 1 to {MOST_DISTRACTORS}."
-        )
+    check_whole("distractors", options.distractors, most=MOST_DISTRACTORS)
     if options.language not in LANGUAGE_VERSIONS:
         known_ones = " or ".join(map(str, LANGUAGE_VERSIONS))
         raise InvalidValueError(f"language is {options.language!r}; it must be {known_ones}.")

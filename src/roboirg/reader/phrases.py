@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 
 Span = tuple[int, int, str | None]
 """First character, one past the last, and what the words between stand for; None if unclear."""
@@ -19,22 +19,17 @@ class Phrases:
 
     Attributes:
         by_example: the whole pattern of each way, by its example.
+        search: as of a pattern, and so are `match` and `finditer`.
     """
 
     def __init__(self, ways: Mapping[str, str], *, before: str = "", after: str = "") -> None:
         self.by_example = {
             example: re.compile(f"{before}(?:{way}){after}") for example, way in ways.items()
         }
-        self._any = re.compile(f"{before}(?:{'|'.join(ways.values())}){after}")
-
-    def search(self, text: str) -> re.Match[str] | None:
-        return self._any.search(text)
-
-    def match(self, text: str, at: int = 0) -> re.Match[str] | None:
-        return self._any.match(text, at)
-
-    def finditer(self, text: str) -> Iterator[re.Match[str]]:
-        return self._any.finditer(text)
+        pattern = re.compile(f"{before}(?:{'|'.join(ways.values())}){after}")
+        self.search = pattern.search
+        self.match = pattern.match
+        self.finditer = pattern.finditer
 
 
 class Rewrites:

@@ -12,8 +12,9 @@ import numpy as np
 from rich.table import Table
 
 from roboirg.core.episode import Episode, Split
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.field_types import check_whole
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.plain_text import counted
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions
 from roboirg.shortcuts.goal_learner import LEARNED_FLOORS, GoalLearner, Heard, Told
@@ -70,7 +71,10 @@ class Excess(NamedTuple):
     error: float
 
     def interval(self, count: int) -> tuple[float, float]:
-        """Return its interval; 95 % of the time all of `count` such intervals are right."""
+        """Return its interval, Bonferroni-adjusted for `count` of them.
+
+        95 % of the time all of these are right.
+        """
         reach = NormalDist().inv_cdf(1 - 0.025 / count) * self.error
         return self.value - reach, self.value + reach
 
@@ -189,8 +193,7 @@ def score_texts(
     learning: int | None = None,
 ) -> Iterator[Scored]:
     """Yield every instruction with its scores, task by task; arguments as of `shortcut_rows`."""
-    if seeds < 0:
-        raise InvalidValueError(f"The number of random seeds is {seeds}; it must be at least 0.")
+    check_whole("seeds", seeds, least=0)
     for task in tasks:
         tested = [*split_episodes((task,), splits), *_random(task, 0, seeds)]
         for setting in (one for one in settings if one in settings_of(get_task(task))):
@@ -255,8 +258,8 @@ def shortcut_table(rows: Sequence[ShortcutRow], title: str, by: Grouping | None 
     if compared:
         table.add_column("text-only over chance", justify="right")
         table.caption += (
-            " Over chance: points of slots above the larger of chance and majority, with "
-            f"intervals corrected for {len(compared)} rows."
+            " Over chance: points of slots above the larger of chance and majority, with 95 % "
+            f"intervals, Bonferroni-adjusted for {counted(len(compared), 'row')}."
         )
     for row in rows:
         cells = [_cell(one) for one in row.shares.values()]
@@ -267,7 +270,7 @@ def shortcut_table(rows: Sequence[ShortcutRow], title: str, by: Grouping | None 
 
 
 def excess_text(excess: Excess | None, count: int) -> str:
-    """Return an excess in points with its interval, corrected for `count` of them."""
+    """Return an excess in points with its interval, Bonferroni-adjusted for `count` of them."""
     if excess is None:
         return "–"
     low, high = excess.interval(count)

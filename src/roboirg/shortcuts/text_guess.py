@@ -27,7 +27,7 @@ from roboirg.shortcuts.named_values import (
     pointed_value,
 )
 from roboirg.shortcuts.surface_rules import SURFACE_RULES, Candidates, SlotWords
-from roboirg.tasks import get_task
+from roboirg.tasks import get_task, goals_of
 
 TextGuess = Mapping[str, tuple[Candidates, ...]]
 """Candidates for each place of each slot; within a place they are equally likely."""
@@ -70,7 +70,7 @@ def slot_share(guess: TextGuess, slot: str, content: SlotValue) -> Fraction:
 def goal_share(guess: TextGuess, episode: Episode) -> Fraction:
     """Return the probability that a guess is the right goal."""
     total = Fraction(0)
-    for goal in get_task(episode.task).goals(episode.scene):
+    for goal in goals_of(episode):
         probability = sum((_probability(guess, slots) for slots in orders(goal)), Fraction(0))
         if probability and is_right(goal, episode):
             total += probability
@@ -83,7 +83,7 @@ def draw_goal(guess: TextGuess, episode: Episode, rng: np.random.Generator) -> G
         slot: tuple(candidates[int(rng.integers(len(candidates)))] for candidates in places)
         for slot, places in guess.items()
     }
-    for goal in get_task(episode.task).goals(episode.scene):
+    for goal in goals_of(episode):
         for slots in orders(goal):
             if {slot: values_in(content) for slot, content in slots.items()} == drawn:
                 return goal

@@ -22,7 +22,7 @@ from roboirg.core import object_sizes
 from roboirg.core.episode import ObjectKind, SceneObject
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.motions import Point
-from roboirg.simulation.rendering.tube_mesh import Rgba, tube
+from roboirg.simulation.rendering.tube_mesh import Rgba, tube_mesh
 
 Triple = tuple[float, float, float]
 Cuboid = tuple[Triple, Triple]
@@ -73,7 +73,7 @@ class Body:
     @property
     def position(self) -> Point:
         """Position of the object's origin, world frame, m."""
-        return Point(*(float(value) for value in self.entity.pose.p))
+        return Point(*self.entity.pose.p.tolist())
 
     @property
     def yaw(self) -> float:
@@ -185,21 +185,14 @@ def _build_container(scene: sapien.Scene, item: SceneObject, visible: bool) -> B
     return finish_body(builder, scene, item, "dynamic")
 
 
-def _build_target(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """Build a ringed disc, purple unless the scene gives a color."""
-    half = (item.thickness or object_sizes.TARGET_THICKNESS) / 2
-    return _ringed_disc(scene, item, _rgba(item, PURPLE), half, visible)
+def _build_disc(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    """Build five concentric discs, colored and white in turn, without collision shapes.
 
-
-def _build_marker(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """Build a red ringed disc, thick enough to cover a target."""
-    return _ringed_disc(scene, item, RED, object_sizes.MARKER_HALF_THICKNESS, visible)
-
-
-def _ringed_disc(
-    scene: sapien.Scene, item: SceneObject, rgba: Rgba, half: float, visible: bool
-) -> Body:
-    """Build five concentric discs, colored and white in turn, without collision shapes."""
+    A target is purple unless the scene gives a color; a red marker is thick enough to cover one.
+    """
+    rgba, half = _rgba(item, PURPLE), (item.thickness or object_sizes.TARGET_THICKNESS) / 2
+    if item.kind == "marker":
+        rgba, half = RED, object_sizes.MARKER_HALF_THICKNESS
     radius = float(item.radius or 0.0)
     builder = ActorBuilder()
     for index, share in enumerate(RING_SHARES if visible else ()):
@@ -297,7 +290,8 @@ def _build_tape(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     body = finish_body(builder, scene, item, "dynamic")
     if visible:
         component = sapien.render.RenderBodyComponent()
-        component.attach(tube(outer, inner, object_sizes.TAPE_HALF, COLOR_RGBA[str(item.color)]))
+        mesh = tube_mesh(outer, inner, object_sizes.TAPE_HALF, COLOR_RGBA[str(item.color)])
+        component.attach(mesh.clone())
         body.entity.add_component(component)
     return body
 
@@ -344,12 +338,12 @@ _BUILDERS: dict[ObjectKind, BodyBuilder] = {
     "cube": _build_cube,
     "hidden_cube": _build_cube,
     "container": _build_container,
-    "target": _build_target,
+    "target": _build_disc,
     "button": _build_button,
     "bin": _build_bin,
     "site": _build_site,
     "shuttle": _build_shuttle,
-    "marker": _build_marker,
+    "marker": _build_disc,
     "box": _build_box,
     "tape": _build_tape,
 }

@@ -31,11 +31,9 @@ from roboirg.simulation.rendering.shaders import (
 from roboirg.simulation.rendering.viewpoint import (
     FAR,
     FIELD_OF_VIEW,
-    FRONT_EYE,
-    FRONT_TARGET,
     NEAR,
     SIZE,
-    look_at,
+    front_camera_pose,
 )
 
 GEOMETRY = "PositionSegmentation"
@@ -74,7 +72,7 @@ class Cameras:
         self._color = COLOR if shader else STOCK_COLOR
         self._components = {name: _make_camera(name, shader) for name in CAMERAS}
         fixed.add_component(self._components[FRONT])
-        fixed.set_pose(look_at(FRONT_EYE, FRONT_TARGET))
+        fixed.set_pose(front_camera_pose())
         scene.add_entity(fixed)
         robot.links[CAMERA_LINK].entity.add_component(self._components[WRIST])
         for component in self._components.values() if rendering.quick_start else ():
@@ -100,11 +98,11 @@ class Cameras:
 
     def depth(self, camera: str) -> NDArray[np.int16]:
         """Return the depth in mm, shape (256, 256, 1); 0 where nothing is visible."""
-        return np.asarray(-self._draw_and_fetch(camera, GEOMETRY)[..., 2:3], dtype=np.int16)
+        return np.asarray(-self._geometry(camera)[..., 2:3], dtype=np.int16)
 
     def segmentation(self, camera: str) -> NDArray[np.int16]:
         """Return the ``entity.per_scene_id`` at each pixel, shape (256, 256)."""
-        return np.asarray(self._draw_and_fetch(camera, GEOMETRY)[..., 3], dtype=np.int16).copy()
+        return np.asarray(self._geometry(camera)[..., 3], dtype=np.int16).copy()
 
     def extrinsic(self, camera: str) -> NDArray[np.float32]:
         """Return the world-to-camera matrix (3, 4): x right, y down, z forward (OpenCV)."""
@@ -163,9 +161,9 @@ class Cameras:
         finally:
             self._frozen = False
 
-    def _draw_and_fetch(self, camera: str, output: str) -> NDArray[np.integer[Any]]:
+    def _geometry(self, camera: str) -> NDArray[np.integer[Any]]:
         self.draw((camera,))
-        return self._fetch(camera, output)
+        return self._fetch(camera, GEOMETRY)
 
     def _fetch(self, camera: str, output: str) -> NDArray[np.integer[Any]]:
         """Return an output of the camera's last drawing."""

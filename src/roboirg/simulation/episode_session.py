@@ -48,8 +48,8 @@ class EpisodeSession:
     ) -> None:
         self.episode = episode
         self.world = World(episode.scene, visible=visible, rendering=rendering)
-        self.judge = _judge_of(episode)
-        self.original = None if original is None else _judge_of(original)
+        self.judge = Judge.of(episode)
+        self.original = None if original is None else Judge.of(original)
         self.events: list[Event] = list(changes(0, frozenset(), self.world.facts))
         self.attempts: list[Event] = []
         self._judge()
@@ -155,10 +155,6 @@ class EpisodeSession:
         for judge in self._judges:
             judge.update(self.world.elapsed, self.world.facts)
         self.world.note_stage(self.judge.index)
-
-
-def _judge_of(episode: Episode) -> Judge:
-    return Judge((*episode.demonstration, *episode.stages), episode.scene)
 
 
 def _body_state(body: Body) -> list[NDArray[Any]]:

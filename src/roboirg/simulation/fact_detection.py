@@ -201,7 +201,7 @@ class FactDetector:
         return tuple(body for body in self._bodies if body.item.kind == kind)
 
     def _tool_now(self) -> Point:
-        return Point(*(float(value) for value in self._robot.tool_pose.p))
+        return Point(*self._robot.tool_pose.p.tolist())
 
 
 # No bound methods: the cycle would keep the world until the next collection.

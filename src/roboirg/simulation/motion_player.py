@@ -81,11 +81,13 @@ class _ScriptedMotion(ABC, Generic[M]):
         stopped: whether the object has stopped permanently.
     """
 
+    absent = False
+    stopped = False
+
     def __init__(self, motion: M, bodies: Bodies, spot: Point) -> None:
         self._motion, self._bodies, self._spot = motion, bodies, spot
         self.subject = motion.first if isinstance(motion, Swap) else motion.subject
         self._body = bodies[self.subject]
-        self.absent = self.stopped = False
 
     @abstractmethod
     def before_step(self, context: MotionContext) -> None: ...
@@ -147,10 +149,8 @@ class _ShuttleMotion(_ScriptedMotion[Shuttle]):
 
 
 class _GlowMotion(_ScriptedMotion[Glow]):
-    def __init__(self, motion: Glow, bodies: Bodies, spot: Point) -> None:
-        super().__init__(motion, bodies, spot)
-        self._last: int | None = None
-        self.absent = True
+    absent = True
+    _last: int | None = None
 
     def before_step(self, context: MotionContext) -> None:
         if self._motion.during in context.facts:

@@ -19,7 +19,7 @@ from roboirg.core.actions import ARM_JOINTS
 from roboirg.core.episode import ROBOT_BASE
 from roboirg.core.observations import CAMERAS, FRONT
 from roboirg.simulation import physics_settings
-from roboirg.simulation.model_files import find_model_files
+from roboirg.simulation.model_files import ROBOT_FILE, find_model_files
 from roboirg.simulation.rendering.culling import CullableBody
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.simulation.rendering.robot_meshes import apply_shading, link_hull, link_shapes
@@ -232,7 +232,7 @@ class _PandaLoader(URDFLoader):  # type: ignore[misc]  # SAPIEN's wrappers have 
             self.set_link_material(finger, 2.0, 2.0, 0.0)
             self.set_link_patch_radius(finger, 0.1)
             self.set_link_min_patch_radius(finger, 0.1)
-        urdf = find_model_files().robot
+        urdf = find_model_files() / ROBOT_FILE
         builders, _, _ = self.parse(str(urdf), str(urdf.with_suffix(".srdf")))
         self.builder = builders[0]
 

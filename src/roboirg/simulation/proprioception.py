@@ -66,7 +66,7 @@ def euler_angles(pose: sapien.Pose) -> NDArray[np.float64]:
     Uses the formulas of Bernardes and Viollet (2022), as SciPy does, and gives the same bits;
     importing SciPy would take a fifth of a process's startup time.
     """
-    w, x, y, z = (float(number) for number in pose.q)
+    w, x, y, z = pose.q.tolist()
     # The order of the sum determines the last bit.
     norm = math.sqrt(x * x + y * y + z * z + w * w)
     w, x, y, z = w / norm, x / norm, y / norm, z / norm

@@ -11,7 +11,7 @@ import sapien
 import sapien.render
 from sapien.wrapper.actor_builder import ActorBuilder
 
-from roboirg.simulation.model_files import find_model_files
+from roboirg.simulation.model_files import GROUND_FILE, TABLE_FILE, find_model_files
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.simulation.rendering.table_mesh import table_shape
 
@@ -60,7 +60,9 @@ def _add_table(scene: sapien.Scene, *, visible: bool, rendering: RenderSettings)
     turned = sapien.Pose(q=QUARTER_TURN)
     stock = rendering.meshes == "stock"
     if visible and stock:
-        builder.add_visual_from_file(str(find_model_files().table), turned, [TABLE_SCALE] * 3)
+        builder.add_visual_from_file(
+            str(find_model_files() / TABLE_FILE), turned, [TABLE_SCALE] * 3
+        )
     builder.set_physx_body_type("kinematic")
     builder.set_initial_pose(sapien.Pose(TABLE_POSITION, QUARTER_TURN))
     table = builder.build(name="table")
@@ -111,7 +113,7 @@ def _floor_piece(
     )
     material = sapien.render.RenderMaterial()
     material.base_color_texture = sapien.render.RenderTexture2D(
-        filename=str(find_model_files().ground_texture), mipmap_levels=4
+        filename=str(find_model_files() / GROUND_FILE), mipmap_levels=4
     )
     return sapien.render.RenderShapeTriangleMesh(
         vertices=vertices.astype(np.float32),

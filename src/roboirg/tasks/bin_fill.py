@@ -26,19 +26,18 @@ from roboirg.core.episode import (
 from roboirg.core.footprints import Obstacle, Region
 from roboirg.core.motions import Away, Motion, Vanish
 from roboirg.core.plain_text import counted
-from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     bin_keep_out,
-    button_footprint,
     button_keep_out,
     draw_bin,
     draw_button,
     draw_cubes,
     draw_number,
+    footprint,
 )
 from roboirg.tasks.shared.stages import PRESSED, press_stage
-from roboirg.tasks.task import Commands, Task, Wording
+from roboirg.tasks.task import Commands, Task, command_pools
 
 COLORS_PRESENT: dict[Difficulty, int] = {"easy": 1, "medium": 2, "hard": 3}
 CUBES: dict[Difficulty, tuple[int, int]] = {"easy": (4, 6), "medium": (8, 10), "hard": (10, 12)}
@@ -67,7 +66,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     late = bool(rng.integers(2))
     button = draw_button(rng, BUTTON_REGION)
     # RoboMME places the bin without looking at the button; here its walls stay off the base.
-    bin_ = draw_bin(rng, BIN_REGION, [button_footprint(button)])
+    bin_ = draw_bin(rng, BIN_REGION, [footprint(button)])
     present = [COLORS[index] for index in rng.permutation(len(COLORS))]
     present = present[: COLORS_PRESENT[difficulty]]
     wanted = _draw_wanted(rng, difficulty, present)
@@ -212,16 +211,16 @@ def _binned(cubes: Iterable[str]) -> tuple[Fact, ...]:
 COMMANDS = Commands(
     by_place="cube[|s] like the one {place}",
     by_rank="cube[|s] like {place}",
-    wordings=Pools(
+    wordings=command_pools(
         train=(
-            Wording("Put {cubes} into the bin and press the button."),
-            Wording("Drop {cubes} into the bin and press the button."),
-            Wording("Place {cubes} in the bin and press the button."),
+            "Put {cubes} into the bin and press the button.",
+            "Drop {cubes} into the bin and press the button.",
+            "Place {cubes} in the bin and press the button.",
         ),
         test=(
-            Wording("Move {cubes} into the bin and push the button."),
-            Wording("Toss {cubes} into the bin and push the button."),
-            Wording("Throw {cubes} in the bin and press the button."),
+            "Move {cubes} into the bin and push the button.",
+            "Toss {cubes} into the bin and push the button.",
+            "Throw {cubes} in the bin and press the button.",
         ),
     ),
 )

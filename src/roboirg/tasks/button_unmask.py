@@ -13,11 +13,10 @@ import numpy as np
 
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.core.footprints import Region
-from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask
 from roboirg.tasks.shared.fixtures import draw_button
 from roboirg.tasks.shared.stages import press_stage
-from roboirg.tasks.task import Task, Wording
+from roboirg.tasks.task import Task, command_pools
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.05)
 
@@ -34,26 +33,22 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 COMMANDS = replace(
     unmask.container_commands(
-        Pools(
+        command_pools(
             train=(
-                Wording("Press the button, then lift {colors.0}."),
-                Wording("Press the button and lift {colors.0}."),
-                Wording("First press the button, then lift {colors.0}."),
-                Wording("Press the button, lift {colors.0}, put it down, then lift {colors.1}.", 2),
-                Wording("Press the button, lift {colors.0}, set it down, and lift {colors.1}.", 2),
-                Wording("Press the button, lift {colors.0}, put it back, then lift {colors.1}.", 2),
+                "Press the button, then lift {colors.0}.",
+                "Press the button and lift {colors.0}.",
+                "First press the button, then lift {colors.0}.",
+                "Press the button, lift {colors.0}, put it down, then lift {colors.1}.",
+                "Press the button, lift {colors.0}, set it down, and lift {colors.1}.",
+                "Press the button, lift {colors.0}, put it back, then lift {colors.1}.",
             ),
             test=(
-                Wording("Push the button, then raise {colors.0}."),
-                Wording("Push the button and pick up {colors.0}."),
-                Wording("Start by pushing the button, then raise {colors.0}."),
-                Wording(
-                    "Push the button, raise {colors.0}, put it back, then raise {colors.1}.", 2
-                ),
-                Wording(
-                    "Push the button, pick up {colors.0}, put it back and pick up {colors.1}.", 2
-                ),
-                Wording("Push the button, raise {colors.0}, set it back, and raise {colors.1}.", 2),
+                "Push the button, then raise {colors.0}.",
+                "Push the button and pick up {colors.0}.",
+                "Start by pushing the button, then raise {colors.0}.",
+                "Push the button, raise {colors.0}, put it back, then raise {colors.1}.",
+                "Push the button, pick up {colors.0}, put it back and pick up {colors.1}.",
+                "Push the button, raise {colors.0}, set it back, and raise {colors.1}.",
             ),
         )
     ),

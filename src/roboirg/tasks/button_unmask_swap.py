@@ -13,12 +13,11 @@ import numpy as np
 from roboirg.core.conditions import All, Fact, FactCount, OccurrenceCount
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.core.footprints import Region
-from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask, unmask_swap
 from roboirg.tasks.shared.fixtures import button_keep_out, draw_button
 from roboirg.tasks.shared.layouts import PlanePoint
 from roboirg.tasks.shared.stages import press_stage
-from roboirg.tasks.task import Task, Wording
+from roboirg.tasks.task import Task, command_pools
 
 RIGHT, LEFT = "button_right", "button_left"
 """On the robot's right (smaller y) and left."""
@@ -65,34 +64,22 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 COMMANDS = replace(
     unmask.container_commands(
-        Pools(
+        command_pools(
             train=(
-                Wording("Press both buttons, then lift {colors.0}."),
-                Wording("Press both buttons and lift {colors.0}."),
-                Wording("First press both buttons, then lift {colors.0}."),
-                Wording(
-                    "Press both buttons, lift {colors.0}, put it down, then lift {colors.1}.", 2
-                ),
-                Wording(
-                    "Press both buttons, lift {colors.0}, set it down, and lift {colors.1}.",
-                    2,
-                ),
-                Wording("Press both buttons, lift {colors.0}, put it back and lift {colors.1}.", 2),
+                "Press both buttons, then lift {colors.0}.",
+                "Press both buttons and lift {colors.0}.",
+                "First press both buttons, then lift {colors.0}.",
+                "Press both buttons, lift {colors.0}, put it down, then lift {colors.1}.",
+                "Press both buttons, lift {colors.0}, set it down, and lift {colors.1}.",
+                "Press both buttons, lift {colors.0}, put it back and lift {colors.1}.",
             ),
             test=(
-                Wording("Push both buttons, then raise {colors.0}."),
-                Wording("Push both buttons and pick up {colors.0}."),
-                Wording("Start by pushing both buttons, then raise {colors.0}."),
-                Wording(
-                    "Push both buttons, raise {colors.0}, put it back, then raise {colors.1}.", 2
-                ),
-                Wording(
-                    "Push both buttons, raise {colors.0}, put it back and raise {colors.1}.",
-                    2,
-                ),
-                Wording(
-                    "Push both buttons, raise {colors.0}, set it back, and raise {colors.1}.", 2
-                ),
+                "Push both buttons, then raise {colors.0}.",
+                "Push both buttons and pick up {colors.0}.",
+                "Start by pushing both buttons, then raise {colors.0}.",
+                "Push both buttons, raise {colors.0}, put it back, then raise {colors.1}.",
+                "Push both buttons, raise {colors.0}, put it back and raise {colors.1}.",
+                "Push both buttons, raise {colors.0}, set it back, and raise {colors.1}.",
             ),
         )
     ),

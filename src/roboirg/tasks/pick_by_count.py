@@ -13,11 +13,10 @@ import numpy as np
 from roboirg.core.conditions import Elapsed, Fact, Rule
 from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stage
 from roboirg.core.footprints import Circle, Footprint, Region
-from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import counted_goals, draw_number, draw_target
 from roboirg.tasks.shared.real_table import draw_sides, draw_tape, on_side
 from roboirg.tasks.shared.stages import placing_stages
-from roboirg.tasks.task import Commands, Task, Wording
+from roboirg.tasks.task import Commands, Task, command_pools
 
 TAPES: tuple[Color, ...] = ("yellow", "gray")
 REPEATS = (1, 2)
@@ -81,16 +80,16 @@ COMMANDS = Commands(
     by_place="the tape {place}",
     pointed="tape",
     things_at="the tape {place}",
-    wordings=Pools(
+    wordings=command_pools(
         train=(
-            Wording("Take {color} and place it on the target {repeats}."),
-            Wording("Put {color} on the target {repeats}."),
-            Wording("Please place {color} on the target {repeats}."),
+            "Take {color} and place it on the target {repeats}.",
+            "Put {color} on the target {repeats}.",
+            "Please place {color} on the target {repeats}.",
         ),
         test=(
-            Wording("Grab {color} and set it on the target {repeats}."),
-            Wording("Lay {color} on the target {repeats}."),
-            Wording("Please set {color} on the target {repeats}."),
+            "Grab {color} and set it on the target {repeats}.",
+            "Lay {color} on the target {repeats}.",
+            "Please set {color} on the target {repeats}.",
         ),
     ),
 )

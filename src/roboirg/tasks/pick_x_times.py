@@ -13,7 +13,6 @@ import numpy as np
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.core.footprints import Region
-from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
     counted_goals,
     draw_button_and_cubes,
@@ -21,7 +20,7 @@ from roboirg.tasks.shared.fixtures import (
     draw_target,
 )
 from roboirg.tasks.shared.stages import PRESSED, placing_stages, press_stage
-from roboirg.tasks.task import Commands, Task, Wording
+from roboirg.tasks.task import Commands, Task, command_pools
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
 REPEATS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 3), "medium": (1, 3), "hard": (4, 5)}
@@ -59,16 +58,16 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 COMMANDS = Commands(
-    wordings=Pools(
+    wordings=command_pools(
         train=(
-            Wording("Put {color} on the target {repeats}, then press the button."),
-            Wording("Take {color} and place it on the target {repeats}, then press the button."),
-            Wording("Place {color} on the target {repeats} and press the button."),
+            "Put {color} on the target {repeats}, then press the button.",
+            "Take {color} and place it on the target {repeats}, then press the button.",
+            "Place {color} on the target {repeats} and press the button.",
         ),
         test=(
-            Wording("Set {color} on the target {repeats}, then push the button."),
-            Wording("Grab {color}, set it down on the target {repeats}, then press the button."),
-            Wording("Lay {color} on the target {repeats} and push the button."),
+            "Set {color} on the target {repeats}, then push the button.",
+            "Grab {color}, set it down on the target {repeats}, then press the button.",
+            "Lay {color} on the target {repeats} and push the button.",
         ),
     ),
 )

@@ -12,16 +12,15 @@ import numpy as np
 from roboirg.core.conditions import Fact, Rule
 from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stage
 from roboirg.core.footprints import Footprint, Region
-from roboirg.core.word_pools import Pools
+from roboirg.tasks.shared.fixtures import footprint
 from roboirg.tasks.shared.real_table import (
-    box_footprint,
     draw_box,
     draw_sides,
     draw_tape,
     on_side,
 )
 from roboirg.tasks.shared.stages import pick_stage
-from roboirg.tasks.task import Commands, Task, Wording
+from roboirg.tasks.task import Commands, Task, command_pools
 
 BOXES: tuple[Color, ...] = ("green", "purple")
 TAPE: Color = "yellow"
@@ -39,7 +38,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
         draw_box(rng, f"box_{color}", color, on_side(LEFT_BOX_REGION, sides[color]))
         for color in BOXES
     )
-    obstacles: list[Footprint] = [box_footprint(box) for box in boxes]
+    obstacles: list[Footprint] = [footprint(box) for box in boxes]
     tape = draw_tape(rng, "tape", TAPE, TAPE_REGION, TAPE_GAP, obstacles)
     goal = Goal.of(color=str(BOXES[int(rng.integers(len(BOXES)))]))
     return Scene((*boxes, tape)), goal
@@ -81,16 +80,16 @@ COMMANDS = Commands(
     by_place="the box {place}",
     pointed="box",
     things_at="the box {place}",
-    wordings=Pools(
+    wordings=command_pools(
         train=(
-            Wording("Put the tape into {color}."),
-            Wording("Please place the tape into {color}."),
-            Wording("Drop the tape into {color}."),
+            "Put the tape into {color}.",
+            "Please place the tape into {color}.",
+            "Drop the tape into {color}.",
         ),
         test=(
-            Wording("Lay the tape in {color}."),
-            Wording("Move the tape into {color}."),
-            Wording("Please set the tape into {color}."),
+            "Lay the tape in {color}.",
+            "Move the tape into {color}.",
+            "Please set the tape into {color}.",
         ),
     ),
 )

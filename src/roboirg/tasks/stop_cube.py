@@ -15,9 +15,8 @@ from roboirg.core.conditions import All, Elapsed, Fact, OccurrenceCount, Rule, a
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.footprints import Region
 from roboirg.core.motions import Point, Shuttle
-from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import ORDINALS, draw_button
-from roboirg.tasks.task import Commands, Task, Wording
+from roboirg.tasks.task import Commands, Task, command_pools
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
 TARGET_REGION = Region(0.0, 0.0, 0.1, 0.1)
@@ -129,16 +128,16 @@ def _wrong(interval: int, visit: int) -> tuple[Rule, ...]:
 
 
 COMMANDS = Commands(
-    wordings=Pools(
+    wordings=command_pools(
         train=(
-            Wording("Press the button to stop the cube on the target {visit}."),
-            Wording("Use the button to stop the cube on the target {visit}."),
-            Wording("Stop the cube on the target {visit} by pressing the button."),
+            "Press the button to stop the cube on the target {visit}.",
+            "Use the button to stop the cube on the target {visit}.",
+            "Stop the cube on the target {visit} by pressing the button.",
         ),
         test=(
-            Wording("Push the button so that the cube stops on the target {visit}."),
-            Wording("Halt the cube on the target {visit} by pushing the button."),
-            Wording("Push the button to make the cube stop on the target {visit}."),
+            "Push the button so that the cube stops on the target {visit}.",
+            "Halt the cube on the target {visit} by pushing the button.",
+            "Push the button to make the cube stop on the target {visit}.",
         ),
     ),
 )

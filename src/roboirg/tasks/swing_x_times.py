@@ -15,7 +15,6 @@ from roboirg.core.conditions import Fact, OccurrenceCount, Rule
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.footprints import Circle, Region
 from roboirg.core.motions import Glow
-from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     counted_goals,
@@ -25,7 +24,7 @@ from roboirg.tasks.shared.fixtures import (
     marker_over,
 )
 from roboirg.tasks.shared.stages import PRESSED, pick_stage, press_stage
-from roboirg.tasks.task import Commands, Task, Wording
+from roboirg.tasks.task import Commands, Task, command_pools
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
 REPEATS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 3), "medium": (1, 2), "hard": (3, 3)}
@@ -116,31 +115,31 @@ def _swing(cube: str, side: str, ordinal: str, wrong: tuple[Fact | Rule, ...]) -
 
 
 COMMANDS = Commands(
-    wordings=Pools(
+    wordings=command_pools(
         train=(
-            Wording(
+            (
                 "Swing {color} from your right to your left target {repeats}, put it "
                 "down and press the button."
             ),
-            Wording(
+            (
                 "Move {color} from your right to your left target {repeats}, put "
                 "it down and press the button."
             ),
-            Wording(
+            (
                 "Bring {color} from your right to your left target {repeats}, "
                 "set it down and press the button."
             ),
         ),
         test=(
-            Wording(
+            (
                 "Carry {color} from your right to your left target "
                 "{repeats}, set it down and push the button."
             ),
-            Wording(
+            (
                 "Grab {color}, swing it from your right to your left target {repeats}, "
                 "put it down and press the button."
             ),
-            Wording(
+            (
                 "Swing {color} from your right to your left target {repeats}, "
                 "put it down and push the button."
             ),

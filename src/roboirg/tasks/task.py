@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -10,6 +11,9 @@ import numpy as np
 
 from roboirg.core.episode import COLORS, Color, Difficulty, Goal, ObjectKind, Scene, Stage, Suite
 from roboirg.core.word_pools import Pools
+
+_NUMBERED = re.compile(r"\{\w+\.\d+\}")
+"""A field for one of several values, each of which is about an object."""
 
 
 def _no_stages(_scene: Scene) -> tuple[Stage, ...]:
@@ -27,7 +31,17 @@ class Wording(NamedTuple):
     """
 
     text: str
-    parts: int = 1
+    parts: int
+
+
+def command_pools(*, train: tuple[str, ...], test: tuple[str, ...]) -> Pools[Wording]:
+    """Return the sentences of a command as its wordings in both pools."""
+    return Pools(tuple(map(_wording, train)), tuple(map(_wording, test)))
+
+
+def _wording(text: str) -> Wording:
+    numbered = set(_NUMBERED.findall(text))
+    return Wording(text, len(numbered) or 1)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,9 @@ import numpy as np
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
-from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import video_place
 from roboirg.tasks.shared.stages import PRESSED
-from roboirg.tasks.task import Commands, Task, Wording
+from roboirg.tasks.task import Commands, Task, command_pools
 
 DISCS: dict[Difficulty, int] = {"easy": 3, "medium": 4, "hard": 4}
 SITE_RADIUS = 0.06
@@ -49,16 +48,16 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 COMMANDS = Commands(
-    wordings=Pools(
+    wordings=command_pools(
         train=(
-            Wording("Think back to the video and put {color} on {relation}."),
-            Wording("You saw the video, so put {color} on {relation}."),
-            Wording("Going by the video, place {color} on {relation}."),
+            "Think back to the video and put {color} on {relation}.",
+            "You saw the video, so put {color} on {relation}.",
+            "Going by the video, place {color} on {relation}.",
         ),
         test=(
-            Wording("Going by what you saw, set {color} on {relation}."),
-            Wording("Keep the video in mind and place {color} on {relation}."),
-            Wording("You watched the video, so set {color} on {relation}."),
+            "Going by what you saw, set {color} on {relation}.",
+            "Keep the video in mind and place {color} on {relation}.",
+            "You watched the video, so set {color} on {relation}.",
         ),
     ),
 )

@@ -11,11 +11,10 @@ import numpy as np
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
-from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import video_place
 from roboirg.tasks.shared.fixtures import draw_number
 from roboirg.tasks.shared.stages import PRESSED
-from roboirg.tasks.task import Commands, Task, Wording
+from roboirg.tasks.task import Commands, Task, command_pools
 
 DISCS = 4
 PLACEMENTS = (2, 4)
@@ -54,16 +53,16 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 
 COMMANDS = Commands(
-    wordings=Pools(
+    wordings=command_pools(
         train=(
-            Wording("Think back to the video and put {color} on {placement}."),
-            Wording("You saw the video, so put {color} on {placement}."),
-            Wording("Going by the video, place {color} on {placement}."),
+            "Think back to the video and put {color} on {placement}.",
+            "You saw the video, so put {color} on {placement}.",
+            "Going by the video, place {color} on {placement}.",
         ),
         test=(
-            Wording("Going by what you saw, set {color} on {placement}."),
-            Wording("Keep the video in mind and place {color} on {placement}."),
-            Wording("You watched the video, so set {color} on {placement}."),
+            "Going by what you saw, set {color} on {placement}.",
+            "Keep the video in mind and place {color} on {placement}.",
+            "You watched the video, so set {color} on {placement}.",
         ),
     ),
 )

@@ -15,7 +15,6 @@ from roboirg.core.conditions import All, Elapsed, Fact, Rule
 from roboirg.core.episode import COLORS, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.footprints import Region
 from roboirg.core.motions import Swap
-from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     button_keep_out,
@@ -33,7 +32,7 @@ from roboirg.tasks.shared.stages import (
     retreat,
 )
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS, plan_swaps
-from roboirg.tasks.task import Commands, Task, Wording
+from roboirg.tasks.task import Commands, Task, command_pools
 
 REPEATS = (1, 3)
 SWAPS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 2), "medium": (2, 3), "hard": (0, 0)}
@@ -167,34 +166,28 @@ def _early_press(timer: str) -> Rule:
 
 
 COMMANDS = Commands(
-    wordings=Pools(
+    wordings=command_pools(
         train=(
-            Wording(
+            (
                 "Take the cube picked up in the video, lift it and put it down {repeats}, then "
                 "press the button."
             ),
-            Wording(
+            (
                 "Find the cube lifted in the video and repeat the action {repeats}, then press "
                 "the button."
             ),
-            Wording(
-                "As in the video, lift the same cube and put it down {repeats}, then press the "
-                "button."
-            ),
+            "As in the video, lift the same cube and put it down {repeats}, then press the button.",
         ),
         test=(
-            Wording(
+            (
                 "Grab the cube raised in the video and repeat the action {repeats}, then push "
                 "the button."
             ),
-            Wording(
+            (
                 "Take the cube held in the video, raise it and put it back "
                 "{repeats}, then push the button."
             ),
-            Wording(
-                "Raise the cube lifted in the video and put it back {repeats}, then push the "
-                "button."
-            ),
+            "Raise the cube lifted in the video and put it back {repeats}, then push the button.",
         ),
     ),
 )

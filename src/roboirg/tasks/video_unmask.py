@@ -8,10 +8,9 @@ Facts: RoboMME.
 from __future__ import annotations
 
 from roboirg.core.episode import Scene, Stage
-from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask
 from roboirg.tasks.shared.stages import hold_still
-from roboirg.tasks.task import Task, Wording
+from roboirg.tasks.task import Task, command_pools
 
 HOLD_STEPS = 64
 
@@ -22,22 +21,22 @@ def demonstration(_scene: Scene) -> tuple[Stage, ...]:
 
 
 COMMANDS = unmask.container_commands(
-    Pools(
+    command_pools(
         train=(
-            Wording("Think back to the video and lift {colors.0}."),
-            Wording("Going by the video, lift {colors.0}."),
-            Wording("Remember the video and lift {colors.0}."),
-            Wording("First lift {colors.0}, put it down, then lift {colors.1}.", 2),
-            Wording("Lift {colors.0}, put it down, then lift {colors.1}.", 2),
-            Wording("Lift {colors.0}, set it down, and lift {colors.1}.", 2),
+            "Think back to the video and lift {colors.0}.",
+            "Going by the video, lift {colors.0}.",
+            "Remember the video and lift {colors.0}.",
+            "First lift {colors.0}, put it down, then lift {colors.1}.",
+            "Lift {colors.0}, put it down, then lift {colors.1}.",
+            "Lift {colors.0}, set it down, and lift {colors.1}.",
         ),
         test=(
-            Wording("Keep the video in mind and raise {colors.0}."),
-            Wording("Going by what you saw, raise {colors.0}."),
-            Wording("Pick up {colors.0}."),
-            Wording("First raise {colors.0}, put it back, then raise {colors.1}.", 2),
-            Wording("Pick up {colors.0}, put it back, and pick up {colors.1}.", 2),
-            Wording("Raise {colors.0}, set it back, and raise {colors.1}.", 2),
+            "Keep the video in mind and raise {colors.0}.",
+            "Going by what you saw, raise {colors.0}.",
+            "Pick up {colors.0}.",
+            "First raise {colors.0}, put it back, then raise {colors.1}.",
+            "Pick up {colors.0}, put it back, and pick up {colors.1}.",
+            "Raise {colors.0}, set it back, and raise {colors.1}.",
         ),
     )
 )

@@ -11,12 +11,11 @@ from dataclasses import replace
 import numpy as np
 
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
-from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared import unmask, unmask_swap
 from roboirg.tasks.shared.layouts import layout_points
 from roboirg.tasks.shared.stages import hold_still
 from roboirg.tasks.shared.swapping import last_step
-from roboirg.tasks.task import Task, Wording
+from roboirg.tasks.task import Task, command_pools
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
@@ -32,22 +31,22 @@ def demonstration(scene: Scene) -> tuple[Stage, ...]:
 
 COMMANDS = replace(
     unmask.container_commands(
-        Pools(
+        command_pools(
             train=(
-                Wording("Think back to the video and lift {colors.0}."),
-                Wording("Going by the video, lift {colors.0}."),
-                Wording("Remember the video and lift {colors.0}."),
-                Wording("Lift {colors.0}, set it down, then lift {colors.1}.", 2),
-                Wording("Lift {colors.0}, put it down, and then lift {colors.1}.", 2),
-                Wording("First lift {colors.0}, put it down, then lift {colors.1}.", 2),
+                "Think back to the video and lift {colors.0}.",
+                "Going by the video, lift {colors.0}.",
+                "Remember the video and lift {colors.0}.",
+                "Lift {colors.0}, set it down, then lift {colors.1}.",
+                "Lift {colors.0}, put it down, and then lift {colors.1}.",
+                "First lift {colors.0}, put it down, then lift {colors.1}.",
             ),
             test=(
-                Wording("Keep the video in mind and raise {colors.0}."),
-                Wording("Going by what you saw, raise {colors.0}."),
-                Wording("Watch the video and pick up {colors.0}."),
-                Wording("Raise {colors.0}, put it back, then raise {colors.1}.", 2),
-                Wording("Pick up {colors.0}, put it back, then pick up {colors.1}.", 2),
-                Wording("First raise {colors.0}, set it back, then raise {colors.1}.", 2),
+                "Keep the video in mind and raise {colors.0}.",
+                "Going by what you saw, raise {colors.0}.",
+                "Watch the video and pick up {colors.0}.",
+                "Raise {colors.0}, put it back, then raise {colors.1}.",
+                "Pick up {colors.0}, put it back, then pick up {colors.1}.",
+                "First raise {colors.0}, set it back, then raise {colors.1}.",
             ),
         )
     ),

@@ -23,7 +23,7 @@ def replacing(path: Path) -> Iterator[Path]:
     old or the new content, never a part, and the content is on the disk before the name is. A
     folder that is missing is made.
     """
-    part = path.with_name(f".{path.name}.{secrets.token_hex(8)}{PART}")
+    part = path.parent / f".{path.name}.{secrets.token_hex(8)}{PART}"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield part
@@ -47,7 +47,7 @@ def write_atomically(path: Path, content: str | bytes) -> None:
 def locked(path: Path, taken: str) -> Iterator[None]:
     """Hold the lock of a file for one process alone; file and folder are made if missing, and stay.
 
-    The kernel releases it when the process ends, however it ends.
+    The kernel releases it when the process ends, however it ends. A symbolic link is refused.
 
     Args:
         path: the file.
@@ -58,7 +58,7 @@ def locked(path: Path, taken: str) -> Iterator[None]:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o644)
     except OSError as error:
         raise InvalidValueError(f"Cannot write {path}: {error.strerror}.") from error
     try:

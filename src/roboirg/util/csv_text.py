@@ -4,15 +4,31 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterable, Mapping
+
+_FORMULA = re.compile(r"[=@\t\r]|[+-](?![\d.,]*%?\Z)")
+"""How a text begins that spreadsheets compute; a signed number is none."""
 
 
 def csv_text(rows: Iterable[Mapping[str, object]]) -> str:
     """Return rows of the same columns under a head; empty without any row."""
     table = list(rows)
+    if not table:
+        return ""
+    return csv_lines([table[0], *(row.values() for row in table)])
+
+
+def csv_lines(rows: Iterable[Iterable[object]]) -> str:
+    """Return rows as lines; an apostrophe keeps spreadsheets from computing a stranger's text."""
     out = io.StringIO()
-    if table:
-        writer = csv.DictWriter(out, list(table[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(table)
+    writer = csv.writer(out, lineterminator="\n")
+    for row in rows:
+        writer.writerow([_cell(value) for value in row])
     return out.getvalue()
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, str) and _FORMULA.match(value):
+        return f"'{value}"
+    return value

@@ -86,39 +86,46 @@ def _guard(number: int) -> None:
 
 
 def _reap(child: int) -> int | None:
-    """Take leave of all dead children; return how one of them ended, None if it has not."""
-    code = None
-    with contextlib.suppress(ChildProcessError):
-        while (found := os.waitpid(-1, os.WNOHANG))[0]:
-            if found[0] == child:
-                code = os.waitstatus_to_exitcode(found[1])
-    return code
+    """Take leave of dead children; return how one of them ended, None if it has not.
+
+    Raises:
+        ChildProcessError: there is no child any more, dead or alive.
+    """
+    while True:
+        pid, status = os.waitpid(-1, os.WNOHANG)
+        if pid == child:
+            return os.waitstatus_to_exitcode(status)
+        if pid == 0:
+            return None
 
 
 def _end_descendants(child: int) -> None:
     """End all that a dead child has started, until nothing is left."""
     # First SIGTERM: Python's resource trackers are among them, and have to clean up.
-    number, until = signal.SIGTERM, time.monotonic() + _TERM_S
+    number, pause_s, until = signal.SIGTERM, 0.01, time.monotonic() + _TERM_S
     with contextlib.suppress(OSError):
         os.killpg(child, number)
-    while found := descendants(os.getpid()):
-        for pid in found:
-            with contextlib.suppress(OSError):
-                os.kill(pid, number)
-        time.sleep(0.01)
-        _reap(child)
-        if time.monotonic() > until:
-            number = signal.SIGKILL
+    # What loses its parent becomes a child of this process: without children nothing is left.
+    with contextlib.suppress(ChildProcessError):
+        while True:
+            for pid in descendants(os.getpid()):
+                with contextlib.suppress(OSError):
+                    os.kill(pid, number)
+            time.sleep(pause_s)
+            _reap(child)
+            if time.monotonic() > until:
+                number, pause_s = signal.SIGKILL, 0.001
 
 
 def descendants(pid: int) -> list[int]:
-    """Return the processes that a process has started, and theirs, the oldest generation first."""
-    children: dict[int, list[int]] = {}
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        with contextlib.suppress(OSError):  # it has ended meanwhile
-            parent = int(path.read_text().rpartition(")")[2].split()[1])
-            children.setdefault(parent, []).append(int(path.parent.name))
+    """Return the processes that a process has started, and theirs, the oldest generation first.
+
+    The kernel lists the children of each, so nothing is read that a process could have written, and
+    it is fast enough for a chain of processes, each of which starts the next one and exits.
+    """
     found = [pid]
-    for one in found:
-        found += children.get(one, [])
+    for process in found:
+        with contextlib.suppress(OSError):  # it has ended meanwhile
+            for thread in Path(f"/proc/{process}/task").iterdir():
+                found += map(int, (thread / "children").read_bytes().split())
     return found[1:]

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.field_types import check_whole
 
 WORKERS_VARIABLE = "ROBOIRG_WORKERS"
 """Environment variable with the number of worker processes of commands."""
@@ -49,7 +50,7 @@ def processor_features() -> str:
 def _fields() -> dict[str, str]:
     """Return what Linux says of the first processor; empty elsewhere."""
     try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return {}
     return {line.partition(":")[0].strip(): line.partition(":")[2].strip() for line in lines[::-1]}
@@ -90,13 +91,11 @@ def worker_count(typed: int | None = None) -> int:
     Raises:
         InvalidValueError: the number is negative, or the variable does not hold one.
     """
-    if typed is not None and not (isinstance(typed, int) and typed >= 0):
-        raise InvalidValueError(
-            f"workers is {typed!r}; it must be a whole number of at least 0 (this process only)."
-        )
+    if typed is not None:
+        return check_whole("workers", typed, least=0)
     text = os.environ.get(WORKERS_VARIABLE)
-    if typed is not None or not text:
-        return core_count() if typed is None else typed
+    if not text:
+        return core_count()
     if not text.isdecimal():
         raise InvalidValueError(f"{WORKERS_VARIABLE} is {text!r}; it must be a number from 0.")
     return int(text)

@@ -6,10 +6,11 @@ import os
 import re
 from importlib.util import find_spec
 from typing import NamedTuple
-from urllib.parse import urlsplit
+from urllib.parse import unquote, urlsplit
 from urllib.request import getproxies_environment, proxy_bypass
 
 from roboirg.core.errors import MissingDependencyError
+from roboirg.core.handed_keys import remember_key
 
 _LOOPBACK = re.compile(r"(.*\.)?localhost\.?|(::ffff:)?127(\.\d+){1,3}|::1|::|0\.0\.0\.0")
 _USABLE = re.compile(r"(https?|socks5h?)://([^\s/?#]*@)?(\[[\da-f:.]+\]|[^\s/:@]+)(:\d{1,5})?/?")
@@ -46,6 +47,9 @@ def proxy_of(url: str) -> Proxy:
                 f"the proxy {re.sub('(?s)//.*@', '//', address)} of {name}"  # without a password
             )
             if _USABLE.fullmatch(address) and (address[0] != "s" or find_spec("socksio")):
+                user = unquote(urlsplit(address).netloc.rpartition("@")[0])
+                remember_key(user)
+                remember_key(user.partition(":")[2])
                 return Proxy(address, f" through {words}")
             raise MissingDependencyError(
                 f"For {url}, {words} cannot be used; write http://, https:// or, with the package "

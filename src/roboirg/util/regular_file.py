@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import stat
 from io import BufferedReader
@@ -37,3 +38,14 @@ def read_regular(path: Path, most: int) -> bytes:
     if len(content) > most:
         raise InvalidValueError(f"{path} has more than {most:,} bytes; no such file is that large.")
     return content
+
+
+def file_hash(path: Path) -> str:
+    """Return the SHA-256 of a file, in hexadecimal.
+
+    Raises:
+        InvalidValueError: it is no regular file.
+        OSError: it cannot be read.
+    """
+    with open_regular(path) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

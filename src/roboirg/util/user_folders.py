@@ -51,6 +51,6 @@ def temporary_folder() -> Path:
     """
     folder = Path(tempfile.gettempdir()) / f"{_NAME}-{os.getuid()}"
     folder.mkdir(mode=0o700, exist_ok=True)
-    if folder.stat().st_uid != os.getuid():
+    if folder.lstat().st_uid != os.getuid():
         raise InvalidValueError(f"The folder {folder} belongs to another user; set HOME.")
     return folder

@@ -240,7 +240,7 @@ def test_other_options_and_folders_are_refused(tmp_path, export, make_plan, monk
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"variations": 0}, "variations is 0; it must be at least 1"),
+        ({"variations": 0}, "variations is 0; it must be a whole number from 1"),
         ({"variations": 2}, "variations is 2, but only disturbed demonstrations vary"),
         ({"format": "robomme-hdf5", "pictures": "lossy-video"}, "holds lossless pictures"),
         ({"size": 8}, "size is 8; it must be an even number from 16"),

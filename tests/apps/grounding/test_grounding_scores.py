@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from forty_replies import FORTY
 from msgspec.structs import replace
 from typer.testing import CliRunner
 
@@ -33,6 +34,7 @@ from roboirg.evaluation.grounding_items.verdicts import guess_chance, judge_repl
 from roboirg.evaluation.records.record import Job
 from roboirg.language import plain_settings
 from roboirg.main import app
+from roboirg.policies.vlm.models import make_model
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
@@ -147,6 +149,38 @@ def test_letters_are_read(reply, right, understood):
     assert verdict.right == (right == item.choice)
 
 
+def test_the_words_of_no_choice_cast_doubt_on_its_letter():
+    for item in items():
+        for letter, choice in zip("ABCD", item.choices, strict=False):
+            for reply in (f"{letter}. {choice}", f"The answer is {letter}: {choice}"):
+                assert judge_reply(item, "choice", reply).understood == letter
+
+
+def test_of_forty_replies_those_without_one_letter_are_counted_as_unreadable():
+    letters = [reply for reply in FORTY if reply.question == "letter"]
+    asked = [item for item in items() if len(item.choices) == 3][: len(letters)]
+    texts = [make_model(reply.options()).read(reply.body()).text for reply in letters]
+    answers = [Answer(item.id, "choice", text) for item, text in zip(asked, texts, strict=True)]
+    (score,) = score_answers(items(), answers, "model")
+    readings = {item.id: reply.reading for item, reply in zip(asked, letters, strict=True)}
+    assert {item.id: verdict.understood for item, verdict in score.judged} == readings
+    assert score.unparsed == list(readings.values()).count(None) > 0
+
+
+def test_thoughts_in_an_answer_are_not_scored():
+    item = item_of("PickXtimes")
+    thoughts = f"<think>{item.goals[0]} or {item.goals[-1]}, the answer is D</think>"
+    for kind in QUESTION_KINDS:
+        assert judge_reply(item, kind, f"{thoughts}\n{right_reply(item, kind)}").right
+        assert judge_reply(item, kind, thoughts).understood is None
+
+
+def test_points_in_a_list_are_all_read_and_numbers_may_be_texts():
+    item = item_of("PickXtimes")
+    points = [{"x": point.x, "y": str(point.y)} for point in item.points]
+    assert judge_reply(item, "points", json.dumps(points)).right
+
+
 def test_slots_are_judged_one_by_one():
     item = item_of("PickXtimes")
     answer = json.loads(item.answer)
@@ -191,7 +225,9 @@ def test_points_of_amounts_have_no_order():
 
 @pytest.mark.parametrize(
     "reply", ["", "[1, 2]", '{"points": 3}', '{"points": []}', '{"x": true, "y": 1}',
-              '{"points": [{"x": "a", "y": 2}]}']
+              '{"points": [{"x": "a", "y": 2}]}', '{"points": [{"x": NaN, "y": 2}]}',
+              '{"points": [{"x": "nan", "y": 2}]}', '{"points": [{"x": 2, "y": 1e400}]}',
+              '{"points": [{"x": "Infinity", "y": 2}]}', '{"x": 1, "y": 2, "x": 3}']
 )  # fmt: skip
 def test_replies_that_point_nowhere_are_no_answer(reply):
     verdict = judge_reply(item_of("PickXtimes"), "points", reply)

@@ -27,6 +27,7 @@ from roboirg.apps.leaderboard.packing import pack_run
 from roboirg.apps.leaderboard.run_verification import verify_run
 from roboirg.core.errors import RoboIRGError
 from roboirg.evaluation.analysis.page.report import write_report
+from roboirg.evaluation.analysis.results.reading import read_frame
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.sources import Source
 from roboirg.evaluation.plan.stored_plans import read_plans, write_plan
@@ -89,6 +90,10 @@ def pack(run: Path) -> Path:
 def merge(run: Path) -> Path:
     merge_runs([run], run.parent / "merged")
     return run.parent / "merged"
+
+
+def read_frame_of(run: Path) -> object:
+    return read_frame([Source(run)], words=True)
 
 
 def report(run: Path) -> Path:
@@ -187,6 +192,9 @@ REFUSED_RECORDS: Mapping[str, tuple[Change, str]] = {
     "cause of 5 MB": (record(outcome="failure", cause="x" * 5_000_000), r"\$\.cause"),
     "version in bidi marks": (record(language_version="\u202e0.0.2"), "control characters"),
     "policy with a line end": (record(policy="random\n"), "control characters"),
+    "policy that is a formula": (record(policy="=cmd|' /C calc'!A0"), "none of = [+] - @"),
+    "task that is a formula": (record(task="@SUM(1)"), "none of = [+] - @"),
+    "setting that is a formula": (option(setting="+1+1"), "none of = [+] - @"),
     "video with a line end": (record(video="videos/a.mp4\n"), "path below"),
     "video outside": (record(video="videos/../../secret.mp4"), "path below"),
     "line of 65 MiB": (
@@ -236,9 +244,54 @@ DAMAGED_LINES: Mapping[str, Change] = {
 
 
 @pytest.mark.parametrize("name", DAMAGED_LINES)
-def test_damaged_lines_are_skipped(name: str, run: Path) -> None:
+def test_damaged_lines_are_skipped_with_a_warning(
+    name: str, run: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     DAMAGED_LINES[name](run)
     assert len(read_records(run)) == 1
+    assert f"{run / RECORDS_FILE} has 1 damaged line, the first is line 1" in caplog.text
+
+
+@pytest.mark.parametrize("reader", [read_frame_of, merge, report])
+def test_what_reads_a_damaged_run_says_so(
+    reader: Reader, run: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    with (run / RECORDS_FILE).open("ab") as file:
+        file.write(b'{"policy": "rand\n{"torn')
+    reader(run)
+    (warning,) = caplog.messages
+    assert "records.jsonl has 1 damaged line, the first is line 3" in warning
+
+
+@pytest.mark.parametrize("reader", [pack, verify])
+def test_a_damaged_run_is_neither_packed_nor_verified(reader: Reader, run: Path) -> None:
+    raw(b'"policy":"random"', b'"policy":"\xff"')(run)
+    assert "has 1 damaged line, the first is line 1" in refusal(reader, run)
+    merged = merge(run)
+    assert len(read_records(merged)) == 1
+    reader(merged)
+
+
+def test_a_mark_of_byte_order_before_the_only_line_is_named(run: Path) -> None:
+    line = (run / RECORDS_FILE).read_bytes().splitlines(keepends=True)[0]
+    (run / RECORDS_FILE).write_bytes(b"\xef\xbb\xbf" + line)
+    assert "has 1 damaged line, the first is line 1" in refusal(read_records, run)
+
+
+def test_a_warning_about_a_pack_names_the_pack(run: Path, caplog: pytest.LogCaptureFixture) -> None:
+    packed = pack(run)
+    with zipfile.ZipFile(packed) as archive:
+        held = {name: archive.read(name) for name in archive.namelist()}
+    held[RECORDS_FILE] += b"damaged\n"
+    manifest = json.loads(held[MANIFEST])
+    manifest["files"][RECORDS_FILE] = hashlib.sha256(held[RECORDS_FILE]).hexdigest()
+    held[MANIFEST] = json.dumps(manifest).encode()
+    with zipfile.ZipFile(packed, "w") as archive:
+        for name, content in held.items():
+            archive.writestr(name, content)
+    with opened_run(packed) as folder:
+        assert len(read_records(folder)) == 2
+    assert f"{packed.name}/{RECORDS_FILE} has 1 damaged line" in caplog.text
 
 
 def _slug(run: Path) -> str:
@@ -358,7 +411,7 @@ PLAN_FILES: Mapping[str, tuple[str, str]] = {
     "Python object": ("tasks: !!python/object/apply:os.abort []\n", "not valid YAML"),
     "deep nesting": ("tasks: " + "[" * 20_000, "nested too deeply"),
     "number of 10,000 digits": ("max_steps: " + "9" * 10_000, "not valid YAML"),
-    "date that cannot be": ("split: 2020-99-99", "not valid YAML"),
+    "date that cannot be": ("split: 2020-99-99", "line 1 has 2020-99-99"),
     "key twice": ("tasks: all\ntasks: all\n", "again"),
     "list as key": ("? [tasks]\n: all\n", "not valid YAML"),
 }

@@ -6,13 +6,12 @@ import expert_world
 import pytest
 from expert_world import HONEST, Honest, OneByOne, record
 
-from roboirg.apps.policy_check.check_result import FAIL, NOTE, PASS, WARN
 from roboirg.apps.policy_check.policy_check import check_policy
 
 PLANTED = []
 
 
-def planted(check, words, verdict=WARN):
+def planted(check, words, verdict="warn"):
     """Declare the check that finds a mistake, words of its message, and the verdict."""
 
     def note(kind):
@@ -22,7 +21,7 @@ def planted(check, words, verdict=WARN):
     return note
 
 
-@planted("reset forgets", "a queue of actions outlives the episode", FAIL)
+@planted("reset forgets", "a queue of actions outlives the episode", "fail")
 class KeepsQueue(OneByOne):
     def __init__(self, seed=0):
         super().__init__(seed)
@@ -65,21 +64,21 @@ def test_a_planted_mistake_is_found_by_name(kind, check, words, verdict):
     assert [one.verdict for one in found] == [verdict]
     assert words in found[0].message
     # And taken for no other.
-    assert {one.check for one in results if one.verdict in (FAIL, WARN)} <= {check}
+    assert {one.check for one in results if one.verdict in ("fail", "warn")} <= {check}
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("kind", HONEST, ids=lambda kind: kind.__name__)
 def test_nothing_is_found_in_honest_policies(kind, seed):
-    assert {one.verdict for one in results_of(kind, seed=seed)} <= {PASS, NOTE}
+    assert {one.verdict for one in results_of(kind, seed=seed)} <= {"pass", "note"}
 
 
 def test_the_expert_s_error_is_told():
     (told,) = [one for one in results_of(Honest) if one.check == "expert"]
-    assert told.verdict == PASS
+    assert told.verdict == "pass"
     assert told.message == (
         "At 20 moments of an expert's episode the answers are 0.000207 rad from what it did; "
         "holding still would be 0.0499."
     )
     (told,) = [one for one in results_of(expert_world.Untrained) if one.check == "expert"]
-    assert told.verdict == NOTE
+    assert told.verdict == "note"

@@ -148,8 +148,9 @@ def test_all_arrangements_are_there_and_neighbors_are_opposites(task):
         ("aa", {}, "'a' is given twice"),
         ("a", {"tasks": ("PickXtimes",)}, "PickXtimes is not a task for a real robot"),
         ("a", {"settings": ("direct", "spatail")}, "no setting of PutInBox 'spatail'"),
-        ("a", {"trials": 0}, "trials is 0; it must be at least 1"),
-        ("a", {"seed": -1}, "seed is -1; it must be at least 0"),
+        (("NA",), {}, "Policy 'NA' has no valid name for records"),
+        ("a", {"trials": 0}, "trials is 0; it must be a whole number from 1"),
+        ("a", {"seed": -1}, "seed is -1; it must be a whole number from 0"),
     ],
 )
 def test_what_cannot_be_is_said(policies, options, words):

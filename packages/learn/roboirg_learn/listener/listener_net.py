@@ -36,10 +36,7 @@ class ListenerNet(nn.Module):
         self.encoders = make_encoders(vocabulary, settings)
         self._tasks = {task: place for place, task in enumerate(vocabulary.tasks)}
         self.tasks = nn.Embedding(len(vocabulary.tasks), WIDTH)
-        layer = nn.TransformerEncoderLayer(
-            WIDTH, HEADS, 2 * WIDTH, dropout=0.0, batch_first=True, norm_first=True
-        )
-        self.encoder = nn.TransformerEncoder(layer, LAYERS, enable_nested_tensor=False)
+        self.encoder = transformer(WIDTH, HEADS, LAYERS)
         self.answer = nn.Linear(WIDTH, len(vocabulary.parts))
         numbers = {part: place for place, part in enumerate(vocabulary.parts)}
         self.goals = {
@@ -58,6 +55,14 @@ class ListenerNet(nn.Module):
         hidden = ~torch.cat([there, *(one.there for one in tokens)], 1)
         parts = self.answer(self.encoder(values, src_key_padding_mask=hidden)[:, 0])
         return [self.goals[one.task] @ own for one, own in zip(inputs, parts, strict=True)]
+
+
+def transformer(width: int, heads: int, layers: int) -> nn.TransformerEncoder:
+    """Return untrained layers of attention, for tokens of `width` numbers."""
+    layer = nn.TransformerEncoderLayer(
+        width, heads, 2 * width, dropout=0.0, batch_first=True, norm_first=True
+    )
+    return nn.TransformerEncoder(layer, layers, enable_nested_tensor=False)
 
 
 def _marked(parts: Iterable[str], numbers: dict[str, int]) -> Tensor:

@@ -45,6 +45,11 @@ class Vocabulary(NamedTuple):
     parts: tuple[str, ...]
 
     @property
+    def goal_size(self) -> int:
+        """How many numbers stand for a task and its answer: one for each task and each part."""
+        return len(self.tasks) + len(self.parts)
+
+    @property
     def content(self) -> dict[str, list[str]]:
         """What a trained file has of it."""
         return {name: list(value) for name, value in self._asdict().items()}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from torch import Tensor, nn
+from torch import Tensor
 from torch.nn import functional
 
 WIDTH = 64
@@ -30,19 +30,11 @@ class Join:
         return normed
 
 
-def body_layers() -> nn.TransformerEncoder:
-    """Return untrained layers, which `run_layer` runs one by one."""
-    layer = nn.TransformerEncoderLayer(
-        WIDTH, HEADS, 2 * WIDTH, dropout=0.0, batch_first=True, norm_first=True
-    )
-    return nn.TransformerEncoder(layer, LAYERS, enable_nested_tensor=False)
-
-
 def run_layer(layer: Any, tokens: Tensor, seen: Tensor, join: Join) -> Tensor:  # noqa: ANN401
     """Return the tokens after one layer: attention, then a feed-forward network.
 
     Args:
-        layer: one of `body_layers`.
+        layer: one of a body's encoder, whose layers are run one by one.
         tokens: (n, L, WIDTH).
         seen: (n, L) whether there is a token.
         join: of a memory.

@@ -10,7 +10,8 @@ import torch
 from torch import Tensor, nn
 
 from roboirg_learn.listener.encoders import METERS, waves
-from roboirg_learn.policy.body_layers import LAYERS, WIDTH, Join, body_layers, run_layer
+from roboirg_learn.listener.listener_net import transformer
+from roboirg_learn.policy.body_layers import HEADS, LAYERS, WIDTH, Join, run_layer
 from roboirg_learn.policy.fast_weights import FastWeightMemory
 from roboirg_learn.policy.frame_memory import EvenFrameMemory, KeptFrameMemory
 from roboirg_learn.policy.memories import (
@@ -117,7 +118,7 @@ class BodyNet(nn.Module):
         self.unseen = nn.Parameter(torch.randn(WIDTH) * 0.02)
         self.goal = nn.Linear(parts, WIDTH)
         self.memory = MEMORIES[memory]()
-        self.encoder = body_layers()
+        self.encoder = transformer(WIDTH, HEADS, LAYERS)
         self.move = nn.Linear(WIDTH, len(at_things))
         self.done = nn.Linear(WIDTH, MOST_DONE + 1)
         self.query = nn.Embedding(len(at_things), WIDTH)

@@ -68,8 +68,7 @@ class LearnedPolicy:
     def act(self, observation: Observation) -> NDArray[np.float64]:
         """Return the next waypoint (1, 7)."""
         seen = self.watch(observation)
-        chosen = seen.decide(self.understand(), tool_of(observation))
-        return np.asarray(chosen, np.float64)[None]
+        return seen.decide(self.understand(), tool_of(observation))[None]
 
     def understand(self) -> NDArray[np.float32]:
         """Return the goal that was heard, as `PolicyModel.understand` does."""

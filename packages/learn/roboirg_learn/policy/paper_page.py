@@ -41,7 +41,7 @@ class Difference(NamedTuple):
 
     Attributes:
         value: the first less the second.
-        interval: 95 %; None if it was not measured.
+        interval: 95 %; None with too few episodes, or if all published rates are 0 or 100.
         p_value: not corrected.
     """
 
@@ -179,9 +179,10 @@ def _independent(first: Rates, second: Rates) -> Difference:
     ]
     variance = sum(one * (1 - one) for pair in shares for one in pair) / TRIALS / len(shares) ** 2
     value, spread = sum(one - other for one, other in shares) / len(shares), math.sqrt(variance)
+    if not spread:
+        return Difference(value, None, 1.0)
     interval = value - Z_95 * spread, value + Z_95 * spread
-    p_value = math.erfc(abs(value) / spread / math.sqrt(2)) if spread else 1.0
-    return Difference(value, interval, p_value)
+    return Difference(value, interval, math.erfc(abs(value) / spread / math.sqrt(2)))
 
 
 def _retention(
@@ -233,6 +234,6 @@ def _table(title: str, note: str, columns: Sequence[str], found: Differences) ->
 def _with_ends(value: float, interval: tuple[float, float] | None, form: str, of_end: str) -> str:
     """Return a value in percent with the ends of its interval, 0 to 1."""
     if interval is None:
-        return form.format(value)
+        return f"{form.format(value)} (no interval)"
     low, high = (of_end.format(100 * end) for end in interval)
     return f"{form.format(value)} ({low} to {high})"

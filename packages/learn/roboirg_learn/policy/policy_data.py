@@ -80,15 +80,9 @@ class LookHistory:
 
     def numbers(self) -> LookNumbers:
         """Return all looks; a thing has the place where it was last seen."""
-        length, count = len(self._rows), max(1, self.tracks.count)
-        classes = np.zeros((length, count), np.int64)
-        places, turns = (np.zeros((length, count, 2), np.float32) for _ in range(2))
-        seen, known = (np.zeros((length, count), bool) for _ in range(2))
-        for look, (kinds, spots, angles, shown, sure) in enumerate(self._rows):
-            own = len(kinds)
-            classes[look, :own], places[look, :own], turns[look, :own] = kinds, spots, angles
-            seen[look, :own], known[look, :own] = shown, sure
-        return LookNumbers(classes, places, turns, seen, known, np.stack(self._tools))
+        count = max(1, self.tracks.count)
+        parts = [np.stack(part)[:, :count] for part in zip(*self._rows, strict=True)]
+        return LookNumbers._make([*parts, np.stack(self._tools)])
 
 
 def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray[np.float32]:
@@ -144,21 +138,20 @@ def to_numbers(
 
 def to_batch(episodes: Sequence[EpisodeNumbers]) -> EpisodeBatch:
     """Return episodes padded to the longest."""
-    looks = [one.looks for one in episodes]
+    looks, goals, decisions, moves, things, done, planned = zip(*episodes, strict=True)
+    of_looks = {
+        name: _pad([getattr(own, name) for own in looks], 0) for name in LookNumbers._fields
+    }
+    there = [np.ones(len(own.tool), bool) for own in looks]
     return EpisodeBatch(
-        _pad([one.classes for one in looks], 0),
-        _pad([one.places for one in looks], 0),
-        _pad([one.turns for one in looks], 0),
-        _pad([one.seen for one in looks], 0),
-        _pad([one.known for one in looks], 0),
-        _pad([one.tool for one in looks], 0),
-        _pad([np.ones(len(one.tool), bool) for one in looks], 0),
-        torch.from_numpy(np.stack([one.goal for one in episodes])),
-        _pad([one.decisions for one in episodes], 0),
-        _pad([one.moves for one in episodes], -1),
-        _pad([one.things for one in episodes], -1),
-        _pad([one.done for one in episodes], -1),
-        _planned([one.planned for one in episodes if one.planned is not None]),
+        **of_looks,
+        there=_pad(there, 0),
+        goals=torch.from_numpy(np.stack(goals)),
+        decisions=_pad(decisions, 0),
+        moves=_pad(moves, -1),
+        things=_pad(things, -1),
+        done=_pad(done, -1),
+        planned=_planned([own for own in planned if own is not None]),
     )
 
 

@@ -69,11 +69,6 @@ class PolicyModel(NamedTuple):
     forms: tuple[SubgoalForm, ...] = ()
     planner: BodyNet | None = None
 
-    @property
-    def goal_size(self) -> int:
-        """How many numbers `goal_numbers` has."""
-        return goal_size(self.vocabulary)
-
     def understand(self, text: str, looks: Sequence[LookTokens]) -> NDArray[np.float32]:
         """Return the task and the goal that an instruction means, as `goal_numbers` does.
 
@@ -98,14 +93,9 @@ def seen_things(
     return rank([one.classes for one in looks], places, corners, classes)
 
 
-def goal_size(vocabulary: Vocabulary) -> int:
-    """Return how many numbers `goal_numbers` has."""
-    return len(vocabulary.tasks) + len(vocabulary.parts)
-
-
 def goal_numbers(task: str, answer: str, vocabulary: Vocabulary) -> NDArray[np.float32]:
     """Return 1 for the task and for each part of an answer, else 0: (tasks + parts,)."""
-    found = np.zeros(goal_size(vocabulary), np.float32)
+    found = np.zeros(vocabulary.goal_size, np.float32)
     found[vocabulary.tasks.index(task)] = 1.0
     for part in parts_of(answer):
         found[len(vocabulary.tasks) + vocabulary.parts.index(part)] = 1.0
@@ -293,4 +283,4 @@ def make_body(sight: Sight, vocabulary: Vocabulary, moves: Sequence[Kind], memor
     planner = dict.fromkeys(PLANNERS, context_size(len(moves)))
     context = {HANDS: ASKED_NUMBERS, **planner}.get(memory, 0)
     at_things = [move.at_thing for move in moves]
-    return BodyNet(len(sight.classes), goal_size(vocabulary), at_things, memory, context)
+    return BodyNet(len(sight.classes), vocabulary.goal_size, at_things, memory, context)

@@ -91,9 +91,9 @@ class LearnedHands(LearnedPolicy):
             self._take(self._namer.next(self.understand()))
         if self._asked is None:
             return np.append(observation["end_effector"], LEAVE)[None]
-        nothing = np.zeros(self.model.goal_size, np.float32)
+        nothing = np.zeros(self.model.vocabulary.goal_size, np.float32)
         chosen = seen.decide(nothing, tool_of(observation), asked_for([self._asked]))
-        return np.asarray(chosen, np.float64)[None]
+        return chosen[None]
 
     def _take(self, subgoal: str) -> None:
         found = asked_numbers(subgoal, self.model.sight)

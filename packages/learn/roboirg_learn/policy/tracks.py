@@ -32,50 +32,38 @@ class LookTokens(NamedTuple):
 
 
 class Tracks:
-    """What is known of each thing that was ever seen; a thing stays in its class."""
+    """What is known of each thing that was ever seen; a thing stays in its class.
+
+    Attributes:
+        count: number of things; the rows after theirs are empty.
+        classes: (MOST_TRACKS,) the class of each.
+        places: (MOST_TRACKS, 2) where each was last seen, m.
+        turns: (MOST_TRACKS, 2) how each was last seen to be turned; see `LookTokens`.
+        seen: (MOST_TRACKS,) whether the last look shows each.
+    """
 
     def __init__(self) -> None:
         self.count = 0
-        self._classes = np.zeros(MOST_TRACKS, np.int64)
-        self._places = np.zeros((MOST_TRACKS, 2), np.float32)
-        self._turns = np.zeros((MOST_TRACKS, 2), np.float32)
+        self.classes = np.zeros(MOST_TRACKS, np.int64)
+        self.places = np.zeros((MOST_TRACKS, 2), np.float32)
+        self.turns = np.zeros((MOST_TRACKS, 2), np.float32)
         self._speeds = np.zeros((MOST_TRACKS, 2), np.float32)
-        self._seen = np.zeros(MOST_TRACKS, bool)
+        self.seen = np.zeros(MOST_TRACKS, bool)
         self._times = np.zeros(MOST_TRACKS, np.int64)
         self._looks = 0
 
     @property
-    def classes(self) -> NDArray[np.int64]:
-        """Classes (k,)."""
-        return self._classes[: self.count]
-
-    @property
-    def places(self) -> NDArray[np.float32]:
-        """Where each was last seen (k, 2), m."""
-        return self._places[: self.count]
-
-    @property
-    def turns(self) -> NDArray[np.float32]:
-        """How each was last seen to be turned (k, 2); see `LookTokens`."""
-        return self._turns[: self.count]
-
-    @property
-    def seen(self) -> NDArray[np.bool_]:
-        """Whether the last look shows each (k,)."""
-        return self._seen[: self.count]
-
-    @property
     def known(self) -> NDArray[np.bool_]:
-        """Whether each was seen often enough to be no mistake of the detector (k,)."""
-        return self._times[: self.count] >= min(self._looks, ENOUGH)
+        """Whether each was seen often enough to be no mistake of the detector (MOST_TRACKS,)."""
+        return self._times >= min(self._looks, ENOUGH)
 
     def update(self, look: LookTokens) -> NDArray[np.int64]:
         """Take in a look; returns the track of each of its things, -1 beyond the most tracks."""
         mine = self._assign(look)
         old = mine >= 0
         own = mine[old]
-        way = look.places[old] - self._places[own]
-        followed = self._seen[own, None]
+        way = look.places[old] - self.places[own]
+        followed = self.seen[own, None]
         self._speeds[:] = 0.0
         self._speeds[own] = np.where(followed, way, 0.0)
         new = np.flatnonzero(~old)[: MOST_TRACKS - self.count]
@@ -83,11 +71,11 @@ class Tracks:
         self.count += len(new)
         kept = mine >= 0
         own = mine[kept]
-        self._seen[:] = False
+        self.seen[:] = False
         self._times[own] += 1
         self._looks += 1
-        self._seen[own], self._classes[own] = True, look.classes[kept]
-        self._places[own], self._turns[own] = look.places[kept], look.turns[kept]
+        self.seen[own], self.classes[own] = True, look.classes[kept]
+        self.places[own], self.turns[own] = look.places[kept], look.turns[kept]
         return mine
 
     def _assign(self, look: LookTokens) -> NDArray[np.int64]:
@@ -95,10 +83,10 @@ class Tracks:
         mine = np.full(len(look.classes), -1, np.int64)
         if not self.count or not len(mine):
             return mine
-        expected = self.places + self._speeds[: self.count]
+        expected = (self.places + self._speeds)[: self.count]
         away = look.places[:, None] - expected
         far = np.hypot(away[..., 0], away[..., 1])
-        far[look.classes[:, None] != self.classes] = NEVER
+        far[look.classes[:, None] != self.classes[: self.count]] = NEVER
         things, tracks = linear_sum_assignment(np.minimum(far, NEVER))
         near = far[things, tracks] <= GATE
         mine[things[near]] = tracks[near]

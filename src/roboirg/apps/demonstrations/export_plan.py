@@ -14,6 +14,7 @@ from roboirg.apps.demonstrations.trajectory import SUFFIX, TRAJECTORY_VERSION
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, known_name
+from roboirg.core.field_types import check_whole
 from roboirg.core.instruction_options import InstructionOptions, identifying
 from roboirg.core.observations import CAMERAS, check_cameras
 from roboirg.core.word_pools import pool_of
@@ -83,8 +84,7 @@ class ExportPlan:
         """
         known_name("format", self.format, get_args(FormatName))
         known_name("way to store pictures", self.pictures, get_args(PictureCoding))
-        if self.variations < 1:
-            raise InvalidValueError(f"variations is {self.variations}; it must be at least 1.")
+        check_whole("variations", self.variations)
         if self.variations > 1 and not self.disturbed:
             raise InvalidValueError(
                 f"variations is {self.variations}, but only disturbed demonstrations vary; ask for "

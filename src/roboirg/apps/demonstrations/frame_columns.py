@@ -25,6 +25,20 @@ _KEYS = {
     "action": "action",
 }
 _OPENPI_KEYS = {"front": "image", "wrist": "wrist_image", "state": "state", "action": "actions"}
+_SINGLE = (
+    ("next.reward", "float32", "reward"),
+    ("next.done", "bool", "done"),
+    ("next.success", "bool", "success"),
+    ("is_video_demo", "bool", "is_video_demo"),
+    ("subgoal", "string", "subgoal"),
+    ("grounded_subgoal", "string", "grounded_subgoal"),
+    ("timestamp", "float32", "s"),
+    ("frame_index", "int64", "frame_index"),
+    ("episode_index", "int64", "episode_index"),
+    ("index", "int64", "index"),
+    ("task_index", "int64", "task_index"),
+)
+"""The columns with one value in each frame: its type, and what it is called."""
 
 EXECUTED = "executed_action"
 """Column of what was executed where that is not the action to learn."""
@@ -80,15 +94,8 @@ class FrameColumns:
         if self.plan.disturbed:
             found[EXECUTED] = _feature("float32", names)
         found["pose_action"] = _feature("float32", _POSE)
-        found["next.reward"] = _feature("float32", ["reward"])
-        found["next.done"] = _feature("bool", ["done"])
-        found["next.success"] = _feature("bool", ["success"])
-        found["is_video_demo"] = _feature("bool", ["is_video_demo"])
-        found["subgoal"] = _feature("string", ["subgoal"])
-        found["grounded_subgoal"] = _feature("string", ["grounded_subgoal"])
-        found["timestamp"] = _feature("float32", ["s"])
-        for name in ("frame_index", "episode_index", "index", "task_index"):
-            found[name] = _feature("int64", [name])
+        for column, dtype, name in _SINGLE:
+            found[column] = _feature(dtype, [name])
         return found
 
     def table_features(self) -> dict[str, dict[str, Any]]:
@@ -160,10 +167,6 @@ class FrameColumns:
                 self.keys[camera]: [archive.read(picture_name(camera, row)) for row in rows]
                 for camera in self.cameras
             }
-
-    def picture_counts(self, trajectory: Trajectory) -> dict[str, NDArray[np.int64]]:
-        """Return how often each value occurs in the frames of each camera's column."""
-        return {self.keys[camera]: trajectory.histograms[camera] for camera in self.cameras}
 
     def stats(
         self,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -72,15 +72,14 @@ class RecordingSpec(NamedTuple):
     disturbed: bool = False
 
 
-@dataclass
-class _Rows:
-    """What is collected while the policy acts; see `Trajectory`."""
+class _Row(NamedTuple):
+    """What one step of the policy gives; see `Trajectory`."""
 
-    observations: list[Mapping[str, Any]] = field(default_factory=list)
-    actions: list[NDArray[np.float64]] = field(default_factory=list)
-    labels: list[NDArray[np.float64]] = field(default_factory=list)
-    subgoals: list[str] = field(default_factory=list)
-    online: list[str] = field(default_factory=list)
+    observation: Mapping[str, Any]
+    action: NDArray[np.float64]
+    label: NDArray[np.float64]
+    subgoal: str
+    online: str
 
 
 class PictureTracks:
@@ -196,7 +195,7 @@ class _Recorder(EpisodeLoop):
         super().__init__(env, policy)
         self._spec, self._archive = spec, archive
         self._tracks = PictureTracks(archive, spec)
-        self._rows = _Rows()
+        self._rows: list[_Row] = []
         self._video_session: object = None
         self._is_waypoint = env.actions == WAYPOINT.name
 
@@ -269,7 +268,7 @@ class _Recorder(EpisodeLoop):
     def _rounded(self, action: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return an action in float32; a waypoint's angles near those of the one before."""
         if self._is_waypoint:
-            angles = np.unwrap([self._rows.actions[-1][_ANGLES], action[_ANGLES]], axis=0)[1]
+            angles = np.unwrap([self._rows[-1].action[_ANGLES], action[_ANGLES]], axis=0)[1]
             action = np.concatenate([action[:3], angles, action[POSE_SIZE:]])
         return action.astype(np.float32).astype(np.float64)
 
@@ -281,15 +280,10 @@ class _Recorder(EpisodeLoop):
         doing: str,
         online: str,
     ) -> None:
-        rows = self._rows
         self._tracks.add(observation)
         pictures = ("_rgb", "_depth")
         kept = {key: value for key, value in observation.items() if not key.endswith(pictures)}
-        rows.observations.append(kept)
-        rows.actions.append(action)
-        rows.labels.append(label)
-        rows.subgoals.append(doing)
-        rows.online.append(online)
+        self._rows.append(_Row(kept, action, label, doing, online))
 
     def _facts(
         self, policy_name: str, variation: int, info: Mapping[str, Any], cause: str
@@ -306,7 +300,7 @@ class _Recorder(EpisodeLoop):
             status="failure" if status == "ongoing" else status,
             cause=cause,
             video_length=info["demonstration"].length if self._spec.video else 0,
-            steps=len(self._rows.actions) - 1,
+            steps=len(self._rows) - 1,
             demonstration_source=info["demonstration_source"],
             environment_version=ENVIRONMENT_VERSION,
             coding=self._spec.coding,
@@ -317,26 +311,27 @@ class _Recorder(EpisodeLoop):
 
     def _arrays(self, info: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
         """Return the arrays of a trajectory, the video's rows first."""
-        rows, video = self._rows, info["demonstration"]
+        video = info["demonstration"]
         length = video.length if self._spec.video else 0
+        observations, actions, wanted, subgoals, due = zip(*self._rows, strict=True)
         names = ["joint_positions", "gripper", "end_effector"]
         names += [f"{camera}_extrinsic" for camera in CAMERAS if self._spec.depth]
         arrays = {
             name: np.concatenate(
-                [video[name][:length], np.stack([one[name] for one in rows.observations])]
+                [video[name][:length], np.stack([one[name] for one in observations])]
             )
             for name in names
         }
         for name in [f"{camera}_intrinsic" for camera in CAMERAS if self._spec.depth]:
-            arrays[name] = rows.observations[0][name]
-        arrays["actions"] = np.array([*video.actions[:length], *rows.actions])
-        labels = np.array([*video.actions[:length], *rows.labels])
+            arrays[name] = observations[0][name]
+        arrays["actions"] = np.array([*video.actions[:length], *actions])
+        labels = np.array([*video.actions[:length], *wanted])
         arrays["pose_actions"] = labels if self._is_waypoint else self._pose_actions(labels)
         if self._spec.disturbed:
             arrays["labels"] = labels
         seen = list(info["demonstration_subgoals"][:length])
-        online = [*seen, *rows.online]
-        doing = [*seen, *_with_pixels(rows.subgoals, rows.online)]
+        online = [*seen, *due]
+        doing = [*seen, *_with_pixels(subgoals, due)]
         for name, texts in (("online_subgoals", online), ("subgoals", doing)):
             arrays[f"grounded_{name}"] = np.array(texts, np.str_)
             arrays[name] = np.array([without_pixel(text) for text in texts], np.str_)
@@ -360,7 +355,7 @@ def without_pixel(subgoal: str) -> str:
     return split_point(subgoal)[0]
 
 
-def _with_pixels(templates: list[str], online: list[str]) -> list[str]:
+def _with_pixels(templates: Sequence[str], online: Sequence[str]) -> list[str]:
     """Fill the pixels into subgoals, as the judge's view of the same subgoal found them.
 
     Args:

@@ -12,9 +12,10 @@ import numpy as np
 
 from roboirg.core.arms import TOLD
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.versions import Versions
 from roboirg.evaluation.analysis.results.frame import MISSING, Frame, as_column, task_order
 from roboirg.evaluation.analysis.results.option_labels import options_sort_key
-from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun, Versions
+from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun
 from roboirg.evaluation.analysis.stats.cells import cells_of
 from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
 from roboirg.evaluation.grounding_items.answer_file import Answer
@@ -55,7 +56,7 @@ class GroundingScore:
 
     @property
     def unparsed(self) -> int:
-        """Number of replies that name no answer."""
+        """Number of unreadable replies."""
         return sum(one.verdict.understood is None for one in self.judged)
 
     @property
@@ -85,12 +86,9 @@ class ScoreRow:
     def corrected(self) -> float | None:
         """The rate on a scale from random answers, 0, to 1; None if random answers are right."""
         rate = self.summary.rate
-        return None if rate is None else above_chance(float(rate), self.chance)
-
-
-def above_chance(rate: float, chance: float) -> float | None:
-    """Return a rate on a scale on which chance is 0 and all right is 1; None if chance is 1."""
-    return None if chance >= 1 else (rate - chance) / (1 - chance)
+        if rate is None or self.chance >= 1:
+            return None
+        return (float(rate) - self.chance) / (1 - self.chance)
 
 
 def score_answers(
@@ -98,7 +96,7 @@ def score_answers(
 ) -> tuple[GroundingScore, ...]:
     """Score answers, kind by kind.
 
-    A reply that names no answer is wrong. An item without an answer is missing: it is in no rate.
+    An unreadable reply is wrong. An item without an answer is missing: it is in no rate.
 
     Args:
         items: of the dataset, all of one split and one wording.
@@ -137,7 +135,15 @@ def _policy_run(items: Sequence[GroundingItem], name: str) -> PolicyRun:
         )
     ((split, wordings, language, environment),) = sources
     conditions = EvalConditions(split, wordings=None if wordings == OWN_WORDS else wordings)
-    return PolicyRun(name, conditions, Versions(ANSWERS_VERSION, language, environment))
+    return PolicyRun(
+        name,
+        conditions,
+        Versions(
+            policy_version=ANSWERS_VERSION,
+            language_version=language,
+            environment_version=environment,
+        ),
+    )
 
 
 def _score(

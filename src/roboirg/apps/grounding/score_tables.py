@@ -9,7 +9,7 @@ from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.results.frame import as_column
 from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.intervals import TOO_FEW, Interval
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, gap_words
 from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
 from roboirg.evaluation.analysis.tables.table import Row, Table, named_columns
@@ -79,8 +79,8 @@ def _notes(scores: Sequence[GroundingScore]) -> Iterator[str]:
     for score in scores:
         name = f"{score.name}, {QUESTIONS[score.kind]}"
         if score.unparsed:
-            replies = counted(score.unparsed, "reply", "replies")
-            yield f"{name}: {replies} without an answer, counted as wrong."
+            replies = counted(score.unparsed, "unreadable reply", "unreadable replies")
+            yield f"{name}: {replies}, counted as wrong."
         if score.missing:
             items = counted(score.missing, "item")
             yield f"{name}: {items} not answered and left out of the rates."
@@ -91,7 +91,7 @@ def _percent(rate: float | None) -> str:
 
 
 def _interval(interval: Interval | None) -> str:
-    return NOT_APPLICABLE if interval is None else " to ".join(map(_percent, interval))
+    return TOO_FEW if interval is None else " to ".join(map(_percent, interval))
 
 
 _LABELS: Mapping[str, Callable[[GroundingItem], Sequence[str]]] = {

@@ -67,19 +67,23 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
     Raises:
         InvalidValueError: the job's wording file is missing or has changed.
     """
-    prepared, policy = PreparedJob(job_of(record)), ReplayPolicy(log)
-    again, played = begin_record(prepared), None
+    prepared = PreparedJob(job_of(record))
+    policy = ReplayPolicy(log)
+    again = begin_record(prepared)
+    played = None
     needs = PolicyNeeds(cameras=(), actions=log.space)
     try:
         loop = play_with(policy, prepared, needs, again, CallGuard(again.timings, None))
         # What was declared is taken over: the attribution of a failure begins with it.
-        again.policy_metadata, again.subgoals = record.policy_metadata, record.subgoals
+        again.policy_metadata = record.policy_metadata
+        again.subgoals = record.subgoals
         loop.conclude()
         played = loop.log
     except EpisodeError as error:
         again.record_error(error.kind, error.cause)
     if policy.is_used_up and record.outcome == "error":
-        again.error, again.cause = record.error, record.cause
+        again.error = record.error
+        again.cause = record.cause
     again.action_log = None if played is None else played.digest
     return again, played
 

@@ -11,7 +11,7 @@ import typer
 
 from roboirg.cli.options import check_output_file
 from roboirg.cli.progress_bar import progress_bar
-from roboirg.cli.run_commands import USAGE_ERROR, Folder, folder_of
+from roboirg.cli.run_commands import USAGE_ERROR, Folder
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted, printable, verb_for
 
@@ -40,9 +40,10 @@ def verify(
     """
     from roboirg.apps.leaderboard.run_verification import verify_run
     from roboirg.evaluation.records.packs import opened_run
+    from roboirg.evaluation.records.run_files import run_folder
     from roboirg.util.processor import worker_count
 
-    with opened_run(folder_of(run)) as folder, progress_bar("records") as show:
+    with opened_run(run_folder(run)) as folder, progress_bar("records") as show:
         found = verify_run(
             folder,
             sample=_share(sample),
@@ -66,9 +67,10 @@ def pack(
     Example: roboirg leaderboard pack runs/first --out first.roboirg.zip
     """
     from roboirg.apps.leaderboard.packing import pack_run
+    from roboirg.evaluation.records.run_files import run_folder
 
     check_output_file(out)
-    manifest = pack_run(folder_of(run), out, videos=videos, logs=logs)
+    manifest = pack_run(run_folder(run), out, videos=videos, logs=logs)
     size = out.stat().st_size / 1e6
     typer.echo(f"{counted(manifest.records, 'record')}, {size:.1f} MB: {out}")
 
@@ -84,15 +86,15 @@ def _share(text: str) -> float:
 
 
 def _print(found: Verification) -> None:
-    from roboirg.apps.leaderboard.record_check import TOLERANCE, ReplayVerdict
+    from roboirg.apps.leaderboard.record_check import TOLERANCE
 
-    played = found.records - found.verdicts[ReplayVerdict.NOT_REPLAYED]
+    played = found.records - found.verdicts["not replayed"]
     verb = verb_for(played, "were")
     typer.echo(
         f"{counted(found.records, 'record')}; {played:,} {verb} played again from stored actions."
     )
-    typer.echo(f"End states equal bit for bit: {found.verdicts[ReplayVerdict.EXACT]:,}.")
-    if tolerant := found.verdicts[ReplayVerdict.TOLERANT]:
+    typer.echo(f"End states equal bit for bit: {found.verdicts['exact']:,}.")
+    if tolerant := found.verdicts["tolerant"]:
         typer.echo(
             f"End states from other processors equal within {TOLERANCE:g} (m, rad, s): "
             f"{tolerant:,}; the largest difference is {found.deviation:.1g}."

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 import zipfile
 from collections.abc import Mapping
@@ -18,7 +17,7 @@ from roboirg.evaluation.records.record_codec import StoreError, read_summary
 from roboirg.evaluation.records.run_files import plan_names, run_file
 from roboirg.evaluation.records.store import RECORDS_FILE, StoredRun
 from roboirg.util.atomic_write import replacing
-from roboirg.util.regular_file import open_regular
+from roboirg.util.regular_file import file_hash
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _BLOCK = 1 << 20
@@ -34,11 +33,13 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
         logs: whether to include what policies printed.
 
     Raises:
-        StoreError: there are no records, a line is not a record, or there is too much.
+        StoreError: there are no records, a line is damaged or no record, or there is too much.
         ForeignPathError: a file is outside of the folder, by a symbolic link, or has an odd name.
         InvalidValueError: the file cannot be written.
     """
-    entries = StoredRun(folder, read_summary).newest
+    run = StoredRun(folder, read_summary)
+    run.file.refuse_damage()
+    entries = run.newest
     wanted = [ACTION_FOLDER, *[LOG_FOLDER] * logs, *[VIDEO_FOLDER] * videos]
     names = [RECORDS_FILE, *plan_names(folder)]
     for name in wanted:
@@ -82,7 +83,6 @@ def _file_hash(path: Path) -> str:
         InvalidValueError: it cannot be read.
     """
     try:
-        with open_regular(path) as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        return file_hash(path)
     except OSError as error:
         raise InvalidValueError(f"Cannot read {path}: {error.strerror}.") from error

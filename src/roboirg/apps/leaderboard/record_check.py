@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from enum import StrEnum
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -42,21 +41,10 @@ ATTRIBUTED_FIELDS = ("attribution", "attempts")
 _MOST_SHOWN = 160
 
 
-class ReplayVerdict(StrEnum):
-    """How the end of an episode compares with the record's.
-
-    Attributes:
-        EXACT: equal, bit for bit.
-        TOLERANT: equal but for `TOLERANCE`, and the record is from a processor of another family,
-            or does not report it.
-        DIFFERENT: not equal.
-        NOT_REPLAYED: not in the sample, or an error that kept no actions.
-    """
-
-    EXACT = "exact"
-    TOLERANT = "tolerant"
-    DIFFERENT = "different"
-    NOT_REPLAYED = "not replayed"
+ReplayVerdict = Literal["exact", "tolerant", "different", "not replayed"]
+"""How the end of an episode compares with the record's: equal, bit for bit; equal but for
+`TOLERANCE`, and the record is from a processor of another family, or does not report it; not equal;
+not in the sample, or an error that kept no actions."""
 
 
 class RecordCheck(NamedTuple):
@@ -73,7 +61,7 @@ class RecordCheck(NamedTuple):
 
     slug: str
     findings: tuple[str, ...]
-    replayed: ReplayVerdict = ReplayVerdict.NOT_REPLAYED
+    replayed: ReplayVerdict = "not replayed"
     deviation: float = 0.0
     elsewhere: bool = False
 
@@ -101,7 +89,7 @@ def check_line(one: LineToCheck, folder: Path) -> RecordCheck:
 
 def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
     findings = [
-        f"{what}_version: the record says {recorded}; this roboirg checks {installed}."
+        f"{what.replace(' ', '_')}: the record says {recorded}; this roboirg checks {installed}."
         for what, recorded, installed in other_versions(record)
     ]
     if findings:
@@ -110,7 +98,8 @@ def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
     if log is not None and play:
         again, played = replay(record, log)
     else:
-        again, played = unplayed(record), None
+        again = unplayed(record)
+        played = None
     findings = list(_differences(record, again, WORD_FIELDS))
     if log is None and record.outcome != "error":
         findings.append("Its actions were not kept, so the verdict cannot be checked.")
@@ -122,17 +111,14 @@ def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
     findings += _differences(record, again, (*PLAYED_FIELDS, *watched))
     if played is None:
         findings.append("actions: when played again, the episode takes none.")
-        return RecordCheck(record.slug, tuple(findings), ReplayVerdict.DIFFERENT, float("inf"))
+        return RecordCheck(record.slug, tuple(findings), "different", float("inf"))
     verdict, deviation = _compare_ends(record, again, log, played, elsewhere=elsewhere)
-    if verdict is ReplayVerdict.DIFFERENT:
+    if verdict == "different":
         findings.append(f"end_state: when played again, it differs by {deviation:.2g} (m, rad, s).")
-    if not _same_answers(played, log):
+    is_as_long = len(played.rows) == len(log.rows)
+    if not (is_as_long and np.array_equal(played.requests, log.requests)):
         findings.append("actions: some of them come after the end of the episode.")
     return RecordCheck(record.slug, tuple(findings), verdict, deviation, may_move_differently)
-
-
-def _same_answers(played: ActionLog, log: ActionLog) -> bool:
-    return len(played.rows) == len(log.rows) and np.array_equal(played.requests, log.requests)
 
 
 def _words(record: Record, unplayed: Record) -> Iterator[str]:
@@ -146,7 +132,8 @@ def _words(record: Record, unplayed: Record) -> Iterator[str]:
 
 def _differences(record: Record, again: Record, fields: tuple[str, ...]) -> Iterator[str]:
     for name in fields:
-        recorded, expected = getattr(record, name), getattr(again, name)
+        recorded = getattr(record, name)
+        expected = getattr(again, name)
         if recorded != expected:
             yield _difference(name, recorded, expected)
 
@@ -171,10 +158,9 @@ def _compare_ends(
     where a record was forged; both are a different end.
     """
     if played.end_state.shape != log.end_state.shape:
-        return ReplayVerdict.DIFFERENT, float("inf")
+        return "different", float("inf")
     deviation = float(np.max(np.abs(played.end_state - log.end_state), initial=0.0))
     if deviation == 0.0:
-        same = record.end_state == again.end_state
-        return ReplayVerdict.EXACT if same else ReplayVerdict.DIFFERENT, 0.0
+        return "exact" if record.end_state == again.end_state else "different", 0.0
     within = deviation <= TOLERANCE and record.end_state != again.end_state
-    return ReplayVerdict.TOLERANT if elsewhere and within else ReplayVerdict.DIFFERENT, deviation
+    return "tolerant" if elsewhere and within else "different", deviation

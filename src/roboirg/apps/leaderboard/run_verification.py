@@ -76,11 +76,12 @@ def verify_run(
     Raises:
         InvalidValueError: the sample is not a share.
         MissingSaltError: the run has private episodes, and their salt is not known.
-        StoreError: there are no records, or a line is not a record of this schema version.
+        StoreError: there are no records, or a line is damaged or no record of this schema version.
     """
     if not 0.0 <= sample <= 1.0:
         raise InvalidValueError(f"sample is {sample}; it must be between 0 % and 100 %.")
     run = StoredRun(folder, read_summary)
+    run.file.refuse_damage()
     for split in sorted({one.split for one in run.newest}):
         check_salt(split)
     checks: list[RecordCheck] = []
@@ -92,17 +93,16 @@ def verify_run(
         if progress is not None:
             progress(done, len(run.newest))
         verdicts[check.replayed] += 1
-        if check.replayed is ReplayVerdict.TOLERANT:
+        if check.replayed == "tolerant":
             deviation = max(deviation, check.deviation)
         if check.findings:
             checks.append(check)
     missing, notes = _completeness(folder, run.newest)
     if moved := sum(one.elsewhere for one in checks):
-        elsewhere = (
+        notes.append(
             f"Of those that do not hold, {moved:,} were played on another kind of processor, where "
             "contacts can end differently: verify them on a machine of that kind."
         )
-        notes = (*notes, elsewhere)
     return Verification(
         records=len(run.newest),
         checks=tuple(sorted(checks)),
@@ -110,7 +110,7 @@ def verify_run(
         verdicts=verdicts,
         deviation=deviation,
         errors=sum(one.outcome == "error" for one in run.newest),
-        notes=notes,
+        notes=tuple(notes),
     )
 
 
@@ -126,9 +126,7 @@ def _lines(run: StoredRun[Summary], sample: float, seed: int | None) -> Sequence
     ]
 
 
-def _completeness(
-    folder: Path, entries: Sequence[Summary]
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _completeness(folder: Path, entries: Sequence[Summary]) -> tuple[tuple[str, ...], list[str]]:
     """Return which episodes are missing, and notes about the plan."""
     plans = read_plans(folder)
     jobs = {identity_key(job): job.slug for plan in plans for job in plan.jobs()}
@@ -138,4 +136,4 @@ def _completeness(
     if outside := len(there - jobs.keys()):
         whose = "an earlier plan" if plans else "no plan that is kept"
         notes.append(f"From {whose}: {counted(outside, 'record')}.")
-    return tuple(sorted(missing)), tuple(notes)
+    return tuple(sorted(missing)), notes

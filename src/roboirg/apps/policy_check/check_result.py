@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 from roboirg.core.error_words import one_line
 
 Verdict = Literal["pass", "fail", "warn", "note"]
-PASS: Verdict = "pass"  # noqa: S105 - a verdict
-FAIL: Verdict = "fail"
-WARN: Verdict = "warn"
-NOTE: Verdict = "note"
 
 
 class CheckResult(NamedTuple):
@@ -30,6 +28,23 @@ class CheckResult(NamedTuple):
 
 class CheckAbortedError(Exception):
     """The checks cannot go on; the arguments are those of the last `CheckResult`."""
+
+
+@contextlib.contextmanager
+def ending_checks(check: str, call: str = "") -> Iterator[None]:
+    """Let any exception of the policy's own code fail a check that the others rely on.
+
+    Args:
+        check: its name.
+        call: of the policy that is made, such as ``reset(): ``.
+
+    Raises:
+        CheckAbortedError: instead of the exception.
+    """
+    try:
+        yield
+    except (Exception, SystemExit) as error:
+        raise CheckAbortedError(check, "fail", f"{call}{describe_error(error)}") from error
 
 
 def describe_error(error: BaseException) -> str:

@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 
 from roboirg.apps.policy_check.check_result import (
-    FAIL,
-    NOTE,
-    PASS,
     CheckAbortedError,
     CheckResult,
     describe_error,
+    ending_checks,
 )
 from roboirg.apps.policy_check.policy_player import (
     CALLS,
@@ -24,7 +22,7 @@ from roboirg.apps.policy_check.policy_player import (
     describe_difference,
 )
 from roboirg.core.actions import ActionSpace
-from roboirg.core.errors import InvalidValueError, MissingDependencyError, RoboIRGError
+from roboirg.core.errors import MissingDependencyError, RoboIRGError
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import UNKNOWN_VERSION
@@ -42,15 +40,15 @@ def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
     except MissingDependencyError:
         raise
     except (Exception, SystemExit) as error:  # the policy's own code runs here
-        raise CheckAbortedError("loads", FAIL, describe_error(error)) from error
+        raise CheckAbortedError("loads", "fail", describe_error(error)) from error
     if missing:
-        raise CheckAbortedError("loads", FAIL, f"It has no {missing[0]}().")
+        raise CheckAbortedError("loads", "fail", f"It has no {missing[0]}().")
     if hasattr(policy, "attach"):
         raise CheckAbortedError(
-            "loads", NOTE, "It is privileged: it needs a simulator, which is not available here."
+            "loads", "note", "It is privileged: it needs a simulator, which is not available here."
         )
     name = player.source if isinstance(policy, BatchedEpisode) else type(policy).__name__
-    yield CheckResult("loads", PASS, f"{name} was made with seed {player.seed}.")
+    yield CheckResult("loads", "pass", f"{name} was made with seed {player.seed}.")
 
 
 def check_requirements(player: PolicyPlayer) -> Iterator[CheckResult]:
@@ -58,11 +56,11 @@ def check_requirements(player: PolicyPlayer) -> Iterator[CheckResult]:
     try:
         player.needs = needs = PolicyNeeds.of(player.policy)
     except RoboIRGError as error:
-        raise CheckAbortedError("requirements", FAIL, str(error)) from error
+        raise CheckAbortedError("requirements", "fail", str(error)) from error
     more = ", depth" * needs.depth + ", calibration" * needs.calibration
     yield CheckResult(
         "requirements",
-        PASS,
+        "pass",
         f"Actions {needs.actions}, cameras {', '.join(needs.cameras) or 'none'}, demonstration "
         f"frames {needs.demonstration_frames}, observations every "
         f"{needs.observe_every or 'chunk'}{more}.",
@@ -72,28 +70,25 @@ def check_requirements(player: PolicyPlayer) -> Iterator[CheckResult]:
 def check_version(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Check that records distinguish the policy from an earlier one of the same name."""
     source = player.source
-    try:
+    with ending_checks("version", "reset(): "):
         episode = copy.deepcopy(player.without_video)
         player.policy.reset(episode.instruction, episode.demonstration)
+    with ending_checks("version"):
         own = read_version(player.policy)
-    except InvalidValueError as error:
-        raise CheckAbortedError("version", FAIL, str(error)) from error
-    except (Exception, SystemExit) as error:  # the policy's own code runs here
-        raise CheckAbortedError("version", FAIL, f"reset(): {describe_error(error)}") from error
     known = look_up(read_policy(source)).version if isinstance(source, str) else UNKNOWN_VERSION
     if own is not None and own != UNKNOWN_VERSION:
-        yield CheckResult("version", PASS, f"Records name the version that it has: {own}.")
+        yield CheckResult("version", "pass", f"Records name the version that it has: {own}.")
     elif known != UNKNOWN_VERSION:
         yield CheckResult(
             "version",
-            PASS,
+            "pass",
             f"It has no version, so records name a fingerprint of its file: {known}. A policy that "
             "loads a checkpoint needs the checkpoint's name as its version.",
         )
     else:
         yield CheckResult(
             "version",
-            NOTE,
+            "note",
             "It is unknown, so records of a changed policy look the same; set the attribute "
             "version, or version=… in the URL of a server.",
         )
@@ -115,7 +110,7 @@ def _describe_actions(
     )
     yield CheckResult(
         f"acts {when}",
-        PASS,
+        "pass",
         f"Chunks of {', '.join(map(str, sizes))} actions of {space.size} numbers, "
         f"{rollout.dtype}, all finite.",
     )
@@ -123,7 +118,7 @@ def _describe_actions(
         have = verb_for(outside, "have")
         yield CheckResult(
             f"range {when}",
-            NOTE,
+            "note",
             f"{outside} of {counted(sum(sizes), 'action')} {have} a number outside the usual "
             f"range of {space.name}; the robot executes them as well as it can.",
         )
@@ -131,17 +126,18 @@ def _describe_actions(
 
 def check_reports(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Check what records get from the policy besides its actions."""
-    policy, source = player.policy, player.source
+    policy = player.policy
+    source = player.source
     is_ours = isinstance(source, str) and not read_policy(source).is_foreign
     try:
         metadata = policy_metadata(policy, is_ours=is_ours)
         policy_subgoal(policy)
         policy_usage(policy)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - a property may raise anything
-        yield CheckResult("reports", FAIL, describe_error(error))
+        yield CheckResult("reports", "fail", describe_error(error))
         return
     if metadata:
-        yield CheckResult("reports", PASS, f"Records hold its {', '.join(metadata)}.")
+        yield CheckResult("reports", "pass", f"Records hold its {', '.join(metadata)}.")
 
 
 def check_determinism(player: PolicyPlayer) -> Iterator[CheckResult]:
@@ -150,30 +146,31 @@ def check_determinism(player: PolicyPlayer) -> Iterator[CheckResult]:
     player.repeatable = are_equal(player.expected, again)
     if player.repeatable:
         yield CheckResult(
-            "deterministic", PASS, "Two equal episodes have the same actions, bit for bit."
+            "deterministic", "pass", "Two equal episodes have the same actions, bit for bit."
         )
     elif getattr(player.policy, "deterministic", True):
         difference = describe_difference(player.expected, again)
         yield CheckResult(
             "deterministic",
-            FAIL,
+            "fail",
             f"Two equal episodes differ by up to {difference}; if that is intended, set "
             "deterministic = False.",
         )
     else:
-        yield CheckResult("deterministic", NOTE, "Equal episodes differ, as the policy declares.")
+        yield CheckResult("deterministic", "note", "Equal episodes differ, as the policy declares.")
 
 
 def check_reset(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Check that an episode does not depend on the one before it."""
-    name, expected = "reset forgets", player.expected
+    name = "reset forgets"
+    expected = player.expected
     if not (player.repeatable and getattr(player.policy, "deterministic", True)):
-        yield CheckResult(name, NOTE, "Not checked: the policy is not deterministic.")
+        yield CheckResult(name, "note", "Not checked: the policy is not deterministic.")
         return
     player.play(name, player.without_video)
     after = player.play(name, player.with_video, fresh=False)
     if are_equal(expected, after):
-        yield CheckResult(name, PASS, "An episode does not depend on the one before it.")
+        yield CheckResult(name, "pass", "An episode does not depend on the one before it.")
         return
     # What the policy would have answered next, and what it had answered, in the episode before.
     before = player.play(name, player.without_video, calls=2 * CALLS).chunks
@@ -187,7 +184,7 @@ def check_reset(player: PolicyPlayer) -> Iterator[CheckResult]:
             "A second episode with the same object differs by up to "
             f"{describe_difference(expected, after)} from the same episode played first."
         )
-    yield CheckResult(name, FAIL, message)
+    yield CheckResult(name, "fail", message)
 
 
 def _holds(chunks: list[Any], chunk: Any) -> bool:  # noqa: ANN401 - arrays

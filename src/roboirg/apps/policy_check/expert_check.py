@@ -5,18 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from roboirg.apps.policy_check.check_result import (
-    FAIL,
-    NOTE,
-    PASS,
-    WARN,
-    CheckAbortedError,
-    CheckResult,
-    describe_error,
-)
-from roboirg.apps.policy_check.expert_episode import ExpertMoment, RecordExpert
+from roboirg.apps.policy_check.check_result import CheckResult, describe_error, ending_checks
+from roboirg.apps.policy_check.expert_episode import ExpertMoment, RecordExpert, Rows
 from roboirg.apps.policy_check.policy_player import Chunks, PolicyPlayer
 from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE
 
@@ -43,26 +34,24 @@ def check_expert(player: PolicyPlayer, record: RecordExpert | None) -> Iterator[
         return
     if player.space.takes_many_steps:
         message = f"Not checked: a {player.space.name} takes many control steps."
-        yield CheckResult(_NAME, NOTE, message)
+        yield CheckResult(_NAME, "note", message)
         return
     rows = max(map(len, player.first_rollout.chunks))
     try:
         episode = record(player.policy, rows)
     except Exception as error:  # noqa: BLE001 - drivers fail in many ways; not the policy's fault
-        yield CheckResult(_NAME, NOTE, f"Not compared: {describe_error(error)}")
+        yield CheckResult(_NAME, "note", f"Not compared: {describe_error(error)}")
         return
     moments = episode.moments
-    try:
+    with ending_checks(_NAME, "act(): "):
         answers = player.ask(episode)
-    except (Exception, SystemExit) as error:
-        raise CheckAbortedError(_NAME, FAIL, f"act(): {describe_error(error)}") from error
     yield from _check_gripper(answers, moments)
     still = _error([np.tile(moment.still, (len(moment.actions), 1)) for moment in moments], moments)
     as_is = _error(answers, moments)
     unit = "rad" if player.space is JOINT_ANGLE else "m"
     yield CheckResult(
         _NAME,
-        PASS if as_is <= FITS * still else NOTE,
+        "pass" if as_is <= FITS * still else "note",
         f"At {len(moments)} moments of an expert's episode the answers are {as_is:.3g} {unit} from "
         f"what it did; holding still would be {still:.3g}.",
     )
@@ -76,13 +65,11 @@ def _error(chunks: Chunks, moments: Sequence[ExpertMoment]) -> float:
     return float(np.mean([_distance(*one) for one in zip(chunks, moments, strict=True)]))
 
 
-def _distance(chunk: NDArray[np.float64], moment: ExpertMoment) -> float:
+def _distance(chunk: Rows, moment: ExpertMoment) -> float:
     size = len(moment.still)
     columns = size if size == ARM_JOINTS else POSITION_SIZE
     rows = min(len(chunk), len(moment.actions))
-    difference: NDArray[np.float64] = np.abs(
-        chunk[:rows, :columns] - moment.actions[:rows, :columns]
-    )
+    difference: Rows = np.abs(chunk[:rows, :columns] - moment.actions[:rows, :columns])
     return float(difference.max(axis=1).mean())
 
 
@@ -92,7 +79,8 @@ def _check_gripper(answers: Chunks, moments: list[ExpertMoment]) -> Iterator[Che
     opens = np.array([moment.actions[0, -1] > 0 for moment in moments])
     if min(opens.sum(), (~opens).sum()) < MIN_MOMENTS:
         return
-    opened, closed = given[opens], given[~opens]
+    opened = given[opens]
+    closed = given[~opens]
     gap = GRIPPER_GAP * (given.max() - given.min())
     if gap > 0 and opened.max() + gap < closed.min():
         message = (
@@ -108,4 +96,4 @@ def _check_gripper(answers: Chunks, moments: list[ExpertMoment]) -> Iterator[Che
         )
     else:
         return
-    yield CheckResult("gripper", WARN, message)
+    yield CheckResult("gripper", "warn", message)

@@ -25,6 +25,10 @@ MAX_ROWS = 16
 """Rows of a chunk that are compared, at most: the policy is asked again after them."""
 
 
+Rows = NDArray[np.float64]
+"""Actions or poses, one a row; or one alone."""
+
+
 class ExpertMoment(NamedTuple):
     """What a policy is shown at a moment of the expert's episode.
 
@@ -35,10 +39,10 @@ class ExpertMoment(NamedTuple):
     """
 
     observation: Observation
-    actions: NDArray[np.float64]
+    actions: Rows
 
     @property
-    def still(self) -> NDArray[np.float64]:
+    def still(self) -> Rows:
         """The joints (7,) or the pose (6,) of the robot at this moment, without the gripper."""
         joints = self.actions.shape[1] == JOINT_ANGLE.size
         return np.asarray(
@@ -80,7 +84,7 @@ def record_expert(policy: Policy, rows: int) -> ExpertEpisode:
     needs = PolicyNeeds.of(policy)
     shown = replace(needs, actions=JOINT_ANGLE.name, grounded=False).env_options
     env = make(TASK, setting=SETTING, split=SPLIT, episode=EPISODE, **shown)
-    poses: list[NDArray[np.float64]] = []
+    poses: list[Rows] = []
     if needs.actions != JOINT_ANGLE.name:
         _keep_poses(env, poses)
     try:
@@ -102,7 +106,7 @@ def record_expert(policy: Policy, rows: int) -> ExpertEpisode:
         env.close()
 
 
-def _pieces(expert: OraclePolicy, rows: int) -> Iterator[NDArray[np.float64]]:
+def _pieces(expert: OraclePolicy, rows: int) -> Iterator[Rows]:
     """Yield what the expert does, some rows at a time; it plans after the ones before."""
     steps = 0
     while steps < MAX_STEPS:
@@ -113,7 +117,7 @@ def _pieces(expert: OraclePolicy, rows: int) -> Iterator[NDArray[np.float64]]:
         steps += len(chunk)
 
 
-def _keep_poses(env: RoboIRGEnv, poses: list[NDArray[np.float64]]) -> None:
+def _keep_poses(env: RoboIRGEnv, poses: list[Rows]) -> None:
     from roboirg.simulation.proprioception import Proprioception
 
     reader: list[Proprioception] = []

@@ -5,14 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
-from roboirg.apps.policy_check.check_result import (
-    FAIL,
-    NOTE,
-    PASS,
-    WARN,
-    CheckAbortedError,
-    CheckResult,
-)
+from roboirg.apps.policy_check.check_result import CheckAbortedError, CheckResult
 from roboirg.apps.policy_check.contract_checks import (
     check_acting,
     check_determinism,
@@ -85,7 +78,7 @@ def print_check_results(results: list[CheckResult], console: Console) -> None:
 
     from roboirg.core.plain_text import printable
 
-    styles = {PASS: "green", FAIL: "bold red", WARN: "bold yellow", NOTE: "yellow"}
+    styles = {"pass": "green", "fail": "bold red", "warn": "bold yellow", "note": "yellow"}
     table = Table(box=None, pad_edge=False)
     for heading in ("check", "", "result"):
         table.add_column(heading)
@@ -96,7 +89,9 @@ def print_check_results(results: list[CheckResult], console: Console) -> None:
             escape(printable(result.message)),
         )
     console.print(table, highlight=False)
-    failed, warned = (sum(one.verdict == verdict for one in results) for verdict in (FAIL, WARN))
+    verdicts = [result.verdict for result in results]
+    failed = verdicts.count("fail")
+    warned = verdicts.count("warn")
     checks = counted(len(results), "check")
     summary = f"{failed} of {checks} failed" if failed else f"{checks}, none failed"
     console.print(f"{summary}, {counted(warned, 'warning')}." if warned else f"{summary}.")

@@ -7,10 +7,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from roboirg.apps.policy_check.check_result import FAIL, CheckAbortedError, describe_error
-from roboirg.apps.policy_check.expert_episode import ExpertEpisode
+from roboirg.apps.policy_check.check_result import ending_checks
+from roboirg.apps.policy_check.expert_episode import ExpertEpisode, Rows
 from roboirg.core.actions import ActionSpace, check_chunk
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies.by_name.finding import make_policy
@@ -20,7 +19,7 @@ from roboirg.policies.contract.synthetic_episodes import SyntheticEpisode, Synth
 CALLS = 3
 """Calls of `act` in a synthetic episode."""
 VIDEO_STEPS = 40
-Chunks = list[NDArray[np.float64]]
+Chunks = list[Rows]
 FIRST, SECOND = "Put the red cube on the target.", "Press the second button from the left."
 
 
@@ -49,7 +48,8 @@ class PolicyPlayer:
     """
 
     def __init__(self, source: str | Policy, seed: int) -> None:
-        self.source, self.seed = source, seed
+        self.source = source
+        self.seed = seed
         self.needs = PolicyNeeds()
         self.repeatable = False
         self._policy: Policy | None = None
@@ -102,19 +102,16 @@ class PolicyPlayer:
             CheckAbortedError: the policy raised, or gave no actions.
         """
         episode = copy.deepcopy(episode)
-        try:
+        with ending_checks(check, "reset(): "):
             policy = self.make_fresh() if fresh or self._policy is None else self._policy
             policy.reset(episode.instruction, episode.demonstration)
-        except (Exception, SystemExit) as error:
-            raise CheckAbortedError(check, FAIL, f"reset(): {describe_error(error)}") from error
-        episodes, observation = SyntheticEpisodes(self.needs, self.seed), episode.first
+        episodes = SyntheticEpisodes(self.needs, self.seed)
+        observation = episode.first
         rollout = SyntheticRollout([], "")
         for _ in range(calls):
-            try:
+            with ending_checks(check, "act(): "):
                 actions = policy.act(observation)
                 chunk = check_chunk(actions, self.space)
-            except (Exception, SystemExit) as error:
-                raise CheckAbortedError(check, FAIL, f"act(): {describe_error(error)}") from error
             # A copy: a policy may reuse its array.
             rollout.chunks.append(chunk.copy())
             rollout = rollout._replace(dtype=str(np.asarray(actions).dtype))
@@ -138,16 +135,14 @@ class PolicyPlayer:
         return self._policy
 
     def close(self) -> None:
-        policy, self._policy = self._policy, None
+        policy = self._policy
+        self._policy = None
         close_policy(policy)
 
 
 def are_equal(one: SyntheticRollout, other: SyntheticRollout) -> bool:
     """Return whether two rollouts have the same actions, bit for bit."""
-    return len(one.chunks) == len(other.chunks) and all(
-        np.array_equal(first, second)
-        for first, second in zip(one.chunks, other.chunks, strict=True)
-    )
+    return all(map(np.array_equal, one.chunks, other.chunks))
 
 
 def describe_difference(one: SyntheticRollout, other: SyntheticRollout) -> str:

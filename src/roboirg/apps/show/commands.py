@@ -50,7 +50,8 @@ def show(
     found = get_episode(task, split, episode)
     options = word_options(**context.obj)
     check_options(options)
-    possible, chosen = settings_of(get_task(task)), known_settings(settings)
+    possible = settings_of(get_task(task))
+    chosen = known_settings(settings)
     shown = [name for name in chosen if name in possible] or chosen
     if words:
         _print_words(found, shown, options)

@@ -26,7 +26,8 @@ _CAPTION_LINES, _CAPTION_LINE = 4, 0.11
 """Lengths in inches."""
 _WORDS_AT = 0.85
 """Left end of what is said, inches."""
-_WORD_LETTERS, _CAPTION_LETTERS = 122, 24
+_WORD_LETTERS, _CAPTION_LETTERS = 122, 24 / 1.09
+"""Letters of a line of words, and of an inch of a caption."""
 _VIDEO = "#E69F00"
 _PALE = "#8a8a8a"
 _BLACK = "#000000"
@@ -74,7 +75,8 @@ def draw_strip(title: str, said: Sequence[SpokenSetting], moments: Sequence[Stri
     size = (PAGE_INCHES - 2 * _EDGE - (columns - 1) * _GAP) / columns
     words = [textwrap.wrap(one.words, _WORD_LETTERS) or [""] for one in said]
     head = _EDGE + _TITLE + _LINE * sum(map(len, words))
-    captions = [textwrap.wrap(one.caption, _letters(size)) for one in moments]
+    letters = int(_CAPTION_LETTERS * size)
+    captions = [textwrap.wrap(one.caption, letters) for one in moments]
     most = min(_CAPTION_LINES, max(map(len, captions)))
     row = size + _GAP + (most + 1) * _CAPTION_LINE + 0.16
     height = head + rows * row
@@ -108,8 +110,3 @@ def draw_strip(title: str, said: Sequence[SpokenSetting], moments: Sequence[Stri
         write(x, y, when, fontsize=6, color=color, fontweight="bold")
         write(x, y + _CAPTION_LINE, "\n".join(caption[:most]), fontsize=6, linespacing=1.15)
     return figure
-
-
-def _letters(size: float) -> int:
-    """Return how many letters of a caption fit below a picture of a size in inches."""
-    return int(_CAPTION_LETTERS * size / 1.09)

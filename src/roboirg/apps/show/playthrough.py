@@ -105,7 +105,8 @@ class _MomentRecorder:
     _is_demonstration: bool | None = None
 
     def __call__(self, env: RoboIRGEnv, is_demonstration: bool) -> None:
-        judge, step = env.session.judge, env.session.world.elapsed
+        judge = env.session.judge
+        step = env.session.world.elapsed
         key_event = self.key_events.at(step, judge.index)
         begins = is_demonstration != self._is_demonstration
         completes = judge.index > self._completed
@@ -144,7 +145,7 @@ def choose_moments(ranks: Sequence[int]) -> tuple[int, ...]:
     a sheet up to the minimum.
     """
     chosen: list[int] = []
-    for rank in (_ESSENTIAL, _STAGE, _KEY_EVENT, _VIDEO_STAGE, _FILLER):
+    for rank in range(_FILLER + 1):
         candidates = [position for position, one in enumerate(ranks) if one == rank]
         room = max(0, (MIN_MOMENTS if rank == _FILLER else MAX_MOMENTS) - len(chosen))
         chosen += [candidates[number] for number in evenly_spaced(len(candidates), room)]

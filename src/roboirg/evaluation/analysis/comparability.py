@@ -14,6 +14,7 @@ from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import words_label
 from roboirg.evaluation.analysis.published import MAX_STEPS, TRIALS, published_tasks
+from roboirg.evaluation.analysis.results.frame import RunNames
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cell, CellKey
 from roboirg.language.settings import EXPLICIT
@@ -69,7 +70,7 @@ def comparison_sign(differences: Differences | None) -> str:
     return DIFFERENT_SIGN if differences else COMPARABLE_SIGN
 
 
-def comparison_notes(found: AllDifferences, names: Mapping[PolicyRun, str]) -> list[str]:
+def comparison_notes(found: AllDifferences, names: RunNames) -> list[str]:
     """Return sentences that explain the signs and say what differs, by policy and task."""
     cells = {key: one for key, one in found.items() if comparison_sign(one)}
     notes = []
@@ -95,15 +96,20 @@ def comparison_notes(found: AllDifferences, names: Mapping[PolicyRun, str]) -> l
 
 def _text(tasks: Mapping[str, Differences]) -> str:
     """Return what differs, with the tasks in which it does unless these are all."""
+    found: dict[str, list[str]] = {}
+    for task, differences in tasks.items():
+        for difference in differences:
+            found.setdefault(difference, []).append(task)
     parts = []
-    for difference in dict.fromkeys(one for differences in tasks.values() for one in differences):
-        where = [task for task, differences in tasks.items() if difference in differences]
-        parts.append(difference + ("" if len(where) == len(tasks) else f" ({', '.join(where)})"))
+    for difference, where in found.items():
+        named = "" if len(where) == len(tasks) else f" ({', '.join(where)})"
+        parts.append(difference + named)
     return "; ".join(parts)
 
 
 def _explicit_differences(policy_run: PolicyRun, cell: Cell) -> Iterator[str]:
-    conditions, versions = policy_run.conditions, policy_run.versions
+    conditions = policy_run.conditions
+    versions = policy_run.versions
     environment = conditions.environment
     # Only a file with exactly RoboMME's sentences can be opened under its name.
     if (conditions.wordings or "").partition("@")[0] != ROBOMME_NAME:
@@ -122,8 +128,8 @@ def _explicit_differences(policy_run: PolicyRun, cell: Cell) -> Iterator[str]:
         yield f"{environment.meshes} meshes"
     if environment.demonstration_frames not in (None, "all"):
         yield f"frames of the video: {environment.demonstration_frames}"
-    if versions is not None and versions.environment != ENVIRONMENT_VERSION:
-        yield f"environment version {versions.environment}"
+    if versions.environment_version not in (None, ENVIRONMENT_VERSION):
+        yield f"environment version {versions.environment_version}"
     if cell.errors:
         yield counted(cell.errors, "error")
     if cell.missing:

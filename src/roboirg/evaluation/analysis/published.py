@@ -103,11 +103,10 @@ def published_rows(table: str) -> tuple[PublishedRow, ...]:
         text = line["success_rate_percent"]
         rate = Decimal(text).quantize(DIGITS) if text else None
         grouped.setdefault((model, _options(line)), {})[line["task"]] = rate
-    rows = []
-    for (model, options), rates in grouped.items():
-        average = cast("Decimal", rates.pop(AVERAGE))
-        rows.append(PublishedRow(model, options, rates, average))
-    return tuple(rows)
+    return tuple(
+        PublishedRow(*key, rates, cast("Decimal", rates.pop(AVERAGE)))
+        for key, rates in grouped.items()
+    )
 
 
 def published_tasks(table: str) -> tuple[str, ...]:

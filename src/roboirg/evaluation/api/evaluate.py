@@ -63,18 +63,13 @@ def evaluate(
     """
     from roboirg.evaluation.api.python_run import play_plan, python_plan
     from roboirg.evaluation.api.results import Results
+    from roboirg.evaluation.plan.plan import PLAN_KEYS
 
-    _check_options(options)
+    # The nearest name may be a parameter's, too.
+    known = (*inspect.signature(evaluate).parameters, *PLAN_KEYS)
+    check_names("option of evaluate()", options, known)
     plan = python_plan(
         policy, tasks=tasks, settings=settings, forms=forms, split=split, episodes=episodes,
         policy_seeds=policy_seeds, video=video, **options,
     )  # fmt: skip
     return Results(play_plan(plan, out, workers=workers, progress=progress))
-
-
-def _check_options(options: Mapping[str, object]) -> None:
-    """Refuse further options that no plan has; the nearest name may be a parameter's, too."""
-    from roboirg.evaluation.plan.plan import PLAN_KEYS
-
-    own = inspect.signature(evaluate).parameters
-    check_names("option of evaluate()", options, (*own, *PLAN_KEYS))

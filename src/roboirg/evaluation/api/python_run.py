@@ -12,6 +12,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.evaluation.records.run_files import run_folder
 from roboirg.evaluation.run.executor import choose_executor
 from roboirg.evaluation.run.progress import ConsoleReporter
 from roboirg.evaluation.run.runner import episode_runner, run_plan
@@ -20,13 +21,13 @@ from roboirg.util.console_width import progress_console
 
 AnyPolicy = str | type[Any] | object
 """A spec as on the command line, a class, or an object with ``reset`` and ``act``."""
+AnyPolicies = AnyPolicy | Sequence[AnyPolicy] | Mapping[str, AnyPolicy]
+"""One, several, or several by name."""
 
 RUNS = Path("runs")
 
 
-def python_plan(
-    policies: AnyPolicy | Sequence[AnyPolicy] | Mapping[str, AnyPolicy], **options: object
-) -> Plan:
+def python_plan(policies: AnyPolicies, **options: object) -> Plan:
     """Return a checked plan; the options are those of `make_plan`."""
     refs = _named(policies)
     if any(one.place == "python" for one in refs):
@@ -50,7 +51,8 @@ def play_plan(
             in it.
         progress: whether to show it.
     """
-    folder = (_new_folder() if out is None else Path(out)).absolute()
+    folder = _new_folder() if out is None else run_folder(out)
+    folder = folder.absolute()
     here = [one.name for one in plan.policies if one.place == "python"]
     if here:
         if workers:
@@ -71,9 +73,7 @@ def play_plan(
     return folder
 
 
-def _named(
-    policies: AnyPolicy | Sequence[AnyPolicy] | Mapping[str, AnyPolicy],
-) -> list[PolicyRef]:
+def _named(policies: AnyPolicies) -> list[PolicyRef]:
     if isinstance(policies, Mapping):
         return [policy_of(policy, name) for name, policy in policies.items()]
     given = policies if isinstance(policies, (list, tuple)) else [policies]

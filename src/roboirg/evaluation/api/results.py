@@ -25,6 +25,7 @@ from roboirg.evaluation.analysis.tables.rendering import get_format
 from roboirg.evaluation.analysis.tables.table_notes import with_mixtures
 from roboirg.evaluation.plan.sources import Source, opened_sources
 from roboirg.evaluation.records.record import Record, Summary
+from roboirg.evaluation.records.run_files import run_folder
 from roboirg.evaluation.records.store import read_records
 
 if TYPE_CHECKING:
@@ -70,10 +71,14 @@ class Results:
     """What a run yielded. Notebooks show its main table, or that of all tasks it has.
 
     Attributes:
-        folder: of the run, with ``records.jsonl``; `roboirg` commands take it, too.
+        folder: of the run, with ``records.jsonl``, which may be given as a text; `roboirg`
+            commands take it, too.
     """
 
     folder: Path
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "folder", run_folder(self.folder))
 
     @property
     def errors(self) -> int:
@@ -101,10 +106,18 @@ class Results:
         return results(self.folder)
 
     def rates(self) -> dict[tuple[str, str], float]:
-        """Return the mean success over tasks, 0 to 1, by policy and setting (with options)."""
+        """Return the mean success over tasks, 0 to 1, by policy and setting (with options).
+
+        Runs of a policy under several conditions or in several versions have labels of their own.
+        """
+        data = self._data.told
+        names = data.frame.names
         return {
-            (key.policy_run.policy, options_label(key.options)): float(one.rate)
-            for key, one in self._data.told.summaries.items()
+            (
+                names[key.policy_run].removesuffix(key.policy_run.mark),
+                options_label(key.options),
+            ): float(one.rate)
+            for key, one in data.summaries.items()
             if key.scope == ALL_TASKS and one.rate is not None
         }
 

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from roboirg.core.episode import Episode, Goal
-from roboirg.language import instruct
 from roboirg.language.instruction import Instruction
 from roboirg.shortcuts.command_chance import blind_goals, is_right
-from roboirg.tasks import goals_of, with_goal
+from roboirg.tasks import goals_of
 
 MOST = 4
 _BLOCK = 12
@@ -43,11 +42,6 @@ def draw_choices(
     group = (episode.task, episode.split, repr(instruction.setting), instruction.form, str(block))
     right = int(_generator("place", *group).permutation(_BLOCK)[place]) % (len(others) + 1)
     return (*others[:right], episode.goal, *others[right:]), right
-
-
-def explicit_command(episode: Episode, goal: Goal, pool: str, language: int) -> str:
-    """Return the explicit command of a goal of the scene, in words of a pool of a language."""
-    return instruct(with_goal(episode, goal), "explicit", wordings=pool, language=language).text
 
 
 def _wrong_goals(episode: Episode, instruction: Instruction) -> Sequence[Goal]:

@@ -11,7 +11,7 @@ from typing import Any, cast
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS
-from roboirg.evaluation.grounding_items.goal_choices import draw_choices, explicit_command
+from roboirg.evaluation.grounding_items.goal_choices import draw_choices
 from roboirg.evaluation.grounding_items.grounding_item import LETTERS, GroundingItem
 from roboirg.evaluation.grounding_items.media_store import EpisodeMedia
 from roboirg.evaluation.grounding_items.referents import is_ordered, noun, pointed_kinds
@@ -25,7 +25,7 @@ from roboirg.policies.vlm.listener_query import PROMPTS, question_texts
 from roboirg.policies.vlm.prompt_files import Prompts, load_prompts
 from roboirg.shortcuts.command_chance import blind_goals, is_right, right_share
 from roboirg.shortcuts.shortcut_scores import hidden_slots
-from roboirg.tasks import get_task
+from roboirg.tasks import get_task, with_goal
 
 QUESTIONS = "grounding_questions"
 """Name of the prompts for the questions that the listener does not ask."""
@@ -97,7 +97,8 @@ def _make_item(
     texts = question_texts(listener, schema, instruction.text, media.steps)
     choices, right = draw_choices(episode, instruction, name)
     pool = next(one for one in POOLS if one != instruction.metadata["pool"])
-    commands = [explicit_command(episode, goal, pool, options.language) for goal in choices]
+    explicit = InstructionOptions(wordings=pool, language=options.language)
+    commands = [instruct_with(with_goal(episode, goal), explicit).text for goal in choices]
     goals, answers = task.goals(episode.scene), schema.answers
     chance = right_share(blind_goals(instruction, episode), episode)
     return GroundingItem(

@@ -5,9 +5,8 @@ from __future__ import annotations
 import itertools
 import json
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import msgspec
 
@@ -18,21 +17,17 @@ from roboirg.evaluation.grounding_items.grounding_item import (
     QuestionKind,
 )
 from roboirg.policies.vlm.goal_schema import goal_schema
-from roboirg.util.json_reply import UnparsableReplyError, json_object
+from roboirg.util.reply_reading import UnparsableReplyError, chosen_letter, last_json
 
-_FIRST_LETTER = re.compile(r"^\W*([A-D])(?![A-Za-z'])", re.IGNORECASE)
-_CONCLUSION = re.compile(
-    r"(?:answer|choice|option)(?:\s+is|\s*:)?\W*\b([A-D])(?![A-Za-z'])", re.IGNORECASE
-)
-_ARTICLE = re.compile(r"a\s+[a-z]", re.IGNORECASE)
-"""*A cube* names no choice."""
+Coordinate = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
+"""Columns or rows of a picture. No bound holds for NaN."""
 
 
 class Pixel(msgspec.Struct, frozen=True):
     """A place in a picture: `x` columns from the left, `y` rows from the top."""
 
-    x: float
-    y: float
+    x: Coordinate
+    y: Coordinate
 
 
 class ReplyVerdict(NamedTuple):
@@ -41,7 +36,7 @@ class ReplyVerdict(NamedTuple):
     Attributes:
         right: whether all of it is right.
         understood: the reply in its usual form: slots as canonical JSON, a letter, or points as
-            JSON; None if it names no answer to the question.
+            JSON; None if it is unreadable: it names no answer to the question, or several letters.
         parts: for slots, whether each field is right, by name; for points, whether each thing that
             is meant is hit, by number from 1.
     """
@@ -54,8 +49,9 @@ class ReplyVerdict(NamedTuple):
 def judge_reply(item: GroundingItem, kind: QuestionKind, reply: str) -> ReplyVerdict:
     """Return the verdict on a model's reply to one of an item's questions.
 
-    Slots are read as by the language-model listener: words and code fences around the JSON object
-    do no harm, but a value that the task does not have makes the reply no answer.
+    It is read as by the language-model listener (`roboirg.util.reply_reading`): thoughts are left
+    out, words and code fences around a JSON object do no harm, but a value that the task does not
+    have makes the reply unreadable.
 
     Raises:
         UnknownNameError: the item's task is not installed.
@@ -99,26 +95,11 @@ def _judge_slots(item: GroundingItem, reply: str) -> ReplyVerdict:
 
 
 def _judge_choice(item: GroundingItem, reply: str) -> ReplyVerdict:
-    letter = _read_letter(reply)
-    if letter is None or letter not in LETTERS[: len(item.choices)]:
+    try:
+        letter = chosen_letter(reply, LETTERS[: len(item.choices)])
+    except UnparsableReplyError:
         return ReplyVerdict(False, None, {})
     return ReplyVerdict(letter == item.choice, letter, {})
-
-
-def _read_letter(reply: str) -> str | None:
-    """Return the letter of a reply: at its beginning, or after *the answer is*."""
-    try:
-        named = json_object(reply).get("choice")
-        reply = named if isinstance(named, str) else reply
-    except UnparsableReplyError:
-        pass
-    named_letters = [
-        found[1].upper()
-        for pattern in (_FIRST_LETTER, _CONCLUSION)
-        for found in pattern.finditer(reply.strip())
-        if not _ARTICLE.match(reply.strip(), found.start(1))
-    ]
-    return named_letters[-1] if named_letters else None
 
 
 def _judge_points(item: GroundingItem, reply: str) -> ReplyVerdict:
@@ -140,10 +121,16 @@ def _numbered(hits: Sequence[bool]) -> dict[str, bool]:
 
 
 def _read_points(reply: str) -> list[Pixel] | None:
-    """Return the points of a reply; None if it has none."""
+    """Return the points of a reply; None if it has none.
+
+    They are in a field, in a list, or a single one is the object itself.
+    """
     try:
-        found = json_object(reply)
-        return msgspec.convert(found.get("points", [found]), list[Pixel]) or None
+        found = last_json(reply)
+        if isinstance(found, dict):
+            found = found.get("points", [found])
+        # Not strict: a number may be a text.
+        return msgspec.convert(found, list[Pixel], strict=False) or None
     except (UnparsableReplyError, msgspec.ValidationError):
         return None
 

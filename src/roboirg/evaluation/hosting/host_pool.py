@@ -13,6 +13,8 @@ from typing import Any, Self
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.hosting.messages import Loss, receive_request, send
 from roboirg.evaluation.hosting.policy_child import PolicyChild
+from roboirg.policies.by_name.key_variables import environment_for
+from roboirg.tasks.splits.private_splits import SALT_VARIABLE
 
 DEFAULT_BATCH = 16
 
@@ -29,10 +31,12 @@ class HostSettings:
     Attributes:
         batch: most episodes that a policy is asked about together.
         devices: values of ``CUDA_VISIBLE_DEVICES``; each policy gets a process on each of them.
+        variables: environment variables with secrets that every policy gets.
     """
 
     batch: int = DEFAULT_BATCH
     devices: tuple[str, ...] = ()
+    variables: tuple[str, ...] = ()
 
 
 @contextlib.contextmanager
@@ -59,7 +63,7 @@ class HostPool:
 
     def __init__(self, settings: HostSettings) -> None:
         self._settings = settings
-        self._children: dict[tuple[PolicyRef | None, str | None], PolicyChild] = {}
+        self._children: dict[tuple[PolicyRef, str | None], PolicyChild] = {}
         self._lines: list[socket.socket] = []
         self._lock, self._is_closed = threading.Lock(), False
         # The kernel ends a process with the thread that started it.
@@ -108,17 +112,15 @@ class HostPool:
                     if request.method in ("open", "leave"):  # a world may have given up an episode
                         self._leave(child)
                         child = None
-                    if passed is not None:
+                    if passed is not None and request.policy is not None:
                         with passed, contextlib.suppress(OSError):  # there is no room for one
                             child = self._enter(request.policy, passed)
                     elif request.method == "loss":
                         send(line, _NO_PROCESS if child is None else child.loss())
-                    elif child is None:
-                        continue
-                    elif request.method == "kill":
-                        child.kill()
                     elif request.method == "check":
-                        child.check(request.limit_s)
+                        send(line, None if child is None else child.check(request.limit_s))
+                    elif request.method == "kill" and child is not None:
+                        child.kill()
         finally:
             self._leave(child)
             line.close()
@@ -128,7 +130,7 @@ class HostPool:
             with self._lock:
                 child.worlds -= 1
 
-    def _enter(self, policy: PolicyRef | None, passed: socket.socket) -> PolicyChild:
+    def _enter(self, policy: PolicyRef, passed: socket.socket) -> PolicyChild:
         """Let the process of a policy with the fewest episodes serve one more.
 
         Raises:
@@ -144,16 +146,19 @@ class HostPool:
         child.serve(passed, self._settings.batch)
         return child
 
-    def _child(self, policy: PolicyRef | None, device: str | None) -> PolicyChild:
+    def _child(self, policy: PolicyRef, device: str | None) -> PolicyChild:
         """Return the process of a policy on a device, a new one if there is none or it has died."""
         child = self._children.get((policy, device))
         if child is None or child.is_over:
-            variables = {} if device is None else {"CUDA_VISIBLE_DEVICES": device}
-            child = self._starter.submit(PolicyChild, variables).result()
+            environment = environment_for(policy, self._settings.variables)
+            environment.pop(SALT_VARIABLE, None)
+            if device is not None:
+                environment["CUDA_VISIBLE_DEVICES"] = device
+            child = self._starter.submit(PolicyChild, environment).result()
             self._children[policy, device] = child
         return child
 
-    def _end_others(self, policy: PolicyRef | None) -> None:
+    def _end_others(self, policy: PolicyRef) -> None:
         """End what has no episodes: a run plays one policy after the other."""
         for key, child in tuple(self._children.items()):
             if key[0] != policy and not child.worlds:

@@ -37,6 +37,7 @@ from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.evaluation.episode_errors import describe_error
 from roboirg.evaluation.hosting.messages import (
+    DRAW_S,
     MAX_TEXT,
     Begun,
     Call,
@@ -63,8 +64,6 @@ GATHER_S = 0.003
 """How long a call waits for others that could be carried out together with it."""
 STUCK_S = 60
 """How long a world may take to send the rest of a message; then it is given up."""
-DRAW_S = 600
-"""How long a world may take to draw."""
 
 
 @dataclass(eq=False)

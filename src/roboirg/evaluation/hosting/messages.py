@@ -7,11 +7,11 @@ such as a line's other end, travel with a request.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
-import time
 from collections.abc import Callable
-from typing import Annotated, Any, Literal, NoReturn
+from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
@@ -32,6 +32,8 @@ MAX_MESSAGE = 16 * 2**20
 MAX_TEXT = 2000
 MAX_OUTPUT = 256 * 2**10
 """Bytes that are kept of what a policy prints in a call."""
+DRAW_S = 600
+"""How long a world may take to draw."""
 
 _SIZE_BYTES = 8
 _ARRAY = 1
@@ -39,6 +41,11 @@ _ARRAY = 1
 _LINE_BUFFER = 2**20
 _MOST_JOINED = 8 * 2**20
 """Bytes that are copied to be sent at once, which wakes the receiver once."""
+
+TimeLeft = Callable[[], float]
+"""Returns the seconds that the next piece of a message may take.
+
+It raises `TimeoutError` when the time for the whole message is over."""
 
 Text = Annotated[str, Meta(max_length=MAX_TEXT)]
 Names = Annotated[tuple[Text, ...], Meta(max_length=64)]
@@ -49,8 +56,8 @@ class HostRequest(Struct, forbid_unknown_fields=True, omit_defaults=True):
 
     Attributes:
         method: ``open`` serves an episode, whose line comes with it; ``leave`` ends that. ``loss``
-            asks how the process ended, ``kill`` ends it, ``check`` ends it if it begins nothing
-            more.
+            asks how the process ended, ``kill`` ends it. ``check`` asks how long a call may wait
+            for its turn, and ends the process if it begins nothing more.
         policy: that is meant.
         limit_s: how long a call may take.
         batch: most episodes that the policy is asked about together.
@@ -176,19 +183,16 @@ def receive_request(line: socket.socket) -> tuple[HostRequest, socket.socket | N
     return msgspec.msgpack.decode(data, type=HostRequest), passed
 
 
-def _give_up() -> NoReturn:
-    raise  # noqa: PLE0704 - what is being handled
-
-
-def send(line: socket.socket, message: object, on_timeout: Callable[[], None] = _give_up) -> None:
+def send(line: socket.socket, message: object, time_left: TimeLeft | None = None) -> None:
     """Send a message, led by its size and followed by the bytes of its arrays.
 
     Args:
-        line: may have a time limit.
+        line: a socket.
         message: of plain data and arrays.
-        on_timeout: called when the limit passes, after which the waiting goes on.
+        time_left: asked before each piece; None for a line without a time limit.
 
     Raises:
+        TimeoutError: the other end did not take in all of it in time.
         TypeError: it holds something other than plain data and arrays.
     """
     arrays: list[memoryview] = []
@@ -207,37 +211,34 @@ def send(line: socket.socket, message: object, on_timeout: Callable[[], None] = 
     for part in parts:
         left = memoryview(part)
         while left:
-            try:
+            if time_left is not None:
+                line.settimeout(time_left())
+            with contextlib.suppress(TimeoutError):
                 left = left[line.send(left) :]
-            except TimeoutError:
-                on_timeout()
 
 
 def receive(
-    line: socket.socket,
-    limit: int | None = None,
-    on_timeout: Callable[[], None] = _give_up,
-    until: float | None = None,
+    line: socket.socket, limit: int | None = None, time_left: TimeLeft | None = None
 ) -> bytearray:
     """Return the next message of a line, which has no arrays.
 
     Args:
-        line: may have a time limit.
+        line: a socket.
         limit: most bytes of a message.
-        on_timeout: called when the time limit passes, after which the waiting goes on.
-        until: time of the monotonic clock at which all of it must be here, instead of that limit.
+        time_left: asked before each piece; None for a line without a time limit.
 
     Raises:
         EOFError: the line was closed.
+        TimeoutError: not all of it came in time.
         ValueError: the message is larger than the limit.
     """
     head = bytearray(_SIZE_BYTES)
-    _fill(line, head, on_timeout, until)
+    _fill(line, head, time_left)
     size = int.from_bytes(head, "big")
     if limit is not None and size > limit:
         raise ValueError(f"a message of {size:,} bytes; at most {limit:,} are read")
     data = bytearray(size)
-    _fill(line, data, on_timeout, until)
+    _fill(line, data, time_left)
     return data
 
 
@@ -258,19 +259,15 @@ def receive_call(line: socket.socket) -> Call:
 
 
 def _fill(
-    line: socket.socket,
-    buffer: bytearray | memoryview,
-    on_timeout: Callable[[], None] = _give_up,
-    until: float | None = None,
+    line: socket.socket, buffer: bytearray | memoryview, time_left: TimeLeft | None = None
 ) -> None:
     left = memoryview(buffer)
     while left:
-        if until is not None:
-            line.settimeout(max(until - time.monotonic(), 0.001))
+        if time_left is not None:
+            line.settimeout(time_left())
         try:
             count = line.recv_into(left, 0, socket.MSG_WAITALL)
         except TimeoutError:
-            on_timeout()
             continue
         if count == 0:
             raise EOFError

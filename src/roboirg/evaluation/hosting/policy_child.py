@@ -18,8 +18,14 @@ from collections.abc import Mapping
 from multiprocessing.connection import wait
 from tempfile import TemporaryFile
 
-from roboirg.evaluation.hosting.messages import MAX_OUTPUT, HostRequest, Loss, ask, take_output
-from roboirg.tasks.splits.private_splits import SALT_VARIABLE
+from roboirg.evaluation.hosting.messages import (
+    DRAW_S,
+    MAX_OUTPUT,
+    HostRequest,
+    Loss,
+    ask,
+    take_output,
+)
 from roboirg.util.child_process import GRACE_S, ChildExit, without_interrupts
 from roboirg.util.process_guard import descendants
 
@@ -41,19 +47,18 @@ PERIOD_S = 0.25
 class PolicyChild:
     """A policy process in an interpreter that knows nothing of this one, and the line to it.
 
-    The script and command line of this process are kept from it, and so is a private split's salt.
-    A guard between the two ends, with the process, all that it has started. The kernel ends both
-    with the thread that starts them.
+    The script and command line of this process are kept from it. A guard between the two ends, with
+    the process, all that it has started. The kernel ends both with the thread that starts them.
 
     Args:
-        variables: environment variables next to those of this process.
+        environment: its environment variables.
 
     Attributes:
         worlds: how many it serves.
     """
 
-    def __init__(self, variables: Mapping[str, str]) -> None:
-        self.worlds = 0
+    def __init__(self, environment: Mapping[str, str]) -> None:
+        self.worlds = self._most_worlds = 0
         self._fault: str | None = None
         self._asking, self._answered = threading.Lock(), 0.0
         self._has_started = self._was_ended = False
@@ -66,9 +71,8 @@ class PolicyChild:
         weakref.finalize(self, os.close, self._output)
         fcntl.fcntl(self._output, fcntl.F_SETFL, os.O_APPEND)
         self._line, theirs = socket.socketpair()
+        self._line.settimeout(GRACE_S)  # for one that reads nothing
         weakref.finalize(self, self._line.close)  # not before: another thread may wait for it
-        environment = {**os.environ, **variables}
-        environment.pop(SALT_VARIABLE, None)
         with theirs, without_interrupts():
             number = theirs.fileno()
             arguments = (str(number), str(os.getpid()), _MODULE, json.dumps(sys.path))
@@ -89,25 +93,42 @@ class PolicyChild:
             passed: its end of the line.
             batch: most episodes that are asked about together.
         """
+        self._most_worlds = max(self._most_worlds, self.worlds)
         with contextlib.suppress(OSError):
             ask(self._line, HostRequest("open", batch=batch), passed)
 
-    def check(self, limit_s: float) -> None:
-        """Kill it unless it is between two calls, or dead, at some time before the limit."""
+    def check(self, limit_s: float) -> float | None:
+        """Kill it unless it is between two calls at some time before the limit.
+
+        Args:
+            limit_s: how long a call may take.
+
+        Returns:
+            How long a call may wait for its turn in all: the process carries out the one that has
+            waited longest, so at most one of each world comes before, in which that may have to
+            draw. None if the process is over.
+        """
+        if self._answers(limit_s):
+            return self._most_worlds * (limit_s + DRAW_S)
+        if not self.is_over:
+            self._fault = f"the process began no call within {limit_s:g} s"
+            self.kill()
+        return None
+
+    def _answers(self, limit_s: float) -> bool:
+        """Return whether it answers within the limit that it is between two calls."""
         asked = time.monotonic()
         with self._asking, contextlib.suppress(OSError):
             if self._answered > asked:  # to another world, meanwhile
-                return
-            with contextlib.suppress(BlockingIOError):  # what it has said unasked is no answer
-                self._has_started |= bool(self._line.recv(MAX_OUTPUT, socket.MSG_DONTWAIT))
+                return True
+            if wait([self._line], 0.0):  # what it has said unasked is no answer
+                self._has_started |= bool(self._line.recv(MAX_OUTPUT))
             ask(self._line, HostRequest("check"))
             patience_s = limit_s + MARGIN_S if self._has_started else max(limit_s, GRACE_S)
             if wait([self._line], patience_s) and self._line.recv(1):
                 self._answered = time.monotonic()
-                return
-        if not self.is_over:
-            self._fault = f"the process began no call within {limit_s:g} s"
-            self.kill()
+                return True
+        return False
 
     @property
     def is_over(self) -> bool:
@@ -132,9 +153,10 @@ class PolicyChild:
         return Loss("infrastructure" if ended.was_killed else "policy", words, output, was_ended)
 
     def kill(self) -> None:
-        """Let the guard kill all; if something has stopped it, kill it and them."""
+        """Let the guard kill all, even one that was stopped; if it does not, kill it and them."""
         self._was_ended = True
         self._guard.terminate()
+        self._guard.send_signal(signal.SIGCONT)
         if self._wait(GUARD_S) is None:
             for pid in descendants(self._guard.pid):
                 with contextlib.suppress(OSError):

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 import msgspec
 
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.field_types import MOST_SECONDS
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.waiting import waiting
 from roboirg.evaluation.episode_errors import EpisodeError, EpisodeLostError
@@ -59,8 +60,8 @@ class PolicyLine:
     Args:
         hosts: the line on which to ask for that process, of `HostPool.connect`.
         policy: that the process plays.
-        limit_s: how long a call may take, without its wait for others and without the time that the
-            world takes to answer; None for no limit.
+        limit_s: how long a call may take, without its wait for others, which the supervisor limits,
+            and without the time that the world takes to answer; None for no limit.
         alone: whether it must not be asked about this episode together with others.
 
     Attributes:
@@ -78,10 +79,11 @@ class PolicyLine:
         *,
         alone: bool = False,
     ) -> None:
-        self._hosts, self._limit_s, self._alone = hosts, limit_s, alone
+        self._hosts, self._alone = hosts, alone
+        self._limit_s = limit_s or MOST_SECONDS
         self.output = b""
+        self._sent_at = self._until = 0.0
         self._line, theirs = new_line()
-        self._line.settimeout(limit_s)
         with theirs, _supervised():
             ask(hosts, HostRequest("open", policy), theirs)
 
@@ -93,7 +95,8 @@ class PolicyLine:
             answer: returns the world's answer to a question of the process; None if it has none.
 
         Raises:
-            EpisodeError: this call broke the process, or took too long.
+            EpisodeError: this call broke the process or took too long, or the process did not
+                begin it.
             EpisodeLostError: the process was lost through no fault of this episode, or a call for
                 several episodes failed.
         """
@@ -104,7 +107,9 @@ class PolicyLine:
             outcome = self._outcome(answer)
         except TimeoutError:
             words = f"the {phase} did not return within {self._limit_s:g} s"
-            raise self._lost(begun, phase, ("timeout", words)) from None
+            if begun is None:  # an honest process begins the call that has waited longest
+                words = f"the process did not begin the {phase}, though it was its turn"
+            raise self._lost(begun or Begun(), phase, ("timeout", words)) from None
         except (EOFError, OSError):
             raise self._lost(begun, phase) from None
         except (KeyboardInterrupt, SystemExit):  # the call goes on, so none can follow
@@ -136,33 +141,55 @@ class PolicyLine:
 
     def _begin(self, call: Call) -> Begun:
         """Send a call and wait for its turn."""
+        self._sent_at = time.monotonic()
+        self._until = self._sent_at + self._limit_s
         with waiting("its turn in the policy's process", is_queue=True):
-            send(self._line, call, self._check)
-            begun = read_child(receive(self._line, MAX_BEGUN, self._check))
+            send(self._line, call, self._turn_left)
+            begun = read_child(receive(self._line, MAX_BEGUN, self._turn_left))
         if not isinstance(begun, Begun) or (begun.together and self._alone):
             raise ValueError("a message that was not asked for")
         return begun
 
-    def _check(self) -> None:
-        """Let the supervisor end the process if it begins no call at all."""
-        ask(self._hosts, HostRequest("check", limit_s=self._limit_s or 0.0))
+    def _turn_left(self) -> float:
+        """Return the seconds for which a call may wait on; let the supervisor check the process.
+
+        Raises:
+            EOFError: the process is over.
+            TimeoutError: the call has waited too long for its turn.
+        """
+        if time.monotonic() >= self._until:
+            ask(self._hosts, HostRequest("check", limit_s=self._limit_s))
+            most_s = msgspec.msgpack.decode(receive(self._hosts), type=float | None)
+            if most_s is None:
+                raise EOFError
+            self._until = min(time.monotonic() + self._limit_s, self._sent_at + most_s)
+        return self._time_left()
 
     def _outcome(self, answer: Answer | None) -> Outcome:
         """Return the outcome of a call that has begun; meanwhile answer questions."""
-        left_s = self._limit_s
+        self._until = time.monotonic() + self._limit_s
         for _ in range(MOST_QUESTIONS + 1):
-            start = time.monotonic()
-            until = None if left_s is None else start + left_s
-            reply = read_child(receive(self._line, MAX_MESSAGE, until=until))
-            self._line.settimeout(self._limit_s)
+            reply = read_child(receive(self._line, MAX_MESSAGE, self._time_left))
             if isinstance(reply, Outcome):
                 return reply
             if answer is None or not isinstance(reply, Question):
                 raise ValueError("a message that was not asked for")
-            if left_s is not None:  # what the world takes to draw is not the policy's time
-                left_s = max(left_s - (time.monotonic() - start), 0.001)
-            send(self._line, answer(reply))
+            asked_at = time.monotonic()
+            answered = answer(reply)
+            self._until += time.monotonic() - asked_at  # drawing is not the policy's time
+            send(self._line, answered, self._time_left)
         raise ValueError("it asked for the video again and again")
+
+    def _time_left(self) -> float:
+        """Return the seconds until the limit.
+
+        Raises:
+            TimeoutError: there are none.
+        """
+        left_s = self._until - time.monotonic()
+        if left_s <= 0:
+            raise TimeoutError
+        return left_s
 
     def _lost(
         self, begun: Begun | None, phase: str, fault: tuple[ErrorKind, str] | None = None

@@ -20,7 +20,9 @@ from roboirg.policies.planners.hierarchical_policy import joint_version
 LIMIT_S = 600.0
 
 
-def open_policy(ref: PolicyRef, limit_s: float = LIMIT_S, device: str | None = None) -> PolicyRef:
+def open_policy(
+    ref: PolicyRef, limit_s: float = LIMIT_S, settings: HostSettings | None = None
+) -> PolicyRef:
     """Return a policy with its version and its needs.
 
     One of the user's is made in a process of its own and begins a synthetic episode, because it may
@@ -29,7 +31,7 @@ def open_policy(ref: PolicyRef, limit_s: float = LIMIT_S, device: str | None = N
     Args:
         ref: as it was named.
         limit_s: seconds that this may take.
-        device: its ``CUDA_VISIBLE_DEVICES``.
+        settings: of its process, which is on the first of the devices.
 
     Raises:
         InvalidValueError: there is no such policy, its module cannot be imported, or its version is
@@ -41,7 +43,8 @@ def open_policy(ref: PolicyRef, limit_s: float = LIMIT_S, device: str | None = N
     forget_batched(ref.body)
     if ref.place == "python":
         return opened(ref)
-    hosted, settings = ref.hosted_part, HostSettings(devices=() if device is None else (device,))
+    hosted, settings = ref.hosted_part, settings or HostSettings()
+    settings = replace(settings, devices=settings.devices[:1])
     try:
         with (
             HostPool(settings) as pool,

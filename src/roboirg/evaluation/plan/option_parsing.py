@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import cast
 
 from roboirg import language
@@ -13,19 +13,25 @@ from roboirg.core.episode import DIFFICULTIES, SPLITS, Split
 from roboirg.core.errors import InvalidValueError
 from roboirg.tasks.splits import splits
 
+Names = tuple[str, ...]
+"""Different names, in the order in which they were given."""
+Numbers = tuple[int, ...]
+"""Different numbers, in the same way."""
+
 ALL = "all"
 """The name that selects everything."""
 
 _NAME = r"[\w.+ -]+"
 """Of a policy: it becomes part of names of files."""
 _MAX_NUMBERS = 10_000
-_NUMBER = r"\d{1,18}"
+_NUMBER = r"(?:0|[1-9]\d{0,17})"
+"""Without leading zeros: 010 is 8 to some readers."""
 _MAX_QUOTED_LENGTH = 40
 _NUMBERS_HINT = "write numbers and ranges such as 0,3,5-9"
 _EPISODES_HINT = f"{_NUMBERS_HINT}, or all"
 
 
-def parse_names(kind: str, given: object) -> tuple[str, ...]:
+def parse_names(kind: str, given: object) -> Names:
     """Parse names, in a text separated by commas; repeated names count once.
 
     Args:
@@ -33,21 +39,25 @@ def parse_names(kind: str, given: object) -> tuple[str, ...]:
         given: as typed, or several of these, or a number alone.
 
     Raises:
-        InvalidValueError: there is none.
+        InvalidValueError: there is none, or they are in a mapping, whose values would be lost.
     """
-    names = tuple(dict.fromkeys(word for word in _words(given) if word))
+    names = tuple(dict.fromkeys(word for word in _words(kind, given) if word))
     if not names:
         raise InvalidValueError(f"No {kind} was given.")
     return names
 
 
-def _words(given: object) -> list[str]:
+def _words(kind: str, given: object) -> list[str]:
+    if given is None:
+        return []
+    if isinstance(given, Mapping):
+        raise InvalidValueError(f"{_shorten(str(given))} is not a valid {kind}; write a list.")
     is_one = isinstance(given, str) or not isinstance(given, Iterable)
     parts: Iterable[object] = [given] if is_one else cast("Iterable[object]", given)
     return [word.strip() for one in parts for word in str(one).split(",")]
 
 
-def parse_arms(given: object) -> tuple[str, ...]:
+def parse_arms(given: object) -> Names:
     """Parse control arms; repeated ones count once.
 
     Raises:
@@ -58,18 +68,20 @@ def parse_arms(given: object) -> tuple[str, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def parse_policies(given: str | Iterable[str]) -> tuple[str, ...]:
+def parse_policies(given: Iterable[str]) -> Names:
     """Parse policies; one text may hold several names separated by commas.
 
     Raises:
         InvalidValueError: there is none, or ``NAME=SPEC`` has a name that is not allowed.
     """
-    # Addresses and their options may contain commas.
-    parts = (
-        (spec.strip(),) if "://" in spec or "?" in spec else parse_names("policy", spec)
-        for spec in ([given] if isinstance(given, str) else map(str, given))
-    )
-    policies = tuple(dict.fromkeys(name for names in parts for name in names))
+    found: list[str] = []
+    for spec in given:
+        # Addresses and their options may contain commas.
+        if "://" in spec or "?" in spec:
+            found.append(spec.strip())
+        else:
+            found += parse_names("policy", spec)
+    policies = tuple(dict.fromkeys(found))
     if not policies:
         raise InvalidValueError("No policy was given.")
     for policy in policies:
@@ -91,7 +103,7 @@ def name_and_spec(policy: str) -> tuple[str, str]:
 
 def means_all(given: object) -> bool:
     """Return whether names contain ``all``."""
-    return ALL in (word.lower() for word in _words(given))
+    return ALL in (word.lower() for word in _words("name", given))
 
 
 def parse_splits(text: str) -> tuple[Split, ...]:
@@ -99,7 +111,7 @@ def parse_splits(text: str) -> tuple[Split, ...]:
     return SPLITS if means_all(text) else (splits.check_fixed_split(text),)
 
 
-def parse_episodes(given: object, split: str, tasks: Collection[str]) -> tuple[int, ...]:
+def parse_episodes(given: object, split: str, tasks: Collection[str]) -> Numbers:
     """Parse episodes: ``4`` is the first four; with a comma or a dash it is a list of positions.
 
     So is a list. Its positions are not compared with the size of the split, which only those who
@@ -112,7 +124,8 @@ def parse_episodes(given: object, split: str, tasks: Collection[str]) -> tuple[i
         UnknownNameError: there is no such split.
         InvalidValueError: the text is neither a number nor a list, or the split has fewer episodes.
     """
-    words, size = parse_names("episode", given), functools.partial(splits.split_size, split)
+    words = parse_names("episode", given)
+    size = functools.partial(splits.split_size, split)
     if means_all(words) or {*words} <= {*DIFFICULTIES}:
         if split not in SPLITS:
             raise InvalidValueError(
@@ -146,23 +159,23 @@ def parse_episodes(given: object, split: str, tasks: Collection[str]) -> tuple[i
     return _union(ranges)
 
 
-def parse_stages(given: object) -> tuple[int, ...]:
+def parse_stages(given: object) -> Numbers:
     """Parse stages of the contextual setting, such as ``1,5``."""
     sets = "; ".join(",".join(map(str, stages)) for stages in language.STAGE_SETS)
     return _union(_parse_ranges("list of stages", given, f"the possible lists are {sets}"))
 
 
-def parse_stage_sets(given: object) -> tuple[tuple[int, ...], ...]:
+def parse_stage_sets(given: object) -> tuple[Numbers, ...]:
     """Parse several lists of stages, such as ``1,5; 1-5``."""
     sets: Iterable[object] = [given]
     if isinstance(given, str):
         sets = given.split(";")
-    elif isinstance(given, Iterable) and not all(isinstance(one, int) for one in given):
+    elif isinstance(given, list | tuple) and not all(isinstance(stage, int) for stage in given):
         sets = given
     return tuple(dict.fromkeys(map(parse_stages, sets)))
 
 
-def parse_numbers(kind: str, given: object) -> tuple[int, ...]:
+def parse_numbers(kind: str, given: object) -> Numbers:
     """Parse numbers and ranges, in a text separated by commas, such as ``0,3,5-9``."""
     return _union(_parse_ranges(kind, given, _NUMBERS_HINT))
 
@@ -180,7 +193,7 @@ def _parse_ranges(kind: str, given: object, hint: str) -> list[range]:
     return ranges
 
 
-def _union(ranges: Sequence[range]) -> tuple[int, ...]:
+def _union(ranges: Sequence[range]) -> Numbers:
     count = sum(map(len, ranges))
     if count > _MAX_NUMBERS:
         raise InvalidValueError(

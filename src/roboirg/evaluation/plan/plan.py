@@ -11,7 +11,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import asdict, fields, is_dataclass, replace
 from functools import partial
-from typing import Annotated, Any, Literal, NamedTuple, get_type_hints
+from typing import Annotated, Any, Literal, NamedTuple
 
 import msgspec
 from pydantic import (
@@ -31,12 +31,14 @@ from roboirg.core.arms import TOLD
 from roboirg.core.delivery import TURNS
 from roboirg.core.environment_options import EnvironmentOptions, check_demonstration_frames
 from roboirg.core.errors import InvalidValueError, check_names
-from roboirg.core.field_types import CONTROLS, NAME
+from roboirg.core.field_types import CONTROLS, check_policy_name
 from roboirg.core.instruction_options import DEFAULT_FRAME, InstructionOptions, identifying
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.word_pools import POOLS
 from roboirg.evaluation.hosting.policy_opening import open_policy
 from roboirg.evaluation.plan.option_parsing import (
+    Names,
+    Numbers,
     name_and_spec,
     parse_arms,
     parse_episodes,
@@ -62,6 +64,8 @@ from roboirg.language.settings import (
 )
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.by_name.finding import read_policy
+from roboirg.policies.by_name.key_variables import check_variables
+from roboirg.policies.contract.option_checking import flags_as_words
 from roboirg.tasks.splits import splits
 from roboirg.tasks.splits.private_splits import MissingSaltError, is_private
 from roboirg.util.short_hash import short_hash
@@ -85,7 +89,7 @@ def _policies(given: object) -> object:
     return tuple(dict.fromkeys(found))
 
 
-def _tasks(given: object) -> tuple[str, ...]:
+def _tasks(given: object) -> Names:
     """Return names of tasks and suites as tasks; `Plan.checked` refuses unknown ones."""
     names = parse_names("task", given)
     with contextlib.suppress(InvalidValueError):
@@ -93,17 +97,15 @@ def _tasks(given: object) -> tuple[str, ...]:
     return names
 
 
-def _settings(given: object) -> tuple[str, ...]:
+def _settings(given: object) -> Names:
     """Return names of settings, or the one word that stands for the same ones."""
     names = parse_names("setting", given)
-    words = tuple(one.lower() if one.lower() in SETTING_GROUPS else one for one in names)
+    words = tuple(name.lower() if name.lower() in SETTING_GROUPS else name for name in names)
     found = {*expand_settings(words)}
-    same = (one for one in words if one in SETTING_GROUPS and {*expand_settings([one])} == found)
-    return next(((one,) for one in same), words)
-
-
-def _word(given: object) -> object:
-    return "off" if given is False else given  # YAML 1.1 reads the word as false
+    for word in words:
+        if word in SETTING_GROUPS and {*expand_settings([word])} == found:
+            return (word,)
+    return words
 
 
 class ChosenWordings(NamedTuple):
@@ -131,10 +133,6 @@ def _open_wordings(given: object) -> object:
     return ChosenWordings(file, str(open_wordings(file)))
 
 
-Seeds = Annotated[tuple[int, ...], BeforeValidator(partial(parse_numbers, "policy seed"))]
-StageSets = Annotated[tuple[tuple[int, ...], ...], BeforeValidator(parse_stage_sets)]
-
-
 def _option(default: Any, text: str) -> Any:  # noqa: ANN401 - as it may be typed
     return Field(default=default, description=text)
 
@@ -147,40 +145,44 @@ class Plan(BaseModel):
     from `video` on are not part of a record's identity.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", validate_default=True, allow_inf_nan=False
+    )
 
     policies: Annotated[tuple[PolicyRef, ...], BeforeValidator(_policies)] = Field(
         description="Built-in names, package.module:Class, or addresses; NAME=SPEC gives one a "
         "name of its own."
     )
-    tasks: Annotated[tuple[str, ...], BeforeValidator(_tasks)] = _option(
+    tasks: Annotated[Names, BeforeValidator(_tasks)] = _option(
         "all", "Tasks or suites; all for the whole benchmark."
     )
-    settings: Annotated[tuple[str, ...], BeforeValidator(_settings)] = _option(
+    settings: Annotated[Names, BeforeValidator(_settings)] = _option(
         "all",
         "Settings; all for every setting that can express the episode, except the harder ones; "
         "every adds these. Next to names, tasks may lack any of them: all,grounded.",
     )
-    in_turns: Annotated[tuple[str, ...], names_of("setting")] = _option(
+    in_turns: Annotated[Names, names_of("setting")] = _option(
         (), "Settings that are also played with the utterances one after another."
     )
-    forms: Annotated[tuple[str, ...], names_of("form")] = _option(
+    forms: Annotated[Names, BeforeValidator(partial(parse_names, "form"))] = _option(
         "implicit", "implicit, resolved or both."
     )
     split: str = _option("test", "train, val, test, random, or the name of a private split.")
-    episodes: tuple[int, ...] = _option(
+    episodes: Numbers = _option(
         "4",
         "Positions in the split, from 0: a list such as 0,3,5-9; 4 for the first four; all; or "
         "easy, medium, hard.",
     )
-    policy_seeds: Seeds = _option("0", "Every seed plays every episode.")
-    arms: Annotated[tuple[str, ...], BeforeValidator(parse_arms)] = _option(
+    policy_seeds: Annotated[Numbers, BeforeValidator(partial(parse_numbers, "policy seed"))] = (
+        _option("0", "Every seed plays every episode.")
+    )
+    arms: Annotated[Names, BeforeValidator(parse_arms)] = _option(
         TOLD,
         "told, and control arms of the same scenes: other-goal, silent, silent-empty, scrambled, "
         "paraphrase:N (N other texts), again (another policy seed). Scenes without such an arm "
         "are left out.",
     )
-    stages: StageSets = _option(
+    stages: Annotated[tuple[Numbers, ...], BeforeValidator(parse_stage_sets)] = _option(
         "1-5",
         "Sets of stages of the contextual setting, separated by semicolons: 1,5;1-5; every set is "
         "played.",
@@ -194,9 +196,7 @@ class Plan(BaseModel):
         InstructionOptions(), "Further options of instructions, for settings that read them."
     )
     environment: EnvironmentOptions = _option(EnvironmentOptions(), "How episodes are played.")
-    video: Annotated[VideoMode, BeforeValidator(_word)] = _option(
-        "off", "Episodes whose video is recorded: off, failures or all."
-    )
+    video: VideoMode = _option("off", "Episodes whose video is recorded: off, failures or all.")
     long_prompts: Literal["send", "refuse"] = _option(
         "send",
         "What to do with prompts longer than the limit that a policy declares: send or refuse.",
@@ -212,32 +212,45 @@ class Plan(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _nest(cls, given: object) -> object:
-        """Put options that stand alone into their sections; None stands for the default."""
+        """Put options that stand alone into their sections."""
         if not isinstance(given, Mapping):
             return given
-        found = {name: value for name, value in given.items() if value is not None}
+        found = flags_as_words(given)
         check_names("plan key", found, PLAN_KEYS)
         for name, keys in SECTION_KEYS.items():
             section = found.get(name)
-            check_names(f"key of {name}", section if isinstance(section, Mapping) else (), keys)
+            options = section if isinstance(section, Mapping) else {}
+            check_names(f"key of {name}", options, keys)
+            for option in options:
+                if option in found:
+                    raise InvalidValueError(
+                        f"{option} is {found[option]!r}, but stands in {name}, too; leave one out."
+                    )
         for name in FLAT.keys() & found.keys():
-            value, section = found.pop(name), found.get(FLAT[name], {})
+            value = found.pop(name)
+            section = found.get(FLAT[name], {})
             if is_dataclass(section) and not isinstance(section, type):
                 section = asdict(section)
+            if isinstance(value, str) and re.fullmatch(r"[\d._]*_[\d._]*", value):
+                raise InvalidValueError(
+                    f"{name} is {value!r}; write the number without underscores."
+                )
             if isinstance(section, Mapping):
                 found[FLAT[name]] = {**section, name: value}
         return found
 
     @field_validator("episodes", mode="before")
     @classmethod
-    def _parse_episodes(cls, given: object, info: ValidationInfo) -> tuple[int, ...]:
+    def _parse_episodes(cls, given: object, info: ValidationInfo) -> Numbers:
         return parse_episodes(given, info.data.get("split", "test"), info.data.get("tasks", ()))
 
     @field_validator("environment", mode="before")
     @classmethod
     def _check_frames(cls, given: object) -> object:
         frames = given.get("demonstration_frames") if isinstance(given, Mapping) else None
-        return given if frames is None or check_demonstration_frames(frames) else None
+        if frames is not None:
+            check_demonstration_frames(frames)
+        return given
 
     @field_serializer("instruction")
     def _write_instruction(
@@ -269,7 +282,7 @@ class Plan(BaseModel):
         return self
 
     @property
-    def setting_names(self) -> tuple[str, ...]:
+    def setting_names(self) -> Names:
         """The settings that may be played."""
         return expand_settings(self.settings)
 
@@ -280,8 +293,12 @@ class Plan(BaseModel):
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all fields."""
-        return short_hash(self.model_dump_json(context=_HASHED))
+        """Hash of all fields but names of variables and what follows from the others."""
+        left_out: Mapping[str, Any] = {
+            "hosting": {"policy_env"},
+            "policies": {"__all__": {"makeup"}},
+        }
+        return short_hash(self.model_dump_json(context=_HASHED, exclude=left_out))
 
     def checked(self) -> Plan:
         """Return this plan if all of it can be played.
@@ -295,11 +312,7 @@ class Plan(BaseModel):
         find_settings(self.settings)
         specs: dict[str, str] = {}
         for one in self.policies:
-            if not re.fullmatch(NAME, one.name):
-                raise InvalidValueError(
-                    f"Policy {one.name[:80]!r} has no valid name for records: at most 1,000 "
-                    "characters, without control characters."
-                )
+            check_policy_name(one.name)
             if specs.setdefault(one.name, one.spec) != one.spec:
                 raise InvalidValueError(
                     f"Two policies are named {one.name!r}: {specs[one.name]} and {one.spec}."
@@ -327,9 +340,10 @@ class Plan(BaseModel):
                 f"There is nothing to play: {', '.join(self.settings)} cannot express any of "
                 "these episodes."
             )
-        device = next(iter(self.hosting.devices), None)
+        check_variables(self.hosting.policy_env, "policies")
         limit = self.hosting.policy_timeout_s
-        opened = [open_policy(one, limit, device) for one in self.policies]
+        settings = replace(self.hosting, policy_process="own").settings
+        opened = [open_policy(policy, limit, settings) for policy in self.policies]
         return self.model_copy(update={"policies": tuple(opened)})
 
     def jobs(self, played: Iterable[Summary] = ()) -> tuple[Job, ...]:
@@ -384,7 +398,7 @@ class Plan(BaseModel):
 
     def settings_of(
         self, task: str, episode: int, said: Collection[tuple[str, int, str]] = ()
-    ) -> tuple[str, ...]:
+    ) -> Names:
         """Return the settings in which an episode is played.
 
         `said` has task, episode and setting of what is known to be expressible.
@@ -406,8 +420,8 @@ class Plan(BaseModel):
         task: str,
         episode: int,
         settings: Iterable[str],
-        arms: tuple[str, ...],
-        seeds: tuple[int, ...],
+        arms: Names,
+        seeds: Numbers,
     ) -> Iterator[Job]:
         said = [options for setting in settings for options in self._options_of(setting)]
         file, wordings = self.wordings or (None, None)
@@ -437,7 +451,8 @@ class Plan(BaseModel):
 
         An option that the setting does not read keeps its default, so that equal words are one job.
         """
-        rule, usual = all_settings()[setting], InstructionOptions(setting)
+        rule = all_settings()[setting]
+        usual = InstructionOptions(setting)
         chosen = {option: getattr(self.instruction, option) for option in rule.reads - {"stages"}}
         for form in self.forms if rule.implicit else (usual.form,):
             for stages in self.stages if "stages" in rule.reads else (usual.stages,):
@@ -456,8 +471,7 @@ class Plan(BaseModel):
             return False
         found = splits.get_episode(task, self.split, episode)
         easier = replace(options, setting=plain)
-        refused = [find_refusal(found, one) is not None for one in (options, easier)]
-        return refused == [True, False]
+        return find_refusal(found, options) is not None and find_refusal(found, easier) is None
 
     def _instruction_jobs(self) -> Iterator[Job]:
         """Yield one job for each instruction that the language may not be able to express."""
@@ -497,19 +511,18 @@ class PlanOption(NamedTuple):
     Attributes:
         name: as it stands alone.
         section: None if it is in none.
-        type: its annotation.
         default: as it may be typed; None if there is none.
         help: what it means.
     """
 
     name: str
     section: str | None
-    type: Any
     default: object
     help: str
 
     def value_in(self, plan: Plan) -> object:
-        return getattr(plan if self.section is None else getattr(plan, self.section), self.name)
+        holder = getattr(plan, self.section) if self.section else plan
+        return getattr(holder, self.name)
 
 
 def plan_options() -> Iterator[PlanOption]:
@@ -517,14 +530,14 @@ def plan_options() -> Iterator[PlanOption]:
     for name, one in Plan.model_fields.items():
         if name not in FLAT.values():
             default = None if one.is_required() or name in SECTIONS else one.default
-            yield PlanOption(name, None, one.annotation, default, str(one.description))
+            yield PlanOption(name, None, default, str(one.description))
             continue
-        types = get_type_hints(SECTIONS[name])
         for option in fields(SECTIONS[name]):
             if option.name in FLAT:
-                words, default = option.metadata["help"], option.default
+                words = option.metadata["help"]
+                default = option.default
                 default = ",".join(default) if isinstance(default, tuple) else default
-                yield PlanOption(option.name, name, types[option.name], default, words)
+                yield PlanOption(option.name, name, default, words)
 
 
 @functools.lru_cache(maxsize=65_536)

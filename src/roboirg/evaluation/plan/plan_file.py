@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from importlib import resources
@@ -27,6 +28,8 @@ _MOST_BYTES = 4_000_000
 _SUFFIXES = (".yaml", ".yml", ".json")
 """JSON is YAML, too: a run's plan.json can be played again."""
 _WIDTH = 100
+_TEXT = "tag:yaml.org,2002:str"
+_PLAIN_NUMBER = re.compile(r"[-+]?(0|[1-9]\d*)?(\.\d*)?([eE][-+]?\d+)?")
 
 
 def named_plans() -> tuple[str, ...]:
@@ -38,7 +41,7 @@ def named_plans() -> tuple[str, ...]:
 
 
 def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
-    """Read a plan file as options of `make_plan`; what is empty is left out.
+    """Read a plan file as options of `make_plan`.
 
     Args:
         name: name of a plan that comes with the package, or path of a YAML file, or of the
@@ -47,7 +50,8 @@ def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
 
     Raises:
         UnknownNameError: there is no such plan, or it has an unknown key.
-        InvalidValueError: the file cannot be read, is not a mapping or has a key twice.
+        InvalidValueError: the file cannot be read, is not a mapping, has a key twice or without a
+            value, or has what YAML reads as something else than it looks.
     """
     data = _load(name)
     if not isinstance(data, Mapping):
@@ -55,8 +59,8 @@ def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
             f"The plan {name!r} is of type {type(data).__name__}; it must be a mapping such as "
             "'tasks: all'."
         )
-    check_names(f"plan key (in {name!r})", data, (*PLAN_KEYS, *([section] if section else [])))
-    found = {key: value for key, value in data.items() if value is not None}
+    check_names(f"plan key (in {name!r})", data, filter(None, (*PLAN_KEYS, section)))
+    found = dict(data)
     policies = found.get("policies")
     if isinstance(policies, list):
         found["policies"] = [_named(one) for one in policies]
@@ -65,16 +69,36 @@ def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
 
 def _named(policy: object) -> str:
     """Return a policy as typed; what a run's plan.json knew of it may have changed."""
-    if isinstance(policy, Mapping):
-        return f"{policy.get('name')}={policy.get('spec')}"
-    return str(policy)
+    if not isinstance(policy, Mapping):
+        return str(policy)
+    if "spec" not in policy:
+        raise InvalidValueError(f"The plan has {policy!r} as a policy; write NAME=SPEC.")
+    return f"{policy.get('name')}={policy['spec']}"
 
 
 class _PlanLoader(yaml.SafeLoader):
-    """Refuses a mapping with a key twice, of which YAML would take the last, and aliases.
+    """Reads what stands there, and refuses what YAML 1.1 takes to be something else.
 
-    A few lines of aliases of aliases stand for billions of values.
+    That is ``010`` (8 to YAML), ``1:30`` (90), ``1_000``, dates and nothing (null); ``yes`` and
+    ``off`` stay texts. It also refuses a mapping with a key twice, of which YAML would take the
+    last, and aliases: a few lines of aliases of aliases stand for billions of values.
     """
+
+    def compose_scalar_node(self, anchor: dict[str, yaml.Node]) -> yaml.ScalarNode:
+        node = super().compose_scalar_node(anchor)
+        text = node.value
+        kind = node.tag.rpartition(":")[2]
+        if kind == "bool":
+            node.tag = _TEXT
+        is_odd = kind in ("int", "float", "timestamp") and not _PLAIN_NUMBER.fullmatch(text)
+        is_empty = kind == "null" and not text
+        if is_odd or is_empty:
+            line = node.start_mark.line + 1
+            raise InvalidValueError(
+                f"line {line} has {text[:40] or 'no value'}; write a plain number such as 10 or "
+                "0.5, or a text in quotes, or leave the key out"
+            )
+        return node
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
@@ -94,7 +118,7 @@ class _PlanLoader(yaml.SafeLoader):
 def _load(name: str) -> object:
     file = _find(name)
     try:
-        # A safe loader, with two more checks.
+        # A safe loader, with more checks.
         return yaml.load(_text(file), _PlanLoader)  # noqa: S506
     except (OSError, UnicodeDecodeError, InvalidValueError) as error:
         raise InvalidValueError(

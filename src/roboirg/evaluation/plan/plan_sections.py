@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
 from roboirg.core.errors import check_names
-from roboirg.core.field_types import described
+from roboirg.core.field_types import MOST_COUNT, described
 from roboirg.evaluation.hosting.host_pool import DEFAULT_BATCH, HostSettings
-from roboirg.evaluation.plan.option_parsing import parse_names
+from roboirg.evaluation.plan.option_parsing import Names, parse_names
 from roboirg.evaluation.records.record import ERROR_KINDS, ErrorKind
 from roboirg.policies.contract.option_checking import Seconds
 
@@ -20,20 +21,26 @@ RETRYABLE: tuple[ErrorKind, ...] = ("connection", "environment", "infrastructure
 """Kinds of errors that may not occur again when the episode is retried."""
 
 
+def _names_if_any(kind: str, given: object) -> Names:
+    """Return names of a kind; none for an empty list, which 0 and an empty text are not."""
+    is_empty = isinstance(given, list | tuple) and not given
+    return () if is_empty else parse_names(kind, given)
+
+
 def names_of(kind: str) -> BeforeValidator:
     """Return what reads names of a kind; there may be none."""
-    return BeforeValidator(lambda given: parse_names(kind, given) if given else ())
+    return BeforeValidator(partial(_names_if_any, kind))
 
 
-def _error_kinds(given: object) -> tuple[str, ...]:
-    names = parse_names("kind of error", given or "none")
-    if [one.lower() for one in names] == ["none"]:
+def _error_kinds(given: object) -> Names:
+    names = _names_if_any("kind of error", given)
+    if {name.lower() for name in names} <= {"none"}:
         return ()
     check_names("kind of error", names, ERROR_KINDS)
     return tuple(kind for kind in ERROR_KINDS if kind in names)
 
 
-Count = Annotated[int, Field(ge=1)]
+Count = Annotated[int, Field(ge=1, le=MOST_COUNT)]
 TimeLimit = Annotated[Seconds, Field(gt=0)]
 
 
@@ -52,11 +59,18 @@ class Hosting:
         default=DEFAULT_BATCH,
         metadata=described("Largest number of episodes that a policy is asked about at once."),
     )
-    devices: Annotated[tuple[str, ...], names_of("device")] = field(
+    devices: Annotated[Names, names_of("device")] = field(
         default=(),
         metadata=described(
             "GPUs, such as 0,1; each policy gets a process on each. If empty, one process on any "
             "GPU."
+        ),
+    )
+    policy_env: Annotated[Names, names_of("environment variable")] = field(
+        default=(),
+        metadata=described(
+            "Environment variables with secrets, such as HF_TOKEN, that policies in processes of "
+            "their own get."
         ),
     )
     policy_timeout_s: TimeLimit = field(
@@ -68,7 +82,7 @@ class Hosting:
         """The same for the hosts; None if policies run in the world's process."""
         if self.policy_process == "shared":
             return None
-        return HostSettings(self.batch, self.devices)
+        return HostSettings(self.batch, self.devices, self.policy_env)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,9 +137,9 @@ class WorkerNeeds:
 
     cpus: Annotated[float, Field(gt=0)] = 1.0
     gpus: Annotated[float, Field(ge=0)] = 0.0
-    memory_gb: Annotated[float, Field(ge=0)] = 0.0
+    memory_gb: Annotated[float, Field(ge=0, le=MOST_COUNT)] = 0.0
     labels: Mapping[str, str] = field(default_factory=dict)
-    variables: tuple[str, ...] = ()
+    variables: Names = ()
     working_dir: str | None = None
 
     def slots(self, node: Mapping[str, Any]) -> int:

@@ -13,7 +13,8 @@ from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.evaluation.plan.stored_plans import read_plan
 from roboirg.evaluation.records.packs import PACK_SUFFIX, opened_run
 from roboirg.evaluation.records.record import Job, Record, Summary
-from roboirg.evaluation.records.record_codec import StoreError, read_summary
+from roboirg.evaluation.records.record_codec import read_summary
+from roboirg.evaluation.records.run_files import run_folder
 from roboirg.evaluation.records.store import StoredRun, iterate_records
 from roboirg.util.freed_memory import paused_collection
 
@@ -52,11 +53,8 @@ class Source:
         Raises:
             StoreError: there are none, or a line is not a record of this schema version.
         """
-        try:
-            with paused_collection():
-                return StoredRun(self.folder, read_summary)
-        except StoreError as error:  # of a pack, the temporary folder means nothing
-            raise StoreError(str(error).replace(str(self.folder), str(self.path))) from error
+        with paused_collection():
+            return StoredRun(self.folder, read_summary)
 
     @cached_property
     def results(self) -> tuple[Summary, ...]:
@@ -118,13 +116,11 @@ def opened_sources(
 
 def _split(text: str) -> tuple[Path, str | None]:
     """Return the path of a run, and the policy that follows it after a colon."""
-    if not text.strip():
-        raise InvalidValueError("The name of the run's folder is empty.")
-    ends = [len(text), *(place for place in reversed(range(len(text))) if text[place] == ":")]
-    end = next((end for end in ends if Path(text[:end]).exists()), None)
-    path, colon, policy = (
-        text.partition(":") if end is None else (text[:end], text[end : end + 1], text[end + 1 :])
-    )
-    if colon and not policy:
+    run_folder(text)
+    path = text
+    while ":" in path and not Path(path).exists():
+        path = path.rpartition(":")[0]
+    policy = text[len(path) + 1 :]
+    if path != text and not policy:
         raise InvalidValueError(f"The name of the policy after {text!r} is empty.")
     return Path(path), policy or None

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.records.line_file import warn_once
 from roboirg.evaluation.records.run_files import (
     MOST_PLAN_BYTES,
     PLAN_FILE,
@@ -23,7 +22,7 @@ def write_plan(plan: Plan, folder: Path) -> None:
 
 
 def read_plan(folder: Path) -> Plan | None:
-    """Return the newest plan of a folder; None if it is missing or of an unknown version."""
+    """Return the newest plan of a folder; None if it is missing or cannot be read."""
     return next(_plans([folder / PLAN_FILE]), None)
 
 
@@ -36,7 +35,11 @@ def read_plans(folder: Path) -> tuple[Plan, ...]:
 
 
 def _plans(paths: Iterable[Path]) -> Iterator[Plan]:
-    """Yield the plans of the files that hold one."""
+    """Yield the plans of the files that hold one; a warning names a file that holds none."""
     for path in paths:
-        with contextlib.suppress(OSError, ValueError, InvalidValueError):
+        try:
             yield Plan.model_validate_json(read_regular(path, MOST_PLAN_BYTES))
+        except FileNotFoundError:
+            continue
+        except (OSError, ValueError):
+            warn_once(f"{path} is not a readable plan, so its missing episodes are not counted.")

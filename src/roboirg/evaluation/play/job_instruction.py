@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 from roboirg.core.arms import AGAIN, TOLD
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
+from roboirg.core.versions import Mismatch, Versions
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.language.arms import TrialWords, arm_episode, say_arm, word_trial
@@ -56,18 +56,14 @@ def _open_wordings(job: Job) -> None:
         open_wordings(job.wordings_file, job.options.wordings)
 
 
-def other_versions(record: Summary) -> Iterator[tuple[str, str | int, str | int]]:
-    """Yield where a record's language or environment is not of the installed version.
-
-    These are what it is the version of, the record's, and the installed one.
-    """
+def other_versions(record: Summary) -> list[Mismatch]:
+    """Return where a record's language or environment is not of the installed version."""
     language = LANGUAGE_VERSIONS.get(record.options.language, "unknown")
-    for what, recorded, installed in (
-        ("environment", record.environment_version, ENVIRONMENT_VERSION),
-        ("language", record.language_version, language),
-    ):
-        if recorded != installed:
-            yield what, recorded, installed
+    installed = Versions(language_version=language, environment_version=ENVIRONMENT_VERSION)
+    recorded = Versions(
+        language_version=record.language_version, environment_version=record.environment_version
+    )
+    return recorded.differences(installed)
 
 
 def episode_policy_seed(policy_seed: int, episode_seed: int, arm: str = TOLD) -> int:

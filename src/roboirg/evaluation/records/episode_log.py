@@ -18,6 +18,7 @@ from types import TracebackType
 from typing import Self
 
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.handed_keys import bytes_without_keys
 
 LOG_FOLDER = "logs"
 LOG_SUFFIX = ".txt"
@@ -99,7 +100,10 @@ class EpisodeLog:
         # A policy may have closed the descriptor; its log must not end the run.
         with contextlib.suppress(OSError):
             self.trim()
-            if not os.fstat(self.descriptor).st_size:
+            content = os.pread(self.descriptor, self._limit, 0)
+            os.ftruncate(self.descriptor, 0)
+            os.write(self.descriptor, bytes_without_keys(content))
+            if not content:
                 self.path.unlink(missing_ok=True)
             os.close(self.descriptor)
 

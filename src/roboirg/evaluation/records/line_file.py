@@ -11,15 +11,18 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
+import logging
 import os
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.records.record_codec import DamagedLineError, StoreError
+from roboirg.evaluation.records.run_files import refuse_links
 from roboirg.util.atomic_write import sync_to_disk, take_lock
 from roboirg.util.regular_file import open_regular
 
@@ -45,6 +48,8 @@ class LineFile:
         place: of the line that `parse` yielded last.
         torn: bytes of an unfinished last line, set by `parse`.
         damaged: numbers of lines that are not JSON, set by `parse`.
+        damage: a sentence about them, or else about an unfinished last line, at the end of `parse`;
+            empty without any.
     """
 
     def __init__(self, path: Path) -> None:
@@ -52,9 +57,12 @@ class LineFile:
         self.place = LinePlace(0, 0, 0)
         self.torn = b""
         self.damaged: list[int] = []
+        self.damage = ""
 
     def parse(self, parse_line: Callable[[bytes, Path, int], Parsed]) -> Iterator[Parsed]:
         """Yield `parse_line` of each line, path and line number; nothing if there is no file.
+
+        At the end a warning names the first damaged line; each process warns once of the same.
 
         Raises:
             StoreError: the file cannot be read, or `parse_line` raises it.
@@ -69,7 +77,8 @@ class LineFile:
             raise StoreError(str(error)) from error
         with file:
             start = 0
-            for number, line in enumerate(iter(partial(file.readline, MOST_BYTES + 1), b""), 1):
+            read_line = functools.partial(file.readline, MOST_BYTES + 1)
+            for number, line in enumerate(iter(read_line, b""), 1):
                 if len(line) > MOST_BYTES:
                     raise StoreError(
                         f"{self._path} line {number} has more than {MOST_BYTES:,} bytes; no "
@@ -79,7 +88,7 @@ class LineFile:
                 # newline, the record is complete.
                 if not line.endswith(b"\n") and not _is_json(line):
                     self.torn = line
-                    return
+                    break
                 content = line.removesuffix(b"\n")
                 self.place = LinePlace(number, start, len(content))
                 start += len(line)
@@ -87,6 +96,27 @@ class LineFile:
                     yield parse_line(content, self._path, number)
                 except DamagedLineError:
                     self.damaged.append(number)
+        if self.torn:
+            self.damage = (
+                f"{self._path} ends in an unfinished line (a run may be writing it); "
+                "roboirg records merge copies all others."
+            )
+        if self.damaged:
+            lines = counted(len(self.damaged), "damaged line")
+            self.damage = (
+                f"{self._path} has {lines}, the first is line {self.damaged[0]}; "
+                "roboirg records merge copies all others."
+            )
+            warn_once(self.damage)
+
+    def refuse_damage(self) -> None:
+        """Raise if `parse` found a damaged or an unfinished line.
+
+        Raises:
+            StoreError: it did.
+        """
+        if self.damage:
+            raise StoreError(self.damage)
 
 
 class AppendFile:
@@ -100,6 +130,7 @@ class AppendFile:
 
     Raises:
         StoreError: another process writes to the folder, it cannot be written, or `read` raises it.
+        ForeignPathError: there is a symbolic link below the folder.
     """
 
     def __init__(
@@ -110,6 +141,7 @@ class AppendFile:
         with contextlib.ExitStack() as undo:
             try:
                 folder.mkdir(parents=True, exist_ok=True)
+                refuse_links(folder)
                 self._lock = os.open(folder / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o644)
                 undo.callback(os.close, self._lock)
                 self._take_lock()
@@ -147,7 +179,7 @@ class AppendFile:
 
     def _take_lock(self) -> None:
         if not take_lock(self._lock, self._folder / LOCK_FILE):
-            owner = os.pread(self._lock, 32, 0).decode().strip() or "unknown"
+            owner = os.pread(self._lock, 32, 0).decode("ascii", "replace").strip() or "unknown"
             raise StoreError(
                 f"{self._folder} is being written by another run (process {owner}); "
                 f"wait for it, stop it, or choose another --out."
@@ -170,6 +202,12 @@ class AppendFile:
             # Killed between the last byte of a line and its newline: the line is complete.
             _write_all(file, b"\n")
         os.fsync(file)
+
+
+@functools.cache
+def warn_once(sentence: str) -> None:
+    """Log a warning, unless this process has logged the same before."""
+    logging.getLogger(__name__).warning("%s", sentence)
 
 
 def _is_json(line: bytes) -> bool:

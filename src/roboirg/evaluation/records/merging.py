@@ -12,6 +12,7 @@ import msgspec
 
 from roboirg.core.arms import TOLD
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.versions import Versions
 from roboirg.evaluation.records.action_log import action_path
 from roboirg.evaluation.records.episode_log import log_path, logged_slugs
 from roboirg.evaluation.records.film import poster_name
@@ -113,28 +114,27 @@ def _read_checked(line: bytes, path: Path, number: int) -> Summary:
 
 
 def _check_versions(runs: Sequence[tuple[Path, Iterable[Summary]]]) -> None:
-    """Refuse records of different versions, as a run does."""
-    first: dict[object, tuple[Path, object]] = {}
-    for folder, entries in runs:
-        for one in entries:
-            for what, value in (
-                (("language version",), one.language_version),
-                (("environment version",), one.environment_version),
-                (("version", "of policy", one.policy), one.policy_version),
-                *(
-                    [(("version", "of the server of", one.policy), one.server_version)]
-                    if one.outcome != "error"
-                    else []
+    """Refuse records of different versions, policies or scenes, as a run does."""
+    known: dict[str, tuple[Path, Versions]] = {}
+    for folder, results in runs:
+        for result in results:
+            owners = {
+                "": Versions(environment_version=result.environment_version),
+                f" of language {result.options.language}": Versions(
+                    language_version=result.language_version
                 ),
-                (("seed", "of", one.task, one.split, one.episode), one.seed),
-            ):
-                there, expected = first.setdefault(what, (folder, value))
-                if value != expected:
+                f" of {result.policy}": result.policy_versions,
+                f" of {result.task} {result.split} {result.episode}": Versions(seed=result.seed),
+            }
+            for owner, versions in owners.items():
+                there, expected = known.setdefault(owner, (folder, versions))
+                for what, value, other in versions.differences(expected):
                     raise StoreError(
-                        f"{folder} and {there} cannot be merged: the "
-                        f"{' '.join(map(str, what))} is {value!r} in the first and "
-                        f"{expected!r} in the second."
+                        f"{folder} and {there} cannot be merged: the {what}{owner} is {value} in "
+                        f"the first and {other} in the second."
                     )
+                if expected.server_version is None:  # an error came before it
+                    known[owner] = folder, versions
 
 
 def _lines(

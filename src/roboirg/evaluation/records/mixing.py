@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any, NamedTuple
 
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS
+from roboirg.core.versions import makeup_text
 from roboirg.core.word_pools import words_label
 from roboirg.evaluation.records.record import Summary
 
@@ -51,6 +52,7 @@ _COMMON = (
     Trait("code", "states of the package's code", "Rates do not tell them apart."),
 )
 _OF_POLICY = (
+    Trait("ref.makeup", "policies", _APART, makeup_text),
     Trait("played_version", "versions", _APART),
     *(
         Trait(path, name.replace("_", " "), _APART)

@@ -84,7 +84,8 @@ def opened_run(path: Path, folders: Collection[str] = PACKED_FOLDERS) -> Iterato
             f"(*{PACK_SUFFIX})."
         )
     with tempfile.TemporaryDirectory(prefix="roboirg-") as name:
-        folder = Path(name)
+        folder = Path(name) / path.name  # which messages about a file of it show
+        folder.mkdir()
         try:
             with open_regular(path) as file, zipfile.ZipFile(file) as archive:
                 _unpack(archive, path, folder, folders)

@@ -20,12 +20,13 @@ from roboirg.core.arms import TOLD
 from roboirg.core.delivery import PromptVerdict
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.failures import FailureKind
-from roboirg.core.field_types import MOST_CAUSE_LETTERS, Cause, Name, Subgoal, Whole
+from roboirg.core.field_types import MOST_CAUSE_LETTERS, Cause, Label, Name, Subgoal, Whole
 from roboirg.core.inference_facts import InferenceFacts
 from roboirg.core.instruction_options import InstructionOptions, identifying
 from roboirg.core.observations import DemonstrationSource
 from roboirg.core.plain_text import clip_text
 from roboirg.core.policy_ref import PolicyRef
+from roboirg.core.versions import NO_VERSION, Versions
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
 from roboirg.util.short_hash import short_hash
 
@@ -86,14 +87,14 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
             policy plays.
     """
 
-    policy: Name
-    task: Name
-    split: Name
+    policy: Label
+    task: Label
+    split: Label
     episode: Whole
     options: InstructionOptions
     policy_seed: Whole = 0
     environment: EnvironmentOptions = EnvironmentOptions()
-    arm: Name = TOLD
+    arm: Label = TOLD
     wordings_file: str | None = None
     ref: PolicyRef | None = None
 
@@ -324,7 +325,7 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
 
     schema_version: Literal[1] = SCHEMA_VERSION
     seed: Whole
-    difficulty: Name
+    difficulty: Label
     outcome: Outcome
     error: ErrorKind | None = None
     cause: Cause | None = None
@@ -368,6 +369,12 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
         return self.policy_version if server is None else f"{self.policy_version} (server {server})"
 
     @property
+    def policy_versions(self) -> Versions:
+        """What the policy is, with its server's version unless an error came before that."""
+        missing = None if self.outcome == "error" else NO_VERSION
+        return self.ref.versions._replace(server_version=self.server_version or missing)
+
+    @property
     def identity(self) -> Job:
         """Its job, without the policy."""
         return Job(**{name: getattr(self, name) for name in IDENTITY})
@@ -398,7 +405,7 @@ class Record(Summary, kw_only=True, forbid_unknown_fields=True):  # type: ignore
             them, as with a real robot and in older records.
         subgoals: what a planner named, in order.
         usage: what models queried by the policy cost: ``calls``, ``input_tokens``,
-            ``output_tokens``, ``cost_usd``.
+            ``output_tokens``, ``cost_usd``; those that are unknown are missing.
         timings: wall-clock seconds by phase: ``policy_load``, ``policy_act``, ``env_step``, ….
         video_error: why the requested video could not be written, or None.
         details: traceback of an error, or None.

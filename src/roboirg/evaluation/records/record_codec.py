@@ -9,7 +9,7 @@ from typing import TypeVar
 import msgspec
 
 from roboirg.core.errors import RoboIRGError
-from roboirg.core.field_types import MOST_NAME_LETTERS, NAME
+from roboirg.core.field_types import LABEL, LABEL_RULE, MOST_NAME_LETTERS, NAME
 from roboirg.evaluation.records.record import IDENTITY, SCHEMA_VERSION, Record, Summary
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
 
@@ -28,6 +28,7 @@ class DamagedLineError(StoreError):
 
 
 _MEANINGS = {
+    LABEL: f"of {LABEL_RULE}",
     NAME: f"of at most {MOST_NAME_LETTERS:,} characters, without control characters",
     RELATIVE_PATH: "that is a path below the run's folder, in letters, digits, '_', '.' and '-'",
 }

@@ -5,10 +5,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
-from roboirg.core.errors import RoboIRGError
+from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.plain_text import printable
 from roboirg.util.atomic_write import write_atomically
 from roboirg.util.short_hash import short_hash
@@ -24,6 +25,18 @@ MOST_PLAN_BYTES = 64_000_000
 
 class ForeignPathError(RoboIRGError):
     """A path is that of no file of the run's folder."""
+
+
+def run_folder(path: str | Path) -> Path:
+    """Return the path of a run's folder, which need not exist.
+
+    Raises:
+        InvalidValueError: it is no path, or its name is empty or has NUL.
+    """
+    text = str(path) if isinstance(path, str | os.PathLike) else ""
+    if not text.strip() or "\0" in text:
+        raise InvalidValueError(f"The run's folder is {path!r}; it must be a path like runs/first.")
+    return Path(path)
 
 
 def run_file(folder: Path, name: str) -> Path:
@@ -45,6 +58,20 @@ def run_file(folder: Path, name: str) -> Path:
             "or a link leads elsewhere."
         )
     return path
+
+
+def refuse_links(folder: Path) -> None:
+    """Refuse a run's folder with a symbolic link in it, as what is written would land elsewhere.
+
+    Raises:
+        ForeignPathError: there is one. The folder itself may be a link.
+    """
+    for path in folder.rglob("*"):
+        if path.is_symlink():
+            raise ForeignPathError(
+                f"{path} is a symbolic link, and a run writes nothing through links; put a file or "
+                "folder in its place, or make the folder of the run itself the link."
+            )
 
 
 def _is_below(path: Path, folder: Path) -> bool:

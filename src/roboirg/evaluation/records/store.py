@@ -2,8 +2,9 @@
 
 Guaranteed on a local POSIX file system, besides what `line_file` guarantees:
 
-- A damaged line in the middle is skipped and reported; all other lines are read.
-- Verdicts of two versions of a policy, or of its server, do not get into one file.
+- A damaged line in the middle is skipped, and a warning names it; all other lines are read.
+- Verdicts of two policies of one name, or of two versions of one or of its server, do not get into
+  one file.
 
 Not guaranteed: anything on network file systems whose `flock` or fsync do not work as specified;
 that lines are in the order of the plan (they are in the order in which episodes finished).
@@ -11,14 +12,15 @@ that lines are in the order of the plan (they are in the order in which episodes
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Generic, NamedTuple, Self, TypeVar
+from typing import Generic, Self, TypeVar
 
 import msgspec
 
-from roboirg.evaluation.records.line_file import AppendFile, LineFile, LinePlace
+from roboirg.core.versions import Mismatch
+from roboirg.evaluation.records.line_file import AppendFile, LineFile, LinePlace, warn_once
 from roboirg.evaluation.records.record import Record, Summary
 from roboirg.evaluation.records.record_codec import (
     RecordKey,
@@ -38,13 +40,6 @@ _BUFFER = 1 << 20
 Stored = TypeVar("Stored", bound=Summary)
 
 
-class ToldVersions(NamedTuple):
-    """The version of a policy, and the one that its server reported, if any."""
-
-    policy: str
-    server: str | None
-
-
 class RecordStore:
     """The records of one output folder, open for appending by this process only.
 
@@ -57,7 +52,6 @@ class RecordStore:
     Attributes:
         stored: summaries by identity, the newest of each.
         torn: bytes of an unfinished line that were moved aside when the file was opened.
-        damaged: numbers of the lines that are not JSON; their episodes count as not played.
 
     Raises:
         StoreError: another process writes to the folder, or a line is not a record.
@@ -67,7 +61,7 @@ class RecordStore:
         self.folder = folder
         self.path = folder / RECORDS_FILE
         self.stored: dict[RecordKey, Summary] = {}
-        self._told: dict[str, ToldVersions] = {}
+        self._told: dict[str, Summary] = {}
         self._file = AppendFile(folder, RECORDS_FILE, TORN_FILE, self._read)
 
     def append(self, record: Record) -> None:
@@ -93,8 +87,11 @@ class RecordStore:
             for line in lines:
                 read_record(line, self.path, 0)  # whole: what is stored can be read
                 entry = read_summary(line, self.path, 0)
-                check_told_version(self.folder, told, entry)
-                told.update(told_versions([entry]))
+                if entry.outcome != "error":
+                    before = told.get(entry.policy, entry).policy_versions
+                    differences = before.differences(entry.policy_versions)
+                    check_same(self.folder, entry.policy, differences, f"in {entry.slug}")
+                    told[entry.policy] = entry
                 added[identity_key(entry)] = entry
                 yield line
 
@@ -104,8 +101,8 @@ class RecordStore:
 
     def _read(self, lines: LineFile) -> None:
         self.stored = {identity_key(one): one for one in lines.parse(read_summary)}
-        self.torn, self.damaged = lines.torn, tuple(lines.damaged)
-        self._told = told_versions(self.stored.values())
+        self.torn = lines.torn
+        self._told = _told(self.stored.values())
 
     def close(self) -> None:
         """Close the file and release the lock."""
@@ -161,7 +158,7 @@ def read_index(folder: Path) -> dict[RecordKey, Summary]:
 class StoredRun(Generic[Stored]):
     """The newest record of each identity in a run's folder, of which memory may hold a summary.
 
-    Takes no lock, so a run may be writing to the folder.
+    Takes no lock, so a run may be writing to the folder; a warning names an unfinished last line.
 
     Args:
         folder: of the run.
@@ -169,6 +166,7 @@ class StoredRun(Generic[Stored]):
 
     Attributes:
         newest: what is kept of each record, in the order of the file.
+        file: that was read, with the numbers of its damaged lines.
 
     Raises:
         StoreError: there are no records, or a line is not a record of this schema version.
@@ -176,15 +174,18 @@ class StoredRun(Generic[Stored]):
 
     def __init__(self, folder: Path, parse_line: Callable[[bytes, Path, int], Stored]) -> None:
         self._path = folder / RECORDS_FILE
-        lines = LineFile(self._path)
+        self.file = LineFile(self._path)
         kept: dict[RecordKey, tuple[Stored, LinePlace]] = {}
-        for one in lines.parse(parse_line):
-            kept[identity_key(one)] = (one, lines.place)
+        for result in self.file.parse(parse_line):
+            kept[identity_key(result)] = (result, self.file.place)
+        if self.file.torn:
+            warn_once(self.file.damage)
         if not kept:
+            self.file.refuse_damage()
             raise StoreError(
                 f"There are no records in {folder}; give the --out folder of a `roboirg run`."
             )
-        self.newest: tuple[Stored, ...] = adopt_told_versions(one for one, _ in kept.values())
+        self.newest: tuple[Stored, ...] = _adopt_told(one for one, _ in kept.values())
         self._in_order = [place for _, place in kept.values()]
 
     @cached_property
@@ -211,53 +212,36 @@ class StoredRun(Generic[Stored]):
             yield read_record(line, self._path, self._places[identity_key(one)].number)
 
 
-def told_versions(records: Iterable[Summary]) -> dict[str, ToldVersions]:
-    """Return the versions of each policy and its server, of those with a verdict."""
-    return {
-        one.policy: ToldVersions(one.policy_version, one.server_version)
-        for one in records
-        if one.outcome != "error"
-    }
+def _told(records: Iterable[Summary]) -> dict[str, Summary]:
+    """Return a result of each policy, of those with a verdict: the server reported its version."""
+    return {record.policy: record for record in records if record.outcome != "error"}
 
 
-def check_told_version(folder: Path, told: Mapping[str, ToldVersions], record: Summary) -> None:
-    """Refuse a verdict of another version than the folder's.
+def check_same(folder: Path, policy: str, found: Iterable[Mismatch], where: str = "now") -> None:
+    """Refuse another policy of a name of which a folder holds episodes, or another version of it.
 
     Args:
-        folder: for the message.
-        told: of the folder's records, as from `told_versions`.
-        record: to be added.
+        folder: for the message, as `policy`.
+        policy: its name.
+        found: the differences, the folder's values first.
+        where: the second values are found.
 
     Raises:
-        StoreError: the version differs.
+        StoreError: there is a difference; the message has the first.
     """
-    before = told.get(record.policy)
-    if before is None or record.outcome == "error":
-        return
-    if before.server != record.server_version:
+    for what, first, second in found:
         raise StoreError(
-            f"{folder} holds episodes of {record.policy} whose server reported "
-            f"{_name(before.server)}, but now it reports {_name(record.server_version)}; choose "
-            "another --out."
-        )
-    if before.policy != record.policy_version:
-        raise StoreError(
-            f"{folder} holds episodes of {record.policy} {_name(before.policy)}, but what played "
-            f"{record.slug} has {_name(record.policy_version)}; choose another --out."
+            f"{folder} holds episodes of {policy} whose {what} is {first}, but {where} it is "
+            f"{second}; choose another --out."
         )
 
 
-def adopt_told_versions(records: Iterable[Stored]) -> tuple[Stored, ...]:
-    """Return the records; errors without a version get that of the same policy's verdicts."""
+def _adopt_told(records: Iterable[Stored]) -> tuple[Stored, ...]:
+    """Return the records; errors without a server's version get that of the policy's verdicts."""
     found = list(records)
-    told = told_versions(found)
-    return tuple(
-        msgspec.structs.replace(one, server_version=told[one.policy].server)
-        if one.outcome == "error" and one.server_version is None and one.policy in told
-        else one
-        for one in found
-    )
-
-
-def _name(version: str | None) -> str:
-    return "no version" if version is None else f"version {version}"
+    told = _told(found)
+    for position, record in enumerate(found):
+        if record.outcome == "error" and record.server_version is None and record.policy in told:
+            version = told[record.policy].server_version
+            found[position] = msgspec.structs.replace(record, server_version=version)
+    return tuple(found)

@@ -27,6 +27,7 @@ from roboirg.evaluation.play.rollout import PlayJob
 from roboirg.evaluation.records.record import Job
 from roboirg.evaluation.run.executor import NO_TIMEOUT_S, Records, Warn
 from roboirg.evaluation.run.ray_pool import RayPool
+from roboirg.policies.by_name.key_variables import check_variables
 
 CONNECT_S = 10.0
 
@@ -119,11 +120,7 @@ def _connected(ray: ModuleType, address: str | None, folder: str | None) -> Iter
 
 def _runtime_environment(needs: WorkerNeeds) -> dict[str, Any]:
     """Return Ray's runtime environment of the actors."""
-    missing = [name for name in needs.variables if name not in os.environ]
-    if missing:
-        raise InvalidValueError(
-            f"The environment variable {missing[0]} is not set here, so workers cannot get it."
-        )
+    check_variables(needs.variables, "workers")
     variables = {
         **{name: os.environ[name] for name in needs.variables},
         # Or older versions of Ray hide the GPUs from actors that reserve none.

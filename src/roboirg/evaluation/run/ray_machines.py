@@ -33,6 +33,7 @@ from roboirg.evaluation.play.rollout import PlayJob
 from roboirg.evaluation.records.record import Job, Record
 from roboirg.evaluation.run.workers import POLL_S, Worker
 from roboirg.language import LANGUAGE_VERSIONS
+from roboirg.policies.by_name.finding import read_policy
 from roboirg.tasks.splits.private_splits import use_salt
 
 KEY_S = 1.0
@@ -67,19 +68,18 @@ class MachineVersions(NamedTuple):
         pairs = [
             ("roboirg", self.roboirg, there.roboirg),
             *(
-                (f"its language {one}", version, there.languages.get(one, "none"))
-                for one, version in self.languages.items()
+                (f"its language {language}", version, there.languages.get(language, "none"))
+                for language, version in self.languages.items()
             ),
             ("its environment", self.environment, there.environment),
-            *(
-                (mine.spec, mine.version, theirs.version)
-                for mine, theirs in zip(self.policies, there.policies, strict=True)
-                if mine.version != UNKNOWN_VERSION
-            ),
         ]
         for what, mine, theirs in pairs:
             if mine != theirs:
                 return f"{what} has version {theirs} there and {mine} here"
+        for policy, other in zip(self.policies, there.policies, strict=True):
+            for what, mine, theirs in policy.versions.differences(other.versions):
+                if mine != UNKNOWN_VERSION:
+                    return f"the {what} of {policy.spec} is {theirs} there and {mine} here"
         return None
 
 
@@ -131,7 +131,7 @@ class MachineAgent:
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(mode=0o700)
         _register(folder)
-        self._folder = folder
+        self._folder, self._settings = folder, settings
         self._address: HostAddress | None = None
         if settings is None:
             return
@@ -146,7 +146,10 @@ class MachineAgent:
     def check(self, versions: MachineVersions) -> CheckedMachine:
         """Check that the machine has the same versions as the driver and can load the policies."""
         try:
-            policies = tuple(map(open_policy, versions.policies))
+            policies = tuple(
+                open_policy(read_policy(policy.spec, policy.name), settings=self._settings)
+                for policy in versions.policies
+            )
             fault = versions.difference(MachineVersions.expected(policies))
         except RoboIRGError as error:
             fault = one_line(error)

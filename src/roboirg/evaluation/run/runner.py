@@ -15,7 +15,6 @@ from typing import NamedTuple
 from roboirg.core.error_words import MAX_CAUSE_LENGTH
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
-from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.evaluation.episode_errors import Terminated, format_cause
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.stored_plans import write_plan
@@ -25,10 +24,12 @@ from roboirg.evaluation.play.video_writer import check_video_support, without_un
 from roboirg.evaluation.records.film import VIDEO_FOLDER
 from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.evaluation.records.record_codec import StoreError, identity_key
+from roboirg.evaluation.records.run_files import refuse_links
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
     TORN_FILE,
     RecordStore,
+    check_same,
     read_index,
 )
 from roboirg.evaluation.run.executor import Executor
@@ -81,7 +82,7 @@ def run_plan(
         play: plays one job.
         executor: where jobs are played.
         retry_errors: play jobs again whose newest record is an error.
-        reporter: gets every record, and first any damage in the file.
+        reporter: gets every record, and first a line that was not finished.
 
     Raises:
         StoreError: another run writes to the folder, the records cannot be read or written, or
@@ -93,7 +94,7 @@ def run_plan(
     jobs = plan.jobs()
     films = without_unfinished_videos(folder / VIDEO_FOLDER)
     with _sigterm_interrupts(), RecordStore(folder) as store, films:
-        _report_damage(store, reporter)
+        _report_torn_line(store, reporter)
         _check_versions(plan, store.stored.values(), folder)
         _warn_of_untrained(plan, reporter)
         write_plan(plan, folder)
@@ -140,6 +141,7 @@ def check_run(plan: Plan, folder: Path) -> None:
             language, environment, scene or policy.
     """
     _check_writable(folder)
+    refuse_links(folder)
     _check_versions(plan, read_index(folder).values(), folder)
 
 
@@ -226,21 +228,16 @@ def _check_record_version(record: Record) -> None:
     """Refuse what a worker with another version of language or environment has played."""
     for what, version, ours in other_versions(record):
         raise StoreError(
-            f"A worker returned {record.slug} with {what} version {version}, but this roboirg has "
+            f"A worker returned {record.slug} with {what} {version}, but this roboirg has "
             f"version {ours}; the record was not stored."
         )
 
 
-def _report_damage(store: RecordStore, reporter: Reporter) -> None:
+def _report_torn_line(store: RecordStore, reporter: Reporter) -> None:
     if store.torn:
         reporter.warn(
             f"An earlier run was stopped while it wrote a record; moved the unfinished line "
             f"({counted(len(store.torn), 'byte')}) to {store.folder / TORN_FILE}."
-        )
-    if store.damaged:
-        reporter.warn(
-            f"{store.path} has {counted(len(store.damaged), 'damaged line')}, first line "
-            f"{store.damaged[0]}; their episodes are played again."
         )
 
 
@@ -261,7 +258,7 @@ def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> N
     for record in records:
         for what, version, ours in other_versions(record):
             raise StoreError(
-                f"{folder} holds episodes of {what} version {version}, but this roboirg has "
+                f"{folder} holds episodes of {what} {version}, but this roboirg has "
                 f"version {ours}; choose another --out."
             )
     for task, split, episode, seed in {
@@ -279,25 +276,22 @@ def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> N
 
 
 def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> None:
-    """Refuse records of another version of a policy of the same name."""
-    known = {one.name: one for one in plan.policies}
-    for policy, version, is_verdict in {
-        (one.policy, one.policy_version, one.outcome != "error") for one in records
+    """Refuse records of another policy of the same name, or of another version of it."""
+    known = {ref.name: ref for ref in plan.policies}
+    for policy, versions, is_verdict in {
+        (record.policy, record.policy_versions, record.outcome != "error") for record in records
     }:
         now = known.get(policy)
-        # Two versions that could not be read may differ.
-        if now is None or (version == now.version and not (is_verdict and now.problem)):
+        if now is None:
             continue
-        if now.problem is not None:
+        # Two versions that could not be read may differ.
+        if now.problem is not None and (is_verdict or versions.policy_version != now.version):
             raise StoreError(
-                f"{folder} holds episodes of {policy} version {version}, but the policy cannot be "
-                f"opened to read its version now ({now.problem}); choose another --out."
+                f"{folder} holds episodes of {policy} version {versions.policy_version}, but the "
+                f"policy cannot be opened to read its version now ({now.problem}); choose another "
+                "--out."
             )
-        if now.is_foreign or now.version != UNKNOWN_VERSION:
-            raise StoreError(
-                f"{folder} holds episodes of {policy} version {version}, but the policy is now "
-                f"version {now.version}; choose another --out."
-            )
+        check_same(folder, policy, versions.differences(now.versions))
 
 
 @contextlib.contextmanager

@@ -11,6 +11,7 @@ from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import (
     BUILT_IN,
     ELSEWHERE,
+    HANDS,
     PRIVILEGED,
     SCRIPTED,
     UNKNOWN_VERSION,
@@ -18,11 +19,13 @@ from roboirg.core.policy_ref import (
     Place,
     PolicyRef,
 )
+from roboirg.core.versions import POLICY, Makeup, makeup_text
 from roboirg.policies.by_name.policy_classes import find_class
 from roboirg.policies.by_name.policy_kinds import (
     CLASS,
     LISTENER,
     LIVE,
+    PLANNER,
     find_kind,
     known_kinds,
     live,
@@ -33,9 +36,10 @@ from roboirg.policies.by_name.policy_kinds import (
 from roboirg.policies.contract.base import Policy
 from roboirg.policies.contract.contract_check import check_policy
 from roboirg.policies.contract.policy_urls import is_url
-from roboirg.policies.contract.policy_version import file_fingerprint, read_version
-from roboirg.policies.planners import OF_MODELS
+from roboirg.policies.contract.policy_version import content_of, file_fingerprint, read_version
+from roboirg.policies.planners import OF_MODELS, make_planner
 from roboirg.policies.planners.planner_alone import PlannerAlone
+from roboirg.policies.planners.systems import System
 
 
 @dataclass(frozen=True)
@@ -82,12 +86,49 @@ def read_policy(spec: str, name: str | None = None) -> PolicyRef:
         )
     if is_foreign:
         place: Place = "world" if ref.is_declared else "split" if is_split else "own"
-        return replace(ref, place=place, is_privileged=ref.is_declared or is_split)
-    known = look_up(ref)
-    if find_kind(kind).has_weights:
-        # What acts on the world by its state is next to it, even if it is trained.
-        return replace(known, place="world" if known.is_privileged else "own")
-    return replace(known, place="server" if is_url(spec) else "world")
+        ref = replace(ref, is_privileged=ref.is_declared or is_split)
+    else:
+        ref = look_up(ref)
+        place = "server" if is_url(spec) else "world"
+        if find_kind(kind).has_weights:
+            # What acts on the world by its state is next to it, even if it is trained.
+            place = "world" if ref.is_privileged else "own"
+    ref = replace(ref, place=place)
+    return replace(ref, makeup=_makeup(ref, system))
+
+
+def _makeup(ref: PolicyRef, system: System | None) -> Makeup:
+    """Return what a policy is, with its place and version known, and the system that it names.
+
+    Of code of others, every option that is typed counts.
+    """
+    maker = ref.kind
+    if ref.kind in (BUILT_IN, CLASS):
+        maker = ref.spec
+    elif ref.version == UNKNOWN_VERSION and ref.place != "server":
+        maker += f":{content_of(ref.target)}"
+    options: dict[str, Any] = dict(ref.options)
+    hands = SCRIPTED
+    made: Any = None
+    if system is not None:
+        if system.planner is None:
+            return read_policy(system.policy).makeup
+        options = dict(system.planner)
+        hands = system.policy
+        kind = options.pop("kind", "")
+        maker = f"{PLANNER}:{kind}"
+        if ":" not in kind:  # else it is the user's own, which has no options
+            made = make_planner(kind, options, maker)
+    elif not ref.is_foreign:
+        hands = options.pop(HANDS, SCRIPTED)
+        made = maker_of(ref)(0)
+    if hasattr(made, "options"):
+        options = made.options.model_dump(exclude_defaults=True)
+        options |= options.pop("model", {})  # its model's options stand next to its own
+    if hands not in (SCRIPTED, ELSEWHERE):
+        options[HANDS] = makeup_text(read_policy(hands).makeup)
+    pairs = [(name, content_of(str(value))) for name, value in sorted(options.items())]
+    return ((POLICY, maker), *pairs)
 
 
 def policy_of(policy: str | type[Any] | object, name: str | None = None) -> PolicyRef:
@@ -110,7 +151,10 @@ def policy_of(policy: str | type[Any] | object, name: str | None = None) -> Poli
     check_policy(name, given, ("reset", "act"))
     live[name] = given
     ref = split_spec(name, f"{declaration}{LIVE}:{name}")
-    return replace(ref, place="python", is_foreign=True, is_privileged=ref.is_declared)
+    makeup = ((POLICY, f"{declaration}{kind.__module__}:{kind.__qualname__}"),)
+    return replace(
+        ref, place="python", is_foreign=True, is_privileged=ref.is_declared, makeup=makeup
+    )
 
 
 def make_policy(policy: str | PolicyRef, seed: int) -> Policy:

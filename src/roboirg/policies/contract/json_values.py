@@ -46,7 +46,7 @@ def as_json(value: Any, owner: str | None = None, key: str = "", depth: int = 1)
         value = "…"
     if isinstance(value, Mapping):
         return {
-            _text(one, owner, key): as_json(
+            _text(one, owner, key or "a key"): as_json(
                 held, owner, f"{key}.{one}" if key else str(one), depth + 1
             )
             for one, held in value.items()

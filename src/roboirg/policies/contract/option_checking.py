@@ -6,12 +6,16 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
 
+import numpy as np
 from pydantic import BaseModel, Field, ValidationError
 
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.field_types import MOST_SECONDS
 
 Options = TypeVar("Options", bound=BaseModel)
+NOT_COMPARED = True
+"""Excludes an option from what a policy is: with another value it is the same policy, as the option
+only concerns the connection or the price, or is compared as the version."""
 Seconds = Annotated[float, Field(le=MOST_SECONDS)]
 """A time limit in an option."""
 
@@ -29,7 +33,7 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
         InvalidValueError: an option is missing or has an invalid value.
     """
     try:
-        return kind.model_validate(dict(values))
+        return kind.model_validate(flags_as_words(values))
     except ValidationError as error:
         # What stands there and means nothing explains best what is missing.
         first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
@@ -42,6 +46,16 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
         given = re.sub(r"//[^/@]*@", "//…@", repr(first["input"]))  # no password of a URL
         end = "" if message.endswith((".", "?")) else "."
         raise InvalidValueError(f"{origin}: option {name} is {given}; {message}{end}") from None
+
+
+def flags_as_words(given: Any) -> Any:  # noqa: ANN401 - options, or the value of one
+    """Return options with True and False as words, because numbers would take them as 1 and 0.
+
+    Options that are flags take the words.
+    """
+    if isinstance(given, Mapping):
+        return {name: flags_as_words(value) for name, value in given.items()}
+    return str(given) if isinstance(given, bool | np.bool_) else given
 
 
 def plain_complaint(message: str) -> str:

@@ -124,6 +124,8 @@ def _checked(metadata: object, *, is_ours: bool) -> dict[str, JsonValue]:
 def policy_usage(policy: Policy) -> dict[str, float]:
     """Return the costs that a policy reports; those below 0 or beyond reason are left out.
 
+    So are those that are unknown, which is NaN.
+
     Raises:
         InvalidValueError: there are too many, a name is not a short text, or a cost no number.
     """
@@ -137,6 +139,8 @@ def policy_usage(policy: Policy) -> dict[str, float]:
             raise InvalidValueError(
                 f"usage() has {shown} as {name!r}; it must be a number."
             ) from None
+        except OverflowError:  # beyond reason
+            continue
     is_short = all(len(name) <= MAX_COSTS and is_encodable(name) for name in usage)
     if len(usage) > MAX_COSTS or not is_short:
         raise InvalidValueError(

@@ -12,6 +12,10 @@ from roboirg.core.policy_ref import PolicyRef
 from roboirg.policies.contract.option_checking import Options, check_options
 
 _URL = re.compile(r"[\w+.-]*://")
+_KEY = re.compile(
+    r"(?i)(//)[^/?#&\s@]+(?=@)|([?&](?:api_?key|access_token|token|secret|password)=)[^&#]+"
+)
+"""A user with a password in a URL, or the value of an option that is a key."""
 
 
 class UrlOptions(BaseModel):
@@ -43,8 +47,15 @@ def parse_query(spec: str, query: str) -> dict[str, str]:
     """Return the options in the query of a policy's spec.
 
     Raises:
-        InvalidValueError: the query is malformed, or gives an option twice.
+        InvalidValueError: the query is malformed, gives an option twice, or holds a key.
     """
+    whole = unquote(spec)
+    shown = _KEY.sub(r"\1\2…", whole)
+    if shown != whole:
+        raise InvalidValueError(
+            f"Policy {shown!r} holds a key or password, which plans and records would keep; put it "
+            "into an environment variable and name that with api_key_env=NAME."
+        )
     try:
         pairs = parse_qsl(query, keep_blank_values=True, strict_parsing=bool(query))
     except ValueError as error:

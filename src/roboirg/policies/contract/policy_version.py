@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import os
 from pathlib import Path
@@ -12,9 +13,12 @@ import numpy as np
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.field_types import as_name
+from roboirg.util.regular_file import file_hash
 from roboirg.util.short_hash import short_hash
 
 MOST_LETTERS = 200
+CHECKPOINT_FILE = "config.json"
+"""In the folder of each checkpoint."""
 
 
 def read_version(policy: object) -> str | None:
@@ -65,3 +69,16 @@ def file_fingerprint(declaring: object) -> str | None:
         except OSError:
             return None
     return short_hash(kind.__qualname__.encode() + source)
+
+
+def content_of(text: str) -> str:
+    """Return a hash of the file or checkpoint that a text names; the text if it names neither."""
+    files = [Path(text)]
+    content = ""
+    with contextlib.suppress(OSError):  # what cannot be read is reported where it is used
+        if Path(f"{text}/{CHECKPOINT_FILE}").is_file():
+            files = sorted(Path(text).iterdir())
+        for path in files:
+            if path.is_file():
+                content += file_hash(path)
+    return short_hash(content) if content else text or "empty"

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import CAMERAS
+from roboirg.policies.contract.policy_version import CHECKPOINT_FILE
 
 PICTURE = "observation.images.{}"
 STATE = "observation.state"
-_CONFIG = "config.json"
 
 
 class CheckpointFacts(NamedTuple):
@@ -40,12 +40,12 @@ def read_facts(place: str) -> CheckpointFacts:
     Raises:
         InvalidValueError: the checkpoint needs an input that does not exist.
     """
-    path = Path(place) / _CONFIG
+    path = Path(place) / CHECKPOINT_FILE
     try:
         if not path.is_file():
             from huggingface_hub import try_to_load_from_cache
 
-            path = Path(str(try_to_load_from_cache(place, _CONFIG)))
+            path = Path(str(try_to_load_from_cache(place, CHECKPOINT_FILE)))
         config = json.loads(path.read_text(encoding="utf-8"))
         shapes = {name: one.get("shape") for name, one in config["input_features"].items()}
         limit = config.get("tokenizer_max_length")

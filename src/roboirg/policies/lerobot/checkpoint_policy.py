@@ -26,6 +26,7 @@ from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.policy_ref import UNKNOWN_VERSION
+from roboirg.policies.contract.option_checking import NOT_COMPARED
 from roboirg.policies.contract.policy_urls import UrlOptions, read_options, split_url
 from roboirg.policies.lerobot.checkpoint_facts import PICTURE, STATE, picture_sizes, read_facts
 from roboirg.util.media import scaled_square
@@ -54,10 +55,10 @@ class LeRobotPolicyOptions(UrlOptions):
         tokenizer: file of the model's tokenizer.
     """
 
-    device: str = Field("cpu", min_length=1)
-    batch: int | None = Field(None, ge=1)
+    device: str = Field("cpu", min_length=1, exclude=NOT_COMPARED)
+    batch: int | None = Field(None, ge=1, exclude=NOT_COMPARED)
     execute: int | None = Field(None, ge=1)
-    version: str = Field(UNKNOWN_VERSION, min_length=1)
+    version: str = Field(UNKNOWN_VERSION, min_length=1, exclude=NOT_COMPARED)
     prompt_tokens: int | None = Field(None, ge=1)
     prompt_added: int = Field(0, ge=0)
     tokenizer: str | None = Field(None, min_length=1)

@@ -102,10 +102,13 @@ class HierarchicalPolicy(PlannerParts):
                 "subgoals from a planner."
             )
         super().__init__(planner, policy)
-        self.planner, self.policy, self.name = planner, policy, name
+        self.planner = planner
+        self.policy = policy
+        self.name = name
         if any(hasattr(one, "attach") for one in (planner, policy)):
             self.attach = functools.partial(_attach, (planner, policy))
-        own, of_planner = PolicyNeeds.of(policy), PolicyNeeds.of_planner(planner)
+        own = PolicyNeeds.of(policy)
+        of_planner = PolicyNeeds.of_planner(planner)
         self._parts = of_planner, own
         self.needs = own.merge(of_planner)
         self._many_steps = self.needs.action_space.takes_many_steps

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.observations import Observation
 from roboirg.core.subgoal_text import split_point
 from roboirg.policies.planners.planner import WHEN_DONE
 from roboirg.policies.planners.points import normalize_subgoal, parse_points
@@ -19,10 +19,11 @@ from roboirg.policies.planners.vlm_planner import (
     PlannerOptions,
     VLMPlanner,
 )
+from roboirg.policies.vlm.goal_schema import object_schema
 from roboirg.policies.vlm.model_content import ChatTurn, Part
 from roboirg.policies.vlm.models import ModelQuery
-from roboirg.util.json_reply import UnparsableReplyError, json_object, text_of
 from roboirg.util.media import VIDEO_RATE, Clip, Picture, Pixels, contact_sheets, evenly_spaced
+from roboirg.util.reply_reading import UnparsableReplyError, json_object, text_of, whole_number
 
 TEXT: Mapping[str, Any] = {"type": "string"}
 """Schema of a field with words."""
@@ -55,9 +56,8 @@ class QwenPlanner(VLMPlanner[QwenOptions]):
     ButtonUnmaskSwap, by the text of the subgoal, as a policy does not know its task. Only these
     tasks have such subgoals."""
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode."""
-        super().reset(instruction, demonstration)
+    def forget(self) -> None:
+        """Forget the subgoals."""
         self._history: list[str] = []
 
     def query(self, observation: Observation) -> ModelQuery:
@@ -104,9 +104,8 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
         super().__init__(options, kind, seed)
         self.demonstration_frames = "all" if options.observe_every == 1 else options.observe_every
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+    def forget(self) -> None:
         """Begin a new conversation, without frames of the last episode."""
-        super().reset(instruction, demonstration)
         self._frames: list[Pixels] = []
         self._turns: list[ChatTurn] = []
         self._quoted = ""
@@ -122,12 +121,12 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
     def query(self, observation: Observation) -> ModelQuery:
         """Add a turn with the frames since the last one."""
         self._frames = self._frames or [front_picture(observation)]
-        schema = _schema(description=TEXT, subgoal=TEXT)
+        fields = {"description": TEXT, "subgoal": TEXT}
         if not self._turns:
-            schema = _schema(subgoal_sequence=_list_of(TEXT), subgoal=TEXT)
+            fields = {"subgoal_sequence": _list_of(TEXT), "subgoal": TEXT}
         self._turn = ChatTurn("user", tuple(self._parts("next" if self._turns else "first")))
         system = self.fill("system", **self.forms())
-        return ModelQuery(system, (*self._turns, self._turn), schema)
+        return ModelQuery(system, (*self._turns, self._turn), object_schema(fields))
 
     def take(self, text: str) -> str:
         """Return the subgoal, the last one if all is done; keep the turn and its reply."""
@@ -135,15 +134,19 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
         if self.finishes(subgoal):
             subgoal = str(self.subgoal)
         self._turns += [self._turn, ChatTurn("model", (text,))]
-        self._quoted, self._frames = self.instruction, []
+        self._quoted = self.instruction
+        self._frames = []
         return subgoal
 
     def _parts(self, when: str) -> Iterator[Part]:
-        frames, has_clip = self._frames, len(self._frames) >= MIN_CLIP_FRAMES
+        frames = self._frames
+        has_clip = len(self._frames) >= MIN_CLIP_FRAMES
         clip = "clip"
         if when == "first":
-            clip, has_clip = "video", self.video is not None
-            frames = [*(() if self.video is None else self.video), *frames]
+            clip = "video"
+            has_clip = self.video is not None
+            if self.video is not None:
+                frames = [*self.video, *frames]
         if self._quoted != self.instruction:  # the first turn, or more has been said since
             yield self.goal()
         yield self.fill(f"{when}_{clip}" if has_clip else f"{when}_picture")
@@ -179,9 +182,8 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
 
     options_type = MemerOptions
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+    def forget(self) -> None:
         """Clear the memory."""
-        super().reset(instruction, demonstration)
         self.frames: dict[int, Pixels] = {}
         self._recent: dict[int, Pixels] = {}
         self._last_step = 0
@@ -205,22 +207,28 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
     def query(self, observation: Observation) -> ModelQuery:  # noqa: ARG002
         """Show the demonstration, the task, the key frames and the recent frames."""
         position = {"type": "integer", "enum": list(range(1, len(self._recent) + 1))}
-        schema = _schema(current_subtask=TEXT, keyframe_positions=_list_of(position))
-        return self.single(self._parts(), schema)
+        fields = {"current_subtask": TEXT, "keyframe_positions": _list_of(position)}
+        return self.single(self._parts(), object_schema(fields))
 
     def take(self, text: str) -> str:
         """Return the subgoal; add the chosen frames, which are counted from 1."""
-        reply, count = json_object(text), len(self._recent)
+        reply = json_object(text)
+        count = len(self._recent)
         subgoal = parse_points(text_of(reply, "current_subtask"))
         positions = reply.get("keyframe_positions")
         if not isinstance(positions, list):
             raise UnparsableReplyError(
                 "The field 'keyframe_positions' has to be a list of numbers."
             )
-        if any(type(one) is not int or not 1 <= one <= count for one in positions):
-            raise UnparsableReplyError(f"Positions of frames are whole numbers from 1 to {count}.")
         steps = tuple(self._recent)
-        frames = self.frames | {steps[one - 1]: self._recent[steps[one - 1]] for one in positions}
+        frames = dict(self.frames)
+        for position in map(whole_number, positions):
+            if position is None or not 1 <= position <= count:
+                raise UnparsableReplyError(
+                    f"Positions of frames are whole numbers from 1 to {count}."
+                )
+            step = steps[position - 1]
+            frames[step] = self._recent[step]
         kept = merge_keyframes(frames, self.options.near)[-(self.options.most or len(frames)) :]
         self.frames = {step: frames[step] for step in kept}
         return subgoal
@@ -258,9 +266,8 @@ class StatelessPlanner(VLMPlanner[StatelessOptions]):
 
     options_type = StatelessOptions
 
-    def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode."""
-        super().reset(instruction, demonstration)
+    def forget(self) -> None:
+        """Forget the pictures."""
         self._past: list[Pixels] = []
 
     def watch(self, observation: Observation, step: int) -> None:  # noqa: ARG002
@@ -273,7 +280,7 @@ class StatelessPlanner(VLMPlanner[StatelessOptions]):
 
     def take(self, text: str) -> str:
         """Return the subgoal in the last line of the reply; the policy reports what comes of it."""
-        lines = [line for line in text.splitlines() if line.strip()]
+        lines = [line for line in text.splitlines() if normalize_subgoal(line)]
         subgoal = parse_points(lines[-1] if lines else "")
         return FINISHED if self.finishes(subgoal) else subgoal
 
@@ -306,16 +313,6 @@ def _sheets(frames: Pixels, most: int, every: int) -> Iterator[Picture]:
 
 def _list_of(item: Mapping[str, Any]) -> dict[str, Any]:
     return {"type": "array", "items": item}
-
-
-def _schema(**fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the JSON schema of an object with these fields."""
-    return {
-        "type": "object",
-        "properties": fields,
-        "required": list(fields),
-        "additionalProperties": False,
-    }
 
 
 def merge_keyframes(steps: Iterable[int], near: int = MAX_GAP) -> tuple[int, ...]:

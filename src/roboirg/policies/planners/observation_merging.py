@@ -30,7 +30,8 @@ class DemonstrationSubset(Mapping[str, NDArray[Any]]):
         wanted: DemonstrationFrames,
     ) -> None:
         own, other = (1 if one in ("all", "none") else int(one) for one in (wanted, available))
-        self._all, self._stride = demonstration, max(own // other, 1)
+        self._all = demonstration
+        self._stride = max(own // other, 1)
 
     def __getitem__(self, field: str) -> NDArray[Any]:
         """Return the selected entries of a field."""

@@ -38,7 +38,8 @@ class OraclePlanner(AttachedPolicy):
         kind: str = "oracle",
         seed: int = 0,  # noqa: ARG002 - of planners that choose
     ) -> None:
-        self.options, self.kind = options or SubgoalOptions(), kind
+        self.options = options or SubgoalOptions()
+        self.kind = kind
         self.grounded = self.options.subgoals == "grounded"
 
     @property
@@ -72,7 +73,8 @@ class OraclePlanner(AttachedPolicy):
         stage = judge.published
         if not self.reports or stage is None:
             return self.env.subgoal
-        index, kind = judge.index, stage.primitive.kind
+        index = judge.index
+        kind = stage.primitive.kind
         end = self._last
         fell = end is not None and (end.how == "missed" or end.why == EMPTY_HAND)
         lost = fell and kind in HANDLES_HELD

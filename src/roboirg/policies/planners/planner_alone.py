@@ -44,7 +44,8 @@ class PlannerAlone(PlannerParts):
     def act(self, observation: Observation) -> NDArray[np.float64]:
         """Let the planner name a subgoal; the action means nothing."""
         seen: dict[str, Any] = dict(observation)
-        ends, step = seen.pop("ends"), seen.pop("step")
+        ends = seen.pop("ends")
+        step = seen.pop("step")
         for end in ends if hasattr(self.planner, "learn") else ():
             self.planner.learn(SubgoalEnd(*end))
         self.subgoal = self.planner.plan(cast("Observation", seen), step)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
-from roboirg.util.json_reply import UnparsableReplyError
+from roboirg.util.reply_reading import UnparsableReplyError, answer_of
 
 PICTURE_SIZE = 256
 """Rows and columns of the front picture."""
@@ -19,7 +19,8 @@ SCALE = 1000
 _POINT = re.compile(
     r"(?:<\|box_start\|>)?\(\s*(\d+)\s*,\s*(\d+)\s*\)(?:<\|box_end\|>)?|<\s*(\d+)\s*,\s*(\d+)\s*>"
 )
-_END = re.compile(r"<\|(?:im_end|endoftext)\|>\s*$")
+_NO_WORDS = re.compile(r"[<>|{}\ud800-\udfff]")
+"""Signs of points and of JSON, and halves of surrogate pairs, which are no text."""
 _FINISHED = re.compile(r"\b(?:complete|completed|finished|done)\b")
 
 
@@ -46,17 +47,17 @@ def parse_points(text: str) -> str:
     if len(subgoal) > MOST_SUBGOAL_LETTERS:
         raise UnparsableReplyError(f"A subgoal has at most {MOST_SUBGOAL_LETTERS} characters.")
     rest = re.sub(r"<\d+, \d+>", "", subgoal)
-    if any(sign in rest for sign in "<>|{}"):
+    if _NO_WORDS.search(rest):
         raise UnparsableReplyError("The subgoal holds signs that are part of no point.")
     return subgoal
 
 
 def normalize_subgoal(text: str) -> str:
-    """Return a model's subgoal in one line, without quotes, full stop and end token.
+    """Return a model's subgoal in one line, without thoughts, quotes, full stop and end token.
 
     It is in lower case, like all text that the policies were trained on.
     """
-    return " ".join(_END.sub("", text).split()).lower().strip("\"'`. ")
+    return " ".join(answer_of(text).split()).lower().strip("\"'`. ")
 
 
 def says_finished(subgoal: str) -> bool:

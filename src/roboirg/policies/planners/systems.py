@@ -72,12 +72,14 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
         ) from error
     origin = f"system {name_or_file}"
     system = check_options(System, entries, origin)
-    policy, planner = system.policy, system.planner
+    policy = system.policy
+    planner = system.planner
     own = {"base_url" if option == VLM else option: value for option, value in overrides.items()}
     for option in [one for one in own if one == SERVER or one.startswith(POLICY)]:
         policy = _policy_with(policy, option, own.pop(option), origin)
     if planner is not None:
-        policy, planner = own.pop(HANDS, policy), with_options(planner, own)
+        policy = own.pop(HANDS, policy)
+        planner = with_options(planner, own)
     elif own:
         known = [SERVER, f"{POLICY}OPTION"]
         raise UnknownNameError(f"option of {origin}, which has no planner,", min(own), known)
@@ -99,7 +101,11 @@ def _policy_with(spec: str, option: str, value: str, origin: str) -> str:
             f"Option {option!r}: the policy of {origin} is {spec!r}, which is not a URL."
         )
     url = split_url(spec)
-    place = value if option == SERVER else url.target
-    changed = {} if option == SERVER else {option.removeprefix(POLICY): value}
-    query = urlencode({**dict(url.options), **changed})
-    return f"{url.kind}://{place}" + (f"?{query}" if query else "")
+    place = url.target
+    options = dict(url.options)
+    if option == SERVER:
+        place = value
+    else:
+        options[option.removeprefix(POLICY)] = value
+    query = f"?{urlencode(options)}" if options else ""
+    return f"{url.kind}://{place}{query}"

@@ -20,8 +20,8 @@ from roboirg.policies.vlm.models import ModelOptions, ModelQuery
 from roboirg.policies.vlm.models.model import config_version
 from roboirg.policies.vlm.prompt_files import SHARED, load_prompts
 from roboirg.policies.vlm.vlm_query import VLMQuery
-from roboirg.util.json_reply import UnparsableReplyError
 from roboirg.util.media import Clip, Pixels
+from roboirg.util.reply_reading import UnparsableReplyError
 
 FINISHED = ""
 """Stands for the answer that the task is complete."""
@@ -80,12 +80,15 @@ class VLMPlanner(ABC, Generic[Options]):
     demonstration_frames: DemonstrationFrames = "all"
 
     def __init__(self, options: Options, kind: str, seed: int = 0) -> None:  # noqa: ARG002
-        self.options, self.kind, self.asked = options, kind, options.asked
+        self.options = options
+        self.kind = kind
+        self.asked = options.asked
         self.observe_every: int | None = getattr(options, "observe_every", None)
-        self.prompts, self.shared = load_prompts(kind, options.prompts), load_prompts(SHARED)
+        self.prompts = load_prompts(kind, options.prompts)
+        self.shared = load_prompts(SHARED)
         self.fill = self.prompts.fill
         self.vlm = VLMQuery(options.model, self.prompts["again"])
-        VLMPlanner.reset(self, "", {})
+        self.reset("", {})
 
     @property
     def version(self) -> str:
@@ -113,6 +116,10 @@ class VLMPlanner(ABC, Generic[Options]):
         seen = len(demonstration.get("joint_positions", ()))
         self.video: Pixels | None = demonstration["front_rgb"] if seen else None
         self._summary: Clip | None = None
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget what was remembered of the last episode."""
 
     def hear(self, text: str, step: int) -> None:  # noqa: ARG002
         """Remember an utterance; the next query quotes everything that was said."""
@@ -138,7 +145,8 @@ class VLMPlanner(ABC, Generic[Options]):
             self._useless += 1
             self._news = True
         else:
-            self._useless, self._finished = 0, subgoal == FINISHED
+            self._useless = 0
+            self._finished = subgoal == FINISHED
             self.subgoal = subgoal or None
         return self.subgoal
 
@@ -197,7 +205,8 @@ class VLMPlanner(ABC, Generic[Options]):
 
     def _due(self, step: int) -> bool:
         """Return whether to query the model now."""
-        waits, period = self.asked == WHEN_DONE, re.search(r"\d+", self.asked)
+        waits = self.asked == WHEN_DONE
+        period = re.search(r"\d+", self.asked)
         number = step // int(period[0]) if period else 0
         is_new = period is None or number > self._periods
         self._periods = number

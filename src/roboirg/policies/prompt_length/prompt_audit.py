@@ -113,7 +113,8 @@ def most_tokens(text: str) -> Tokens:
     """
     ends: list[int] = []
     for found in _WORD.finditer(text):
-        word, start = found[0], found.start()
+        word = found[0]
+        start = found.start()
         # A letter beyond ASCII may need a token for each of its bytes.
         count = count_tokens(word) - ADDED_TOKENS + len(word.encode()) - len(word)
         ends += [start] * (count - 1) + [found.end()]

@@ -20,6 +20,7 @@ from roboirg.core.errors import (
     RoboIRGError,
 )
 from roboirg.core.extras import extra_needed
+from roboirg.core.handed_keys import bytes_without_keys, without_keys
 from roboirg.core.waiting import waiting
 from roboirg.policies.remote.endpoints import MIB, Endpoint, RemoteOptions
 from roboirg.policies.remote.message_codec import CodecError, unpack
@@ -136,6 +137,7 @@ class ServerConnection:
 
     def error_reply(self, text: str) -> PolicyReplyError:
         """Return the error for a server's traceback, of which the last line says most."""
+        text = without_keys(text)  # before it is cut, perhaps within a key
         # Only the end is split into lines: there may be millions.
         lines = text[-_MAX_TRACEBACK_END:].rstrip().splitlines()
         words = lines[-1].strip()[:_MAX_ERROR_LENGTH].rstrip(".") if lines else "an empty text"
@@ -206,7 +208,7 @@ class ServerConnection:
         if isinstance(data, str):
             raise self.error_reply(data)
         try:
-            return unpack(data)
+            return unpack(bytes_without_keys(data))
         except CodecError as error:
             raise PolicyReplyError(
                 f"{self} sent something other than a message: {error}."

@@ -11,8 +11,9 @@ from pydantic import AfterValidator, Field
 
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.handed_keys import remember_key
 from roboirg.core.policy_ref import PolicyRef
-from roboirg.policies.contract.option_checking import Seconds
+from roboirg.policies.contract.option_checking import NOT_COMPARED, Seconds
 from roboirg.policies.contract.policy_urls import UrlOptions
 from roboirg.util.web.request_origin import LOOPBACK_NAMES
 
@@ -58,14 +59,14 @@ class RemoteOptions(UrlOptions):
         tokenizer: file of the model's tokenizer.
     """
 
-    timeout: Seconds = Field(120.0, gt=0)
-    connect: Seconds = Field(60.0, gt=0)
-    wait: Seconds = Field(3600.0, ge=0)
-    shared: bool = False
-    tls: bool = False
-    api_key_env: str | None = Field(None, min_length=1)
-    max_reply_mib: float = Field(16.0, gt=0)
-    version: str | None = Field(None, min_length=1)
+    timeout: Seconds = Field(120.0, gt=0, exclude=NOT_COMPARED)
+    connect: Seconds = Field(60.0, gt=0, exclude=NOT_COMPARED)
+    wait: Seconds = Field(3600.0, ge=0, exclude=NOT_COMPARED)
+    shared: bool = Field(False, exclude=NOT_COMPARED)
+    tls: bool = Field(False, exclude=NOT_COMPARED)
+    api_key_env: str | None = Field(None, min_length=1, exclude=NOT_COMPARED)
+    max_reply_mib: float = Field(16.0, gt=0, exclude=NOT_COMPARED)
+    version: str | None = Field(None, min_length=1, exclude=NOT_COMPARED)
     prompt_tokens: int | None = Field(None, ge=1)
     prompt_added: int = Field(0, ge=0)
     tokenizer: str | None = Field(None, min_length=1)
@@ -84,6 +85,7 @@ class RemoteOptions(UrlOptions):
             raise InvalidValueError(
                 f"The environment variable {self.api_key_env} (option api_key_env) holds no key."
             )
+        remember_key(key)
         return {"Authorization": f"Api-Key {key}"}
 
 
@@ -97,11 +99,6 @@ def read_endpoints(url: PolicyRef) -> tuple[Endpoint, ...]:
 
 
 def _endpoint(url: PolicyRef, text: str) -> Endpoint:
-    if "@" in text:
-        raise InvalidValueError(
-            f"A URL of {url.kind}:// cannot hold a key or password; put it into an environment "
-            "variable and name that with api_key_env=NAME."
-        )
     try:
         parts = urlsplit(f"//{text}")
         host, port = parts.hostname, parts.port

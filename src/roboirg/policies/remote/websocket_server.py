@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from roboirg.core.error_words import one_line
 from roboirg.core.extras import extra_needed
+from roboirg.core.plain_text import printable
 from roboirg.policies.remote.message_codec import pack, unpack
 from roboirg.policies.remote.service import Service
 from roboirg.util.web.listening import TIMEOUT_S, listen
@@ -143,4 +144,4 @@ def _answer(service: Service, data: bytes | str) -> bytes | str:
             raise TypeError("Messages must be binary, not text.")
         return pack(service.handle(unpack(data)))
     except (Exception, SystemExit) as error:  # noqa: BLE001 - the boundary: the policy's author needs the traceback
-        return traceback.format_exc() + one_line(error)  # clients show the last line
+        return printable(traceback.format_exc()) + one_line(error)  # clients show the last line

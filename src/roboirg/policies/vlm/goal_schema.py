@@ -16,7 +16,7 @@ from roboirg.core.episode import Goal
 from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import split_episodes
-from roboirg.util.json_reply import UnparsableReplyError, json_object
+from roboirg.util.reply_reading import UnparsableReplyError, json_object, whole_number
 
 Answer = Mapping[str, Any]
 """JSON values by field: numbers, words and lists of words."""
@@ -40,9 +40,14 @@ class Field:
     values: tuple[str | int, ...]
     lengths: tuple[int, int] | None = None
 
+    @property
+    def is_number(self) -> bool:
+        """Whether the values are whole numbers."""
+        return isinstance(self.values[0], int)
+
     def schema(self) -> dict[str, Any]:
         """Return the JSON schema of the field."""
-        kind = "integer" if isinstance(self.values[0], int) else "string"
+        kind = "integer" if self.is_number else "string"
         one: dict[str, Any] = {"type": kind, "enum": list(self.values)}
         if self.lengths is None:
             return one
@@ -85,12 +90,7 @@ class GoalSchema:
         if reasoning is not None:
             properties["reasoning"] = {"type": "string", "description": reasoning}
         properties |= {field.name: field.schema() for field in self.fields}
-        return {
-            "type": "object",
-            "properties": properties,
-            "required": list(properties),
-            "additionalProperties": False,
-        }
+        return object_schema(properties)
 
     def read(self, text: str) -> Goal:
         """Return the goal that a reply names.
@@ -103,7 +103,7 @@ class GoalSchema:
         for field in self.fields:
             if field.name not in reply:
                 raise UnparsableReplyError(f"The field {field.name!r} is missing.")
-            answer[field.name] = _normalize(reply[field.name])
+            answer[field.name] = _normalize(reply[field.name], field.is_number)
         goal = self.goals.get(_canonical(answer))
         if goal is not None:
             return goal
@@ -115,6 +115,16 @@ class GoalSchema:
                     f"its values are {', '.join(map(str, field.values))}."
                 )
         raise UnparsableReplyError("These values cannot be meant together.")
+
+
+def object_schema(fields: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the JSON schema of an object with these fields, each with its schema, and no other."""
+    return {
+        "type": "object",
+        "properties": dict(fields),
+        "required": list(fields),
+        "additionalProperties": False,
+    }
 
 
 @functools.cache
@@ -151,11 +161,14 @@ def _field(name: str, values: list[Any]) -> Field:
     return Field(name, kind, tuple(sorted(set(values))), lengths)
 
 
-def _normalize(value: object) -> object:
-    """Return a value with its words in lower case and stripped."""
+def _normalize(value: object, is_number: bool) -> object:
+    """Return a value with its words in lower case and stripped; 3.0 and "3" become 3."""
+    if isinstance(value, list):
+        return [_normalize(item, is_number) for item in value]
     if isinstance(value, str):
-        return value.strip().lower()
-    return [_normalize(item) for item in value] if isinstance(value, list) else value
+        value = value.strip().lower()
+    number = whole_number(value) if is_number else None
+    return value if number is None else number
 
 
 def _canonical(answer: Answer) -> str:

@@ -10,17 +10,20 @@ from dataclasses import dataclass, field
 from string import Template
 from typing import TypeVar
 
-from roboirg.core.errors import ModelBusyError, PolicyConnectionError
+from roboirg.core.errors import ModelBusyError, PolicyConnectionError, UnknownCostError
 from roboirg.core.waiting import waiting
 from roboirg.policies.vlm.model_content import ChatTurn
 from roboirg.policies.vlm.models import Model, ModelOptions, ModelQuery, ModelReply, make_model
+from roboirg.policies.vlm.models.model import tokens_of
 from roboirg.policies.vlm.models.reply_store import ReplyStore, current_store, digest
-from roboirg.util.json_reply import UnparsableReplyError
+from roboirg.util.reply_reading import UnparsableReplyError, answer_of
 
 Value = TypeVar("Value")
 
 SILENCE = "(no answer)"
 """Stands for an empty reply when it is quoted back; services refuse empty turns."""
+UNREAD = ModelReply("")
+"""Stands for a reply that could not be read: its tokens are unknown."""
 TRIES = 2
 FIRST_PAUSE_S = 1.0
 LONGEST_PAUSE_S = 60.0
@@ -48,7 +51,7 @@ class VLMQuery:
         self.start()
 
     def ask(self, query: ModelQuery, parse: Callable[[str], Value]) -> Value | None:
-        """Return the parsed reply; None if `parse` rejects two replies.
+        """Return the parsed answer of the reply; None if `parse` rejects two.
 
         Raises:
             PolicyConnectionError: the service cannot be reached or is overloaded.
@@ -57,11 +60,11 @@ class VLMQuery:
             BudgetError: the run has spent what it may.
         """
         for _ in range(TRIES):
-            reply = self._request(query)
+            answer = answer_of(self._request(query).text)
             try:
-                return parse(reply.text)
+                return parse(answer)
             except UnparsableReplyError as error:
-                rejected = ChatTurn("model", (reply.text or SILENCE,))
+                rejected = ChatTurn("model", (answer or SILENCE,))
                 retry = ChatTurn("user", (self.again.substitute(why=str(error)),))
                 query = query._replace(turns=(*query.turns, rejected, retry))
         self._counts["unparsed"] += 1
@@ -75,15 +78,16 @@ class VLMQuery:
     def usage(self) -> dict[str, float]:
         """Return calls, tokens and queries without a usable reply; the cost if prices are known.
 
+        Tokens and cost are NaN if the service did not report those of every reply.
         What was ``stored`` by an earlier try cost nothing again; ``anew`` is what was stored with
         something else sent, as by another machine; ``answered_s`` the time that its answers took,
         and ``waited_s`` that in queues and while it was busy.
         """
-        found = {
-            name: round(count, 3) if name.endswith("_s") else count
-            for name, count in self._counts.items()
-        }
-        return {name: count for name, count in found.items() if count or name in ALWAYS}
+        usage = {}
+        for name, count in self._counts.items():
+            if count or name in ALWAYS:
+                usage[name] = round(count, 3) if name.endswith("_s") else count
+        return usage
 
     @contextlib.contextmanager
     def _timed(self, name: str) -> Iterator[None]:
@@ -95,11 +99,15 @@ class VLMQuery:
     def _request(self, query: ModelQuery) -> ModelReply:
         self._counts["calls"] += 1
         reply = self._find_or_send(query)
+        self._count(reply)
+        return reply
+
+    def _count(self, reply: ModelReply) -> None:
+        """Add the tokens and the cost of a reply to the counts."""
         self._counts["input_tokens"] += reply.input_tokens
         self._counts["output_tokens"] += reply.output_tokens
         if self.options.has_prices:
             self._counts["cost_usd"] += self.options.cost_usd(reply)
-        return reply
 
     def _find_or_send(self, query: ModelQuery) -> ModelReply:
         """Return the run's reply to a query; a new one is stored before anything sees it."""
@@ -129,15 +137,27 @@ class VLMQuery:
                     store.wait_for_turn(self._service, self.options.requests_per_minute)
             try:
                 with self._timed("answered_s"):
-                    return model.answer(query)
+                    reply = model.answer(query)
+                return _as_stored(reply)
             except PolicyConnectionError as error:
                 is_busy = isinstance(error, ModelBusyError)
                 unreachable += not is_busy
                 seconds = getattr(error, "retry_after_s", None) or pause
                 if unreachable > self.options.retries or time.monotonic() + seconds > end:
                     raise
+            except UnknownCostError:
+                self._count(UNREAD)
+                if store is not None:
+                    store.keep_unread()
+                raise
             if store is not None and is_busy:  # makes the other processes of the run wait, too
                 store.pause(self._service, seconds)
             with self._timed("waited_s"), waiting(f"{self._service}, which is busy", is_queue=True):
                 time.sleep(seconds)
             pause = min(2 * pause, LONGEST_PAUSE_S)
+
+
+def _as_stored(reply: ModelReply) -> ModelReply:
+    """Return a reply that can be stored: halves of surrogate pairs are escaped in its text."""
+    text = reply.text.encode(errors="backslashreplace").decode()
+    return ModelReply(text, tokens_of(reply.input_tokens), tokens_of(reply.output_tokens))

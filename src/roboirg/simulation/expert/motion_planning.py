@@ -10,7 +10,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-import sapien
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -55,11 +54,6 @@ class ToolPose(NamedTuple):
     position: Vector
     rotation: Rotation
 
-    @classmethod
-    def from_sapien(cls, pose: sapien.Pose) -> ToolPose:
-        """Convert a SAPIEN pose."""
-        return cls(np.asarray(pose.p, dtype=np.float64), rotation_of(pose))
-
 
 class MotionPlanner:
     """Motion planner of one robot."""
@@ -76,8 +70,8 @@ class MotionPlanner:
     def forward_kinematics(self, arm: Vector) -> ToolPose:
         """Return the tool pose at arm joint positions (7)."""
         self._model.compute_forward_kinematics(_with_fingers(arm))
-        pose = ToolPose.from_sapien(self._model.get_link_pose(self._tool))
-        return ToolPose(pose.position + ROBOT_BASE, pose.rotation)
+        pose = self._model.get_link_pose(self._tool)
+        return ToolPose(np.asarray(pose.p, dtype=np.float64) + ROBOT_BASE, rotation_of(pose))
 
     def plan_straight(self, arm: Vector, goal: ToolPose) -> Vector:
         """Plan a straight move of the tool to `goal`.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -58,7 +58,7 @@ STRAIGHT_DOWN = Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
 
 
 class MotionPrimitives:
-    """Executes primitives in one world."""
+    """Executes primitives in one world; ``_do_KIND`` is the routine of each kind."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -72,9 +72,10 @@ class MotionPrimitives:
 
     def execute(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         """Yield the trajectories of a primitive; take the next after executing the last."""
-        return _ROUTINES[primitive.kind](self, primitive)
+        routine = getattr(self, f"_do_{primitive.kind}")
+        yield from routine(primitive)
 
-    def _pick_cube(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    def _do_pick_cube(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         for opening in (OPEN, NARROW):
             yield from self._grasp_and_lift(primitive.subject, opening)
             if Fact("picked", primitive.subject) in self._world.facts:
@@ -91,7 +92,7 @@ class MotionPrimitives:
         yield self._grip(CLOSED)
         yield self._move(_above(place, CUBE_HOVER), rotation)
 
-    def _release(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    def _do_place_on(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         """Yield the trajectories that let go of a thing over a place, at its kind's height."""
         place, rotation = self._place(primitive), self._rotation()
         kind = self._world.bodies[str(primitive.place)].item.kind
@@ -101,21 +102,23 @@ class MotionPrimitives:
         yield self._grip(OPEN)
         yield self._move(_above(place, CUBE_HOVER), rotation)
 
-    def _drop_into(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    _do_put_into = _do_place_on
+
+    def _do_drop_into(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         place, rotation = self._place(primitive), self._rotation()
         yield self._move(_above(place, BIN_RELEASE), rotation)
         yield self._grip(OPEN)
         back = place._replace(x=place.x - BIN_RETREAT)
         yield self._move(_above(back, BIN_RELEASE), rotation)
 
-    def _move_over(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    def _do_move_over(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._move(_above(self._place(primitive), OVER_TARGET), self._rotation())
 
-    def _press(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    def _do_press(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._move(_above(self._position(primitive.subject), CUBE_HOVER), STRAIGHT_DOWN)
-        yield from self._press_below(primitive)
+        yield from self._do_press_below(primitive)
 
-    def _press_below(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    def _do_press_below(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         button = self._position(primitive.subject)
         yield self._grip(CLOSED)
         down = self._move(_above(button, BUTTON_PRESS), STRAIGHT_DOWN)
@@ -132,11 +135,11 @@ class MotionPrimitives:
         ]
         return int(np.count_nonzero(np.array(heights) > BUTTON_CONTACT)) + ARM_LAG
 
-    def _hover(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    def _do_hover(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._move(_above(self._position(primitive.subject), CUBE_HOVER), STRAIGHT_DOWN)
         yield self._grip(CLOSED)
 
-    def _pick_container(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    def _do_pick_container(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._grip(OPEN)
         container = self._position(primitive.subject)
         grasp = _above(container, container.z + CONTAINER_GRASP)
@@ -147,29 +150,29 @@ class MotionPrimitives:
         yield self._grip(CLOSED)
         yield self._move(_above(container, CONTAINER_HOVER), rotation)
 
-    def _put_down(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    def _do_put_down(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         held = primitive.subject
-        tool = Point(*(float(one) for one in self._world.robot.tool_pose.p))
+        tool = Point(*self._world.robot.tool_pose.p.tolist())
         here = tool if held == ROBOT else self._position(held)
         rotation = self._rotation()
         yield self._move(_above(here, primitive.height), rotation)
         yield self._grip(OPEN)
         yield self._move(_above(here, CUBE_HOVER), rotation)
 
-    def _hold(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    def _do_hold(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         for _ in range(0, primitive.steps, GRIPPER_STEPS):
             yield self._grip(OPEN)
 
-    def _hold_until(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    def _do_hold_until(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         while (left := primitive.steps - self._world.elapsed) > 0:
             yield self._grip(CLOSED)[:left]
 
-    def _retreat(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    def _do_retreat(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._move(ASIDE, self._rotation())
         yield self._grip(OPEN)
-        yield from self._hold(primitive)
+        yield from self._do_hold(primitive)
 
-    def _go_home(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+    def _do_go_home(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         del primitive
         yield self._grip(OPEN)
         yield np.tile(HOME_ACTION, (HOMING_STEPS, 1))
@@ -217,26 +220,6 @@ class MotionPrimitives:
     def _rotation(self) -> Rotation:
         """Return the tool's current rotation."""
         return rotation_of(self._world.robot.tool_pose)
-
-
-# The table is part of the class.
-# ruff: noqa: SLF001
-_ROUTINES: dict[str, Callable[[MotionPrimitives, Primitive], Iterator[JointTrajectory]]] = {
-    "pick_cube": MotionPrimitives._pick_cube,
-    "place_on": MotionPrimitives._release,
-    "drop_into": MotionPrimitives._drop_into,
-    "put_into": MotionPrimitives._release,
-    "move_over": MotionPrimitives._move_over,
-    "put_down": MotionPrimitives._put_down,
-    "pick_container": MotionPrimitives._pick_container,
-    "press": MotionPrimitives._press,
-    "press_below": MotionPrimitives._press_below,
-    "hover": MotionPrimitives._hover,
-    "hold": MotionPrimitives._hold,
-    "hold_until": MotionPrimitives._hold_until,
-    "retreat": MotionPrimitives._retreat,
-    "go_home": MotionPrimitives._go_home,
-}
 
 
 def _above(place: Point, height: float) -> Point:

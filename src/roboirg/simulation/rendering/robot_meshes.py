@@ -77,9 +77,12 @@ def link_hull(path: Path, rendering: RenderSettings) -> NDArray[np.float64]:
 
 
 def apply_shading(body: sapien.render.RenderBodyComponent, rendering: RenderSettings) -> None:
-    """Set the shading of a body with `link_shapes`, once it is in a scene."""
+    """Set the shading of a body with `link_shapes`, once it is in a scene.
+
+    The slim shader shades each triangle by the normal of its first vertex.
+    """
     if rendering.slim_shader:
-        shaders.enable_flat_shading(body)
+        body.set_property(shaders.SHADING, shaders.FIRST_CORNER)
 
 
 @functools.cache

@@ -2,7 +2,7 @@
 
 The scenes have no environment map, so image-based light and the background pass contribute nothing
 and are removed; nothing is transparent either. Bodies can be shaded by one normal per triangle,
-that of its first vertex (`enable_flat_shading`); triangles can then share vertices, and the driver
+that of its first vertex (`FIRST_CORNER`); triangles can then share vertices, and the driver
 has fewer to compute. No text of SAPIEN is stored here: the installed shader is patched when it is
 used.
 """
@@ -108,11 +108,6 @@ def slim_shader() -> str:
     for name in _BACKGROUND:
         del texts[f"{STOCK_SHADER}/{name}"]
     return str(_write(texts) / STOCK_SHADER)
-
-
-def enable_flat_shading(body: sapien.render.RenderBodyComponent) -> None:
-    """Shade each triangle of a body by the normal of its first vertex."""
-    body.set_property(SHADING, FIRST_CORNER)
 
 
 @functools.cache

@@ -13,10 +13,11 @@ Rgba = tuple[float, float, float, float]
 SEGMENTS = 48
 
 
-def tube(
+@functools.cache
+def tube_mesh(
     outer: float, inner: float, half: float, rgba: Rgba
 ) -> sapien.render.RenderShapeTriangleMesh:
-    """Return an upright tube centered at the origin, to be attached to a body.
+    """Return an upright tube centered at the origin, to be cloned and attached to a body.
 
     Args:
         outer: outer radius, m.
@@ -24,13 +25,6 @@ def tube(
         half: half the height, m.
         rgba: color, 0 to 1 each.
     """
-    return _tube_mesh(outer, inner, half, rgba).clone()
-
-
-@functools.cache
-def _tube_mesh(
-    outer: float, inner: float, half: float, rgba: Rgba
-) -> sapien.render.RenderShapeTriangleMesh:
     # Four bands between two circles each: outside, top, inside, bottom; edges are sharp.
     circles = [(outer, -half), (outer, half), (inner, half), (inner, -half)]
     slopes = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]

@@ -25,21 +25,21 @@ FRONT_EYE = (0.3, 0.0, 0.4)
 FRONT_TARGET = (0.0, 0.0, -0.2)
 
 
-def look_at(eye: tuple[float, float, float], target: tuple[float, float, float]) -> sapien.Pose:
-    """Return the pose of a camera (x forward, z up, as in SAPIEN) that looks at a target."""
-    forward = np.subtract(target, eye)
+def front_camera_pose() -> sapien.Pose:
+    """Return the pose of the front camera: x forward, z up, as in SAPIEN."""
+    forward = np.subtract(FRONT_TARGET, FRONT_EYE)
     forward /= np.linalg.norm(forward)
     left = np.cross([0.0, 0.0, 1.0], forward)
     left /= np.linalg.norm(left)
     matrix = np.eye(4)
     matrix[:3, :3] = np.stack([forward, left, np.cross(forward, left)], axis=1)
-    matrix[:3, 3] = eye
+    matrix[:3, 3] = FRONT_EYE
     return sapien.Pose(matrix)
 
 
 def to_front_camera(pose: sapien.Pose) -> NDArray[np.float64]:
     """Return the transform (4, 4) from a frame in the world to the front camera (OpenCV)."""
-    frame = look_at(FRONT_EYE, FRONT_TARGET).inv() * pose
+    frame = front_camera_pose().inv() * pose
     # x right, y down, z forward of x forward, y left, z up
     axes = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1]], dtype=np.float64)
     return np.asarray(axes @ frame.to_transformation_matrix(), dtype=np.float64)

@@ -137,7 +137,7 @@ def rendering_key(rendering: RenderSettings) -> str:
 def _driver_libraries() -> list[str]:
     """Return the Vulkan driver files of this process; SAPIEN does not report their version."""
     try:
-        mapped = Path("/proc/self/maps").read_text().splitlines()
+        mapped = os.fsdecode(Path("/proc/self/maps").read_bytes()).splitlines()
     except OSError:
         return []
     paths = map(Path, {line.split(maxsplit=5)[5] for line in mapped if "/" in line})

@@ -54,16 +54,10 @@ def button_keep_out(button: SceneObject) -> Rectangle:
     return Rectangle(button.position.x, button.position.y, half, half)
 
 
-def button_footprint(button: SceneObject) -> Rectangle:
-    """Return the square that the base of a button covers."""
-    half_x, half_y, _ = object_sizes.BUTTON_BASE_HALF
-    return Rectangle(button.position.x, button.position.y, half_x, half_y, button.yaw)
-
-
-def cube_footprint(cube: SceneObject) -> Rectangle:
-    """Return the square that a cube covers."""
-    half = object_sizes.CUBE_HALF
-    return Rectangle(cube.position.x, cube.position.y, half, half, cube.yaw)
+def footprint(item: SceneObject) -> Rectangle:
+    """Return the square that a cube, container, bin, box or base of a button covers."""
+    half = item.half_width
+    return Rectangle(item.position.x, item.position.y, half, half, item.yaw)
 
 
 def cube_obstacle(cube: SceneObject) -> Rectangle | Line:
@@ -75,7 +69,7 @@ def cube_obstacle(cube: SceneObject) -> Rectangle | Line:
     """
     turn = LINE_TURNS[int(cube.yaw * YAW_DIGITS) % len(LINE_TURNS)]
     if turn is None:
-        return cube_footprint(cube)
+        return footprint(cube)
     return Line(*cube.position[:2], object_sizes.CUBE_HALF, cube.yaw + turn)
 
 
@@ -94,7 +88,7 @@ def draw_cube(
         yaw = 2.0 * math.pi * rng.random()
         return SceneObject(name, "cube", Point(x, y, object_sizes.CUBE_HALF), yaw, color)
 
-    return placed(name, draw, lambda cube: cube_footprint(cube).grown(gap), obstacles)
+    return placed(name, draw, lambda cube: footprint(cube).grown(gap), obstacles)
 
 
 def draw_cubes(
@@ -175,19 +169,13 @@ def draw_bin(
         yaw = (2.0 * rng.random() - 1.0) * BIN_YAW
         return SceneObject("bin", "bin", Point(x, y, object_sizes.BIN_HEIGHT / 2), yaw)
 
-    return placed("bin", draw, bin_footprint, obstacles)
+    return placed("bin", draw, footprint, obstacles)
 
 
 def bin_keep_out(item: SceneObject) -> Rectangle:
     """Return the square that keeps cubes away from a bin; as in RoboMME, it does not turn."""
     half = object_sizes.BIN_HALF
     return Rectangle(item.position.x, item.position.y, half, half)
-
-
-def bin_footprint(item: SceneObject) -> Rectangle:
-    """Return the square that a bin covers, its hole included."""
-    half = object_sizes.BIN_HALF
-    return Rectangle(item.position.x, item.position.y, half, half, item.yaw)
 
 
 def placed(

@@ -15,7 +15,7 @@ import numpy as np
 
 from roboirg.core import object_sizes
 from roboirg.core.episode import Color, ObjectKind, Scene, SceneObject
-from roboirg.core.footprints import Circle, Footprint, Rectangle, Region
+from roboirg.core.footprints import Circle, Footprint, Region
 from roboirg.core.motions import Point
 from roboirg.tasks.shared.fixtures import placed
 
@@ -42,12 +42,6 @@ def left_to_right(scene: Scene, kind: ObjectKind) -> tuple[Color, ...]:
     """Return the colors of the objects of a kind, from the robot's left to its right."""
     items = sorted(scene.of_kind(kind), key=lambda item: -item.position.y)
     return tuple(item.color for item in items if item.color is not None)
-
-
-def box_footprint(box: SceneObject) -> Rectangle:
-    """Return the square that a box covers."""
-    half = object_sizes.BOX_HALF
-    return Rectangle(box.position.x, box.position.y, half, half, box.yaw)
 
 
 def draw_box(rng: np.random.Generator, name: str, color: Color, region: Region) -> SceneObject:

@@ -22,10 +22,10 @@ from roboirg.core.episode import (
     Stage,
 )
 from roboirg.core.errors import SceneRejectedError
-from roboirg.core.footprints import Circle, Footprint, Rectangle, Region, place
+from roboirg.core.footprints import Circle, Footprint, Region, place
 from roboirg.core.motions import Away, Point
 from roboirg.core.word_pools import Pools
-from roboirg.tasks.shared.fixtures import button_keep_out
+from roboirg.tasks.shared.fixtures import button_keep_out, footprint
 from roboirg.tasks.task import Commands, Wording
 
 APPEAR_STEP = 32
@@ -35,12 +35,6 @@ CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 5, "hard": 15}
 PICKS: dict[Difficulty, int] = {"easy": 1, "medium": 1, "hard": 2}
 REGION = Region(0.0, 0.0, 0.2, 0.2)
 GAP = 0.04
-
-
-def container_footprint(container: SceneObject) -> Rectangle:
-    """Return the square that a container covers."""
-    half = object_sizes.CONTAINER_FOOTPRINT_HALF
-    return Rectangle(container.position.x, container.position.y, half, half, container.yaw)
 
 
 def sample(
@@ -81,7 +75,7 @@ def draw_containers_in(
         yaw = -rng.random() * math.pi / 2
         container = SceneObject(f"container_{index}", "container", position, yaw)
         containers.append(container)
-        taken.append(container_footprint(container).grown(gap))
+        taken.append(footprint(container).grown(gap))
     return containers
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import json
 from collections.abc import Iterable
 
 from roboirg.core.episode import Episode
+from roboirg.tasks.splits.scene_codec import fields_of
 
 Plain = str | int | float | bool | None | list["Plain"] | dict[str, "Plain"]
 """Data that JSON can hold."""
@@ -40,18 +40,14 @@ def plain(value: object) -> Plain:
         return round(value, DECIMALS)
     if value is None or type(value) in {str, int, bool}:
         return value  # type: ignore[return-value] # mypy does not narrow by `in`
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        names = tuple(field.name for field in dataclasses.fields(value))
-    elif isinstance(value, tuple):
-        names = getattr(value, "_fields", ())
-        if not names:
-            return [plain(item) for item in value]
-    else:
-        raise TypeError(f"{value!r} of {type(value).__name__} is not plain data")
     kind = type(value).__name__
     fields = {
-        HASHED_AS.get((kind, name), name): plain(getattr(value, name))
-        for name in names
+        HASHED_AS.get((kind, name), name): plain(content)
+        for name, content, _ in fields_of(value)
         if (kind, name) not in NOT_COUNTED
     }
-    return {"type": kind, **fields}
+    if fields:
+        return {"type": kind, **fields}
+    if isinstance(value, tuple):
+        return [plain(item) for item in value]
+    raise TypeError(f"{value!r} of {kind} is not plain data")

@@ -44,7 +44,7 @@ class PublishedEpisode(NamedTuple):
 
 def published_episode(task: str, split: str, index: int) -> PublishedEpisode | None:
     """Return an episode, or None if RoboMME has none there: it is sampled."""
-    line = _lines().get((task, split, index))
+    line = _lines().get(_Key(task, split, index))
     if line is None:
         return None
     entry = json.loads(line)
@@ -58,7 +58,7 @@ def published_episode(task: str, split: str, index: int) -> PublishedEpisode | N
 
 def published_goals(task: str) -> tuple[Goal, ...]:
     """Return the goals of all published episodes of a task, in the order of the file."""
-    lines = (line for key, line in _lines().items() if key[0] == task)
+    lines = (line for key, line in _lines().items() if key.task == task)
     return tuple(cast("Goal", decode(json.loads(line)["goal"])) for line in lines)
 
 
@@ -75,15 +75,16 @@ def published_text() -> str:
     return text
 
 
-class _Key(msgspec.Struct):
+class _Key(msgspec.Struct, frozen=True):
+    """Which episode a line has."""
+
     task: str
     split: str
     index: int
 
 
 @functools.cache
-def _lines() -> Mapping[tuple[str, str, int], str]:
-    """Return the lines by task, split and index; a line is decoded when it is asked for."""
+def _lines() -> Mapping[_Key, str]:
+    """Return the lines; a line is decoded when it is asked for."""
     lines = published_text().splitlines()
-    keys = (msgspec.json.decode(line, type=_Key) for line in lines)
-    return {(key.task, key.split, key.index): line for key, line in zip(keys, lines, strict=True)}
+    return {msgspec.json.decode(line, type=_Key): line for line in lines}

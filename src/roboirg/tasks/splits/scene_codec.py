@@ -27,7 +27,7 @@ def encode(value: object) -> Json:
     if value is None or isinstance(value, str | int):
         return value
     if type(value).__name__ in _TYPES:
-        given = {name: encode(one) for name, one, default in _fields(value) if one != default}
+        given = {name: encode(one) for name, one, default in fields_of(value) if one != default}
         return {_TYPE: type(value).__name__, **given}
     if isinstance(value, tuple):
         return [encode(one) for one in value]
@@ -44,7 +44,7 @@ def decode(value: Json) -> object:
     return value
 
 
-def _fields(value: object) -> Iterator[tuple[str, object, object]]:
+def fields_of(value: object) -> Iterator[tuple[str, object, object]]:
     """Yield name, value and default of each field; `MISSING` where there is no default."""
     if dataclasses.is_dataclass(value):
         for field in dataclasses.fields(value):

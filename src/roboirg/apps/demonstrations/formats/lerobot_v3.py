@@ -132,15 +132,16 @@ class StatsCollector:
 
     def add(self, trajectory: Trajectory, placed: PlacedText) -> dict[str, FeatureStats]:
         """Add an episode; returns its own statistics."""
-        shared = self._columns.numbers(trajectory)
-        counts = self._columns.picture_counts(trajectory)
-        indices = self._columns.indices(placed, len(next(iter(shared.values()))))
+        columns = self._columns
+        shared = columns.numbers(trajectory)
+        counts = {columns.keys[one]: trajectory.histograms[one] for one in columns.cameras}
+        indices = columns.indices(placed, len(next(iter(shared.values()))))
         for name, values in (shared | indices).items():
             self._numbers[name].append(values)
         for name, one in counts.items():
             self._counts[name] = self._counts.get(name, 0) + one
         if self._last is None or self._last[0] != trajectory.path:
-            stats = self._columns.stats({name: [one] for name, one in shared.items()}, counts)
+            stats = columns.stats({name: [one] for name, one in shared.items()}, counts)
             self._last = trajectory.path, stats
         return self._last[1] | {name: vector_stats(one) for name, one in indices.items()}
 

@@ -47,7 +47,8 @@ class PipeModel:
         """Return the parent's reply; see `Model`."""
         self._pipe.send(ModelRequest(chat_messages(query, self._options), query.schema))
         try:
-            return ModelReply(*self._pipe.recv())
+            reply: ModelReply = self._pipe.recv()
+            return reply
         except EOFError as error:
             raise PolicyConnectionError("Inspect ended the episode.") from error
 

@@ -42,7 +42,7 @@ from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.policies.vlm.listener_query import PROMPTS, QuestionTexts
 from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.policies.vlm.vlm_query import SILENCE
-from roboirg.util.json_reply import UnparsableReplyError
+from roboirg.util.reply_reading import UnparsableReplyError
 
 EPISODE = "episode"
 

@@ -35,7 +35,7 @@ from roboirg.core.errors import RoboIRGError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOptions
 from roboirg.evaluation.records.record import Job
 from roboirg.policies.by_name.finding import read_policy
-from roboirg.policies.vlm.models import ModelOptions
+from roboirg.policies.vlm.models import ModelOptions, ModelReply
 from roboirg.policies.vlm.vlm_listener import ListenerOptions
 from roboirg.tasks import find_tasks
 from roboirg.tasks.splits.splits import split_size
@@ -157,8 +157,8 @@ async def _play(
 
 async def _ask(
     model: Model, request: ModelRequest, options: ListenerOptions, state: TaskState
-) -> tuple[str, int, int]:
-    """Return the text of the model's reply and its tokens."""
+) -> ModelReply:
+    """Return the model's reply; Inspect keeps its thoughts apart."""
     config = GenerateConfig()
     if request.schema is not None and options.model.structured:
         schema = JSONSchema.model_validate(request.schema)
@@ -167,11 +167,9 @@ async def _ask(
     output = await model.generate(messages, config=config)
     state.messages = [*messages, *([output.message] if output.choices else [])]
     usage = output.usage
-    return (
-        output.completion,
-        usage.input_tokens if usage else 0,
-        usage.output_tokens if usage else 0,
-    )
+    if usage is None:
+        return ModelReply(output.completion)
+    return ModelReply(output.completion, usage.input_tokens, usage.output_tokens)
 
 
 def _message(message: dict[str, Any]) -> ChatMessage:

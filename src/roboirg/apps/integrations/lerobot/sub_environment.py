@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.environment_options import MAX_STEPS
 from roboirg.core.errors import InvalidActionError, InvalidValueError
+from roboirg.core.field_types import check_whole
 from roboirg.core.observations import CAMERAS, proprioception
 from roboirg.envs.action_chunks import StepResult
 from roboirg.envs.env_settings import EnvOptions
@@ -70,10 +71,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
     ) -> None:
         if not options.get("cameras", CAMERAS):
             raise InvalidValueError("cameras is empty; LeRobot needs at least one picture.")
-        if not isinstance(size, int) or not 1 <= size <= PICTURE_SIZE:
-            raise InvalidValueError(
-                f"size is {size!r}; it must be a number from 1 to {PICTURE_SIZE}."
-            )
+        check_whole("size", size, most=PICTURE_SIZE)
         self._video, self._size = video, size
         usual: EnvOptions = {
             "demonstration_frames": "all" if video else "none",

@@ -18,6 +18,7 @@ from roboirg.apps.language_lab.validation.validation_results import (
 )
 from roboirg.core.episode import SPLITS, Episode, Goal, Split, values_in
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.field_types import check_whole
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import expressible, find_refusal, instruct_with
 from roboirg.language.instruction import Instruction, Mention, hidden_slots
@@ -52,8 +53,7 @@ def places_of(tasks: Sequence[str], splits: Sequence[Split], seeds: int) -> list
     Raises:
         InvalidValueError: the number is negative, or there is nothing to validate.
     """
-    if seeds < 0:
-        raise InvalidValueError(f"The number of random seeds is {seeds}; it must be at least 0.")
+    check_whole("seeds", seeds, least=0)
     sizes: dict[Split, int] = {**{split: SIZES[split] for split in splits}, "random": seeds}
     found = [
         (task, split, index)

@@ -19,6 +19,7 @@ import numpy as np
 from roboirg.apps.real.study.counterbalancing import counterbalanced_episodes, target_kind
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError, check_names
+from roboirg.core.field_types import MOST_WHOLE, check_policy_name, check_whole
 from roboirg.core.instruction_options import InstructionOptions, identifying
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.plan.option_parsing import name_and_spec
@@ -144,6 +145,7 @@ class StudyPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         written = msgspec.to_builtins(self)
         for one, trial in zip(written["trials"], self.trials, strict=True):
             one["job"]["options"] = identifying(trial.job.options)
+            del one["job"]["ref"]["makeup"]  # which plans did not have
         return short_hash(msgspec.json.encode(written))
 
     def trial(self, name: str) -> PlannedTrial:
@@ -290,13 +292,11 @@ def _check(
             raise InvalidValueError(f"The {kind} {repeated[0]!r} is given twice.")
     if len(policies) > len(LETTERS):
         raise InvalidValueError(f"{len(policies)} policies are too many; at most {len(LETTERS)}.")
-    for name, value, minimum in (
-        ("trials", trials, 1),
-        ("demonstrations", demonstrations, 0),
-        ("seed", seed, 0),
-    ):
-        if value < minimum:
-            raise InvalidValueError(f"{name} is {value}; it must be at least {minimum}.")
+    check_whole("trials", trials)
+    check_whole("demonstrations", demonstrations, least=0)
+    check_whole("seed", seed, least=0, most=MOST_WHOLE)
+    for policy in policies:
+        check_policy_name(policy)
     for task in tasks:
         target_kind(task)
         available = settings_of(get_task(task))

@@ -47,12 +47,10 @@ def draw_failures(content: RunData) -> Figure | None:
     columns = sorted({options for _, options in counts}, key=options_sort_key)
     runs = [one for one in content.frame.names if any(run == one for run, _ in counts)]
     labels = {content.name(run): list(map(options_label, columns)) for run in runs}
-    keys = {
-        f"{FAILURES[name]}: " * bool(FAILURES[name]) + name.replace("_", " "): Patch(
-            facecolor=COLORS[name], edgecolor=paper()
-        )
-        for name in shown
-    }
+    keys = {}
+    for name in shown:
+        words = filter(None, (FAILURES[name], name.replace("_", " ")))
+        keys[": ".join(words)] = Patch(facecolor=COLORS[name], edgecolor=paper())
     notes = [NOTE, where_played([one.conditions for one in runs])]
     figure, found = panels(labels, MOST_COLUMNS, keys, notes)
     for (axes, places), run in zip(found, runs, strict=True):
@@ -65,7 +63,8 @@ def draw_failures(content: RunData) -> Figure | None:
 
 
 def _draw_bar(axes: Axes, place: float, counts: Counter[str], shown: Sequence[str]) -> None:
-    left, trials = 0.0, counts["trials"]
+    left = 0.0
+    trials = counts["trials"]
     for name in shown:
         width = 100 * counts[name] / max(1, trials)
         axes.barh(

@@ -7,8 +7,8 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from roboirg.core.errors import InvalidValueError
 from roboirg.core.extras import extra_needed
+from roboirg.util.atomic_write import replacing
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -55,14 +55,12 @@ DARK_STYLE = {
     ),
 }
 """For pages with a dark background."""
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
-"""Okabe and Ito's colors, safe for color-blind readers."""
-_METADATA: Mapping[str, Mapping[str, None] | None] = {
+_METADATA = {
     "svg": {"Date": None},
     "pdf": {"CreationDate": None},
     "png": None,
 }
-_SAME_FILES: Mapping[str, object] = {
+_SAME_FILES = {
     "font.family": "DejaVu Sans",
     "pdf.fonttype": 42,  # letters, not outlines, which some venues refuse
     "svg.hashsalt": "roboirg",  # the ids in an SVG file are random without it
@@ -100,13 +98,13 @@ def save(
             if figure is None:
                 return ()
             _fix_layout(figure)
-            try:
-                folder.mkdir(parents=True, exist_ok=True)
-                for one in own:
-                    paths.append(folder / f"{stem}.{one}")
-                    figure.savefig(paths[-1], dpi=DOTS_PER_INCH, metadata=_METADATA[one])
-            except OSError as error:
-                raise InvalidValueError(f"Cannot write to {folder}: {error.strerror}.") from error
+            for ending in own:
+                path = folder / f"{stem}.{ending}"
+                with replacing(path) as part:
+                    figure.savefig(
+                        part, format=ending, dpi=DOTS_PER_INCH, metadata=_METADATA[ending]
+                    )
+                paths.append(path)
     return tuple(paths)
 
 
@@ -134,25 +132,25 @@ def first_color() -> str:
     return str(mpl.rcParams["lines.color"])
 
 
-def new_figure(width: float, height: float, below: float = 0) -> Figure:
-    """Return an empty figure of the given size in inches, with a share of it left free below."""
+def _new_figure(width: float, height: float, below: float) -> Figure:
+    """Return an empty figure of the given size in inches, with `below` of it left free below."""
     # Without pyplot, which keeps every figure and looks for a display.
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+    share = below / height
     engine = ConstrainedLayoutEngine(
-        w_pad=0.03, h_pad=0.03, wspace=0.04, rect=(0, below, 1, 1 - below)
+        w_pad=0.03, h_pad=0.03, wspace=0.04, rect=(0, share, 1, 1 - share)
     )
     return Figure(figsize=(width, height), layout=engine)
 
 
-def clear_axes(axes: Axes, *, grid: str) -> None:
-    """Remove most of the frame and add grid lines for one axis."""
+def _clear_axes(axes: Axes) -> None:
+    """Remove most of the frame and add vertical grid lines."""
     axes.set_axisbelow(True)
-    axes.grid(axis="x" if grid == "x" else "y")
+    axes.grid(axis="x")
     axes.tick_params(axis="both", length=0)
-    for side in ("top", "right", "left" if grid == "x" else "bottom"):
-        axes.spines[side].set_visible(False)
+    axes.spines[["top", "right", "left"]].set_visible(False)
 
 
 def folded(text: str, letters: float) -> str:
@@ -182,7 +180,8 @@ def panels(
         which is two units high, and one more for every further line of its label.
     """
     across = min(across, len(rows))
-    down, width = -(-len(rows) // across), PAGE_INCHES if across > 1 else COLUMN_INCHES
+    down = -(-len(rows) // across)
+    width = PAGE_INCHES if across > 1 else COLUMN_INCHES
     labels = [[folded(label, MOST_ROW_LETTERS) for label in own] for own in rows.values()]
     longest = max(len(line) for own in labels for label in own for line in label.split("\n"))
     room = (width - longest / ROW_LETTERS) / across
@@ -201,13 +200,13 @@ def panels(
     title_inches = TITLE_LINE_INCHES * max(title.count("\n") + 1 for title in titles)
     panel_inches = ROW_LINE_INCHES * max(map(sum, sizes)) + title_inches + AXIS_INCHES
     height = down * panel_inches + below
-    figure = new_figure(width, height, below=below / height)
+    figure = _new_figure(width, height, below)
     is_shared = all(own == labels[0] for own in labels)
     grid = figure.subplots(down, across, sharey=is_shared, squeeze=False).ravel()
     found = []
     for axes, title, own, size in zip(grid, titles, labels, sizes, strict=False):
         axes.set_title(title, loc="left").set_size(TITLE_POINTS * fitting / letters)
-        clear_axes(axes, grid="x")
+        _clear_axes(axes)
         found.append((axes, _label_rows(axes, own, size, headings)))
     for axes in grid[len(rows) :]:
         axes.set_visible(False)

@@ -32,9 +32,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 NO_BREAK = "\N{NO-BREAK SPACE}"
-SIZE_NOTE = "n: episodes per task and setting, × policy seeds if there are several."
+SIZE_NOTE = (
+    "n: episodes per task and setting, × policy seeds if there are several; where no band is "
+    "drawn, too few episodes."
+)
 PUBLISHED_NOTE = "published: the same tasks, the paper's instructions and simulator."
-WORDS: Mapping[RateTable, tuple[str, str, str]] = {
+WORDS = {
     "main": ("success", "success with explicit instructions", "with implicit ones"),
     "context": ("success", "success with stages 1,5", "with more stages"),
 }
@@ -42,7 +45,7 @@ WORDS: Mapping[RateTable, tuple[str, str, str]] = {
 
 Tasks = Mapping[InstructionOptions, Sequence[str]]
 """The tasks of each column."""
-Played = Mapping[tuple[InstructionOptions, PolicyRun], Mapping[str, Cell]]
+Played = Mapping[InstructionOptions, Mapping[PolicyRun, ByTask]]
 """By column and policy run, the tasks with a verdict."""
 
 
@@ -51,7 +54,8 @@ def draw_next_to_reference(which: RateTable, content: RunData, published: bool) 
 
     None without data, and for contexts if there is only one, as in a run of the usual settings.
     """
-    table, played = PAPER_TABLES[which], _played(which, content.cells)
+    table = PAPER_TABLES[which]
+    played = _played(which, content.cells)
     tasks = _shared_tasks(which, played) if content.cells else _published_tasks(which)
     if which == "context" and len(tasks) <= 1:
         return None
@@ -92,10 +96,10 @@ def _title(which: RateTable, options: InstructionOptions) -> str:
 
 
 def _played(which: RateTable, cells: Cells) -> Played:
-    found: dict[tuple[InstructionOptions, PolicyRun], dict[str, Cell]] = {}
+    found: dict[InstructionOptions, dict[PolicyRun, dict[str, Cell]]] = {}
     for (policy_run, task, options), cell in cells.items():
         if cell.verdicts and PAPER_TABLES[which].shows(options):
-            found.setdefault((options, policy_run), {})[task] = cell
+            found.setdefault(options, {}).setdefault(policy_run, {})[task] = cell
     return found
 
 
@@ -105,12 +109,10 @@ def _shared_tasks(which: RateTable, played: Played) -> dict[InstructionOptions, 
     Those that played the reference as well must have played these tasks with it.
     """
     shared = {}
-    for options in sorted({options for options, _ in played}, key=row_order):
-        runs = [policy_run for one, policy_run in played if one == options]
-        places = [
-            (one, run) for one in (options, PAPER_TABLES[which].reference(options)) for run in runs
-        ]
-        needed = [played[place] for place in places if place in played]
+    for options in sorted(played, key=row_order):
+        runs = played[options]
+        before = played.get(PAPER_TABLES[which].reference(options), {})
+        needed = [*runs.values(), *(own for run, own in before.items() if run in runs)]
         if tasks := [task for task in needed[0] if all(task in own for own in needed)]:
             shared[options] = tasks
     return shared
@@ -128,24 +130,25 @@ def _own_rates(
     which: RateTable, policy_run: PolicyRun, played: Played, tasks: Tasks
 ) -> dict[str, Rate]:
     """Return the rates of a policy run by column, over exactly the column's tasks."""
-    table = PAPER_TABLES[which]
+    own = {options: runs[policy_run] for options, runs in played.items() if policy_run in runs}
 
     def reference(key: tuple[InstructionOptions]) -> ByTask:
-        before = table.reference(key[0])
-        return NOTHING if key[0] == before else played.get((before, policy_run), NOTHING)
+        before = PAPER_TABLES[which].reference(key[0])
+        return NOTHING if key[0] == before else own.get(before, NOTHING)
 
     found = measure_groups(
         {
-            (options,): {task: own[task] for task in names}
+            (options,): {task: own[options][task] for task in names}
             for options, names in tasks.items()
-            if (own := played.get((options, policy_run)))
+            if options in own
         },
         [reference],
         is_mean=lambda _key: True,
     )
     rates = {}
     for one in found:
-        rate, gap = float(one.rate or 0), one.gap
+        rate = float(one.rate or 0)
+        gap = one.gap
         before = None if gap is None else rate - gap.value
         rates[_title(which, one.key[0])] = Rate(rate, before, (gap or one).interval)
     return rates
@@ -154,9 +157,13 @@ def _own_rates(
 def _size_and_sign(policy_run: PolicyRun, cells: Cells, differences: AllDifferences) -> str:
     """Return how many episodes a policy has per cell, and whether its rates are comparable."""
     trials = [cell.rows()[:, 1] for key, cell in cells.items() if key.policy_run == policy_run]
-    sizes, seeds = [*map(len, trials)], max(max(one) for one in trials)
-    low, high = min(sizes), max(sizes)
-    text = f"n = {low}" + f" to {high}" * (low < high) + f" × {seeds}" * bool(seeds > 1)
+    sizes = sorted({len(one) for one in trials})
+    seeds = max(max(one) for one in trials)
+    text = f"n = {sizes[0]}"
+    if len(sizes) > 1:
+        text += f" to {sizes[-1]}"
+    if seeds > 1:
+        text += f" × {seeds}"
     own = [one for key, one in differences.items() if key.policy_run == policy_run]
     signs = [comparison_sign(one) for one in own if one is not None]
     if signs:
@@ -174,7 +181,8 @@ def _published_rates(which: RateTable, tasks: Tasks) -> Iterator[RateRow]:
         rates = {}
         for options, names in tasks.items():
             row = published.get((first.model, options), first)
-            rate, before = row.average_over(names), first.average_over(names)
+            rate = row.average_over(names)
+            before = first.average_over(names)
             if rate is not None and before is not None and row.options == options:
                 alone = float(rate) / 100
                 rates[_title(which, options)] = Rate(

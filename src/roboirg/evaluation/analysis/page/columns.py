@@ -13,12 +13,11 @@ from typing import NamedTuple, get_args
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.page.episodes import PageEpisodes
-from roboirg.evaluation.analysis.results.frame import task_order
+from roboirg.evaluation.analysis.results.frame import suite, task_order
 from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.tables.diagnostic_tables import FAILURES, UNATTRIBUTED
 from roboirg.evaluation.records.mixing import FAIRNESS
 from roboirg.evaluation.records.record import ERROR_KINDS, Outcome, Summary
-from roboirg.tasks import all_tasks
 
 _KINDS: dict[str, str] = {
     **FAILURES,
@@ -50,8 +49,7 @@ def make_filters(episodes: PageEpisodes) -> dict[str, Filter]:
     policies = {run: place for place, run in enumerate(episodes.names)}
     played_by = [policies[one.policy_run] for one in episodes.all]
     tasks = task_order({one.task for one in records})
-    suites = {task: known.suite if (known := all_tasks().get(task)) else "other tasks"
-              for task in tasks}  # fmt: skip
+    suites = {task: suite(task) or "other tasks" for task in tasks}
     options = sorted({one.column for one in records}, key=options_sort_key)
     settings = {one: setting_label(one) for one in options}
     seeds = [str(one.policy_seed) for one in records]

@@ -16,18 +16,18 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from urllib.parse import quote
 
 import msgspec
 
 from roboirg.core.conditions import Fact, facts_of
-from roboirg.core.episode import Episode, Scene, describe_goal
+from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Scene, describe_goal
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.fact_traits import fact_traits
 from roboirg.core.plain_text import counted
 from roboirg.core.word_pools import words_label
-from roboirg.evaluation.analysis.page.episodes import PageEpisode
+from roboirg.evaluation.analysis.page.episodes import JsonObject, PageEpisode
 from roboirg.evaluation.play.job_instruction import instruct_job, other_versions
 from roboirg.evaluation.records.record import EventRecord, Job, Record, SubgoalRecord
 from roboirg.judging.episode_replay import Event, completed_stages
@@ -41,8 +41,6 @@ EMBEDDED = "#"
 
 _KINDS = {"shuttle": "the moving cube", "site": "the spot on the table"}
 """Words for objects that causes do not name."""
-
-Details = dict[str, Any]
 
 
 @dataclass
@@ -83,7 +81,7 @@ class EpisodeDetails:
                 self.links_videos |= name in media
         self.lines.append(msgspec.json.encode(details).decode())
 
-    def details_of(self, record: Record) -> Details:
+    def details_of(self, record: Record) -> JsonObject:
         """Return the details of an episode, with texts as indices; empty ones are left out."""
         index = self._index
         # Of the job only what decides the words, which all policies and seeds share.
@@ -91,14 +89,13 @@ class EpisodeDetails:
             policy="", task=record.task, split=record.split, episode=record.episode,
             options=record.options, arm=record.arm, wordings_file=record.wordings_file,
         )  # fmt: skip
-        foreign = {what for what, *_ in other_versions(record)}
-        scene = (
-            _played_scene(job.task, job.split, job.episode, job.arm)
-            if "environment" not in foreign
-            else _PlayedScene(None, {}, {})
-        )
-        cause, audit = record.attribution, record.prompt
-        found: Details = {
+        foreign = other_versions(record)
+        scene = _PlayedScene(None, {}, {})
+        if record.environment_version == ENVIRONMENT_VERSION:
+            scene = _played_scene(job.task, job.split, job.episode, job.arm)
+        cause = record.attribution
+        audit = record.prompt
+        found: JsonObject = {
             "turns": [[index(turn.stage), index(turn.text)] for turn in record.instruction],
             "reached": audit.reached if audit and record.prompt_verdict == "cut" else None,
             "prompt": self._optional(_prompt(record)),
@@ -246,7 +243,8 @@ def _named(record: Record) -> str | None:
 
     None if nothing was named, and if no model names anything.
     """
-    goal, cause = record.policy_metadata.get("understood"), record.attribution
+    goal = record.policy_metadata.get("understood")
+    cause = record.attribution
     if isinstance(goal, dict):
         return describe_goal(goal)
     end = record.steps if cause is None or cause.step is None else cause.step
@@ -282,9 +280,8 @@ def _conditions(record: Record) -> str:
         for name in ("actions", "demonstration_frames", "observe_every")
         if (value := getattr(record.environment, name)) is not None
     ]
-    server = "" if record.server_version is None else f" (server {record.server_version})"
     versions = (
-        f"policy {record.policy_version}{server}, language {record.language_version}, environment "
+        f"policy {record.played_version}, language {record.language_version}, environment "
         f"{record.environment_version}, roboirg {record.package_version}"
     )
     return f"{', '.join(parts)}; {versions}"

@@ -6,9 +6,9 @@ import operator
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from roboirg.evaluation.analysis.results.frame import Frame, join, make_frame
+from roboirg.evaluation.analysis.results.frame import Frame, RunNames, join, make_frame
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.plan.sources import Source
@@ -19,6 +19,10 @@ from roboirg.evaluation.records.run_files import run_file
 
 Runs = Mapping[str, Source]
 """The runs that a page shows by their names: one, or two to compare."""
+
+
+JsonObject = dict[str, Any]
+"""What the page's script reads."""
 
 
 class PageEpisode(NamedTuple):
@@ -64,7 +68,7 @@ class PageEpisodes:
         return cls(runs, RunData(frame), tuple(_episodes(runs, frame, videos=videos)))
 
     @property
-    def names(self) -> Mapping[PolicyRun, str]:
+    def names(self) -> RunNames:
         """Labels of the policy runs, in the order of the page."""
         return self.data.frame.names
 
@@ -92,8 +96,11 @@ def _episodes(runs: Runs, frame: Frame, *, videos: bool) -> Iterator[PageEpisode
         if isinstance(one, Summary)
     ]
     for _, _, owner, record in sorted(rows, key=operator.itemgetter(0, 1)):
-        folder, number = named[owner.run].folder, [*named].index(owner.run)
-        slug, film, poster = record.slug, None, None
+        folder = named[owner.run].folder
+        number = [*named].index(owner.run)
+        slug = record.slug
+        film = None
+        poster = None
         if videos and record.video is not None:
             film = _existing(folder, record.video)
             poster = film and _existing(folder, poster_name(record.video))

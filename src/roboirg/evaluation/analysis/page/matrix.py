@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from typing import Any
-
 from roboirg.core.episode import DIFFICULTIES
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.page.columns import setting_label
-from roboirg.evaluation.analysis.page.episodes import PageEpisodes
+from roboirg.evaluation.analysis.page.episodes import JsonObject, PageEpisodes
 from roboirg.evaluation.analysis.results.frame import suite, task_order
 from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
-from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
-from roboirg.evaluation.analysis.stats.intervals import Interval
-from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
-from roboirg.evaluation.analysis.stats.rates import p_text, points, whole_percent
+from roboirg.evaluation.analysis.stats.intervals import TOO_FEW
+from roboirg.evaluation.analysis.stats.measure import (
+    ALL_TASKS,
+    ScopeSummary,
+    Summaries,
+    summarize,
+)
+from roboirg.evaluation.analysis.stats.rates import interval_note, p_text, points, whole_percent
 
 
-def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
+def make_matrix(episodes: PageEpisodes) -> JsonObject:
     """Return the heat maps as JSON values: columns, rows, and cells by policy, row and column.
 
     There is one set of cells for all episodes and, if there are several difficulties, one for
@@ -27,15 +27,25 @@ def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
     """
     columns = sorted({key.options for key in episodes.data.cells}, key=options_sort_key)
     rows = _rows(episodes.data.cells)
+    places = {policy_run: place for place, policy_run in enumerate(episodes.names)}
+    lines = {scope: line for line, scope in enumerate(rows)}
+
+    def cells(summaries: Summaries) -> list[JsonObject]:
+        return [
+            {
+                "at": [places[key.policy_run], lines[key.scope], columns.index(key.options)],
+                **_cell(one, f"{episodes.names[key.policy_run]}, {key.scope}"),
+            }
+            for key, one in summaries.items()
+            if key.scope in lines
+        ]
+
     found = {one.record.difficulty for one in episodes.all}
-    levels = {"": episodes.data.summaries}
-    if len(found) > 1:
-        ordered = dict.fromkeys((*DIFFICULTIES, *found))
-        levels |= {
-            level: summarize(cells_of(episodes.data.frame.where(difficulty=level)))
-            for level in ordered
-            if level in found
-        }
+    levels = [{"difficulty": "", "cells": cells(episodes.data.summaries)}]
+    for level in DIFFICULTIES if len(found) > 1 else ():
+        if level in found:
+            summaries = summarize(cells_of(episodes.data.frame.where(difficulty=level)))
+            levels.append({"difficulty": level, "cells": cells(summaries)})
     return {
         "policies": list(episodes.names.values()),
         "columns": [
@@ -43,13 +53,7 @@ def make_matrix(episodes: PageEpisodes) -> dict[str, Any]:
             for one in columns
         ],
         "rows": [{"name": name, **scope} for name, scope in rows.items()],
-        "levels": [
-            {
-                "difficulty": level,
-                "cells": _matrix_cells(summaries, episodes.names, rows, columns),
-            }
-            for level, summaries in levels.items()
-        ],
+        "levels": levels,
     }
 
 
@@ -68,26 +72,8 @@ def _rows(cells: Cells) -> dict[str, dict[str, str | None]]:
     return rows
 
 
-def _matrix_cells(
-    summaries: Mapping[ScopeKey, Measured[ScopeKey]],
-    names: Mapping[PolicyRun, str],
-    rows: Collection[str],
-    columns: Sequence[InstructionOptions],
-) -> list[dict[str, Any]]:
-    places = {policy_run: place for place, policy_run in enumerate(names)}
-    lines = {scope: line for line, scope in enumerate(rows)}
-    return [
-        {
-            "at": [places[key.policy_run], lines[key.scope], columns.index(key.options)],
-            **_cell(one, f"{names[key.policy_run]}, {key.scope}"),
-        }
-        for key, one in summaries.items()
-        if key.scope in lines
-    ]
-
-
-def _cell(one: Measured[ScopeKey], subject: str) -> dict[str, Any]:
-    cell: dict[str, Any] = {"note": notes(one, subject)}
+def _cell(one: ScopeSummary, subject: str) -> JsonObject:
+    cell: JsonObject = {"note": notes(one, subject)}
     if one.rate is not None:
         cell |= {"rate": round(float(one.rate), 4), "text": whole_percent(one.rate)}
     if one.interval is not None:
@@ -100,9 +86,10 @@ def _cell(one: Measured[ScopeKey], subject: str) -> dict[str, Any]:
     return cell
 
 
-def notes(one: Measured[ScopeKey], subject: str) -> list[str]:
+def notes(one: ScopeSummary, subject: str) -> list[str]:
     """Return a cell in words: first its subject, then its results."""
-    lines, counts = [f"{subject}, {options_label(one.key.options)}"], one.counts
+    lines = [f"{subject}, {options_label(one.key.options)}"]
+    counts = one.counts
     if one.rate is None:
         lines.append("no verdict yet")
     else:
@@ -111,7 +98,9 @@ def notes(one: Measured[ScopeKey], subject: str) -> list[str]:
             f"{whole_percent(one.rate)} % success{mean}: {counts.successes} of "
             f"{counted(counts.trials, 'trial')}, {counted(counts.episodes, 'episode')}"
         )
-        if one.interval is not None:
+        if one.interval is None:
+            lines.append(TOO_FEW)
+        else:
             low, high = map(whole_percent, one.interval)
             lines.append(f"95 % interval {low} to {high} %")
     lines += _gap_notes(one)
@@ -122,15 +111,15 @@ def notes(one: Measured[ScopeKey], subject: str) -> list[str]:
     return lines
 
 
-def _gap_notes(one: Measured[ScopeKey]) -> list[str]:
+def _gap_notes(one: ScopeSummary) -> list[str]:
     lines: list[str] = []
     if one.gap is not None:
         gap = f"{points(one.gap.value)} points to explicit"
         if one.gap.retention is not None:
-            tested = "not tested" if one.p_holm is None else f"corrected {p_text(one.p_holm)}"
+            tested = "not tested" if one.p_holm is None else f"{p_text(one.p_holm)} (Holm)"
             lines.append(
                 f"{gap} on the same {counted(one.gap.episodes, 'episode')}"
-                f"{_ends(one.gap.interval)}, {tested}"
+                f"{interval_note(one.gap.interval)}, {tested}"
             )
         elif one.gap.value:
             lines.append(f"{gap}, which has no success")
@@ -139,10 +128,6 @@ def _gap_notes(one: Measured[ScopeKey]) -> list[str]:
     if one.second_gap is not None:
         lines.append(
             f"{points(one.second_gap.value)} points to the resolved form"
-            f"{_ends(one.second_gap.interval)}"
+            f"{interval_note(one.second_gap.interval)}"
         )
     return lines
-
-
-def _ends(interval: Interval | None) -> str:
-    return "" if interval is None else f" ({points(interval.low)} to {points(interval.high)})"

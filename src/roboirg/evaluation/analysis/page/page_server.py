@@ -28,7 +28,8 @@ def run_server(folder: Path, port: int = 0) -> AppServer:
 
 def _refuse(request: Request) -> Response | None:
     """Return the response to a request that comes from a page of another site."""
-    hosts, origins = request.headers.getlist("host"), request.headers.getlist("origin")
+    hosts = request.headers.getlist("host")
+    origins = request.headers.getlist("origin")
     if is_own_request(hosts, origins, LOOPBACK_NAMES):
         return None
     return PlainTextResponse("403 Forbidden\n", 403)

@@ -8,12 +8,11 @@ import json
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.page.columns import make_filters, make_numbers
 from roboirg.evaluation.analysis.page.details import EpisodeDetails
-from roboirg.evaluation.analysis.page.episodes import PageEpisodes
+from roboirg.evaluation.analysis.page.episodes import JsonObject, PageEpisodes
 from roboirg.evaluation.analysis.page.matrix import make_matrix
 from roboirg.evaluation.analysis.page.run_warnings import comparisons, facts_of, run_warnings
 from roboirg.evaluation.analysis.results.frame import Frame
@@ -159,8 +158,9 @@ def _add_all(
             progress(done, len(episodes.all))
 
 
-def _data(episodes: PageEpisodes, details: EpisodeDetails) -> dict[str, Any]:
-    filters, numbers = make_filters(episodes), make_numbers(episodes)
+def _data(episodes: PageEpisodes, details: EpisodeDetails) -> JsonObject:
+    filters = make_filters(episodes)
+    numbers = make_numbers(episodes)
     policies = [one.policy for one in episodes.names]
     twins = (place for place, one in enumerate(policies) if place and one == policies[0])
     return {
@@ -183,9 +183,9 @@ def _data(episodes: PageEpisodes, details: EpisodeDetails) -> dict[str, Any]:
 
 def _breakdown_tables(frame: Frame) -> list[Table]:
     """Return the tables of control arms, and of gaps by kind of instruction, that have rows."""
-    tables = [make_breakdown_table(one, frame) for one in BREAKDOWNS.values()]
-    arms = _tables_with_rows(lambda: make_arm_table(RunData(frame)))  # no scene may have two arms
-    return [*arms, *(table for table in tables if table.rows)]
+    tables = _tables_with_rows(lambda: make_arm_table(RunData(frame)))  # no scene may have two arms
+    tables += [make_breakdown_table(one, frame) for one in BREAKDOWNS.values()]
+    return [table for table in tables if table.rows]
 
 
 def _tables_with_rows(make: Callable[[], Table]) -> list[Table]:

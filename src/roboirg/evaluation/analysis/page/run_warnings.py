@@ -6,12 +6,11 @@ import operator
 from collections import Counter
 from collections.abc import Iterable
 from itertools import chain, combinations
-from typing import Any
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.core.word_pools import words_label
-from roboirg.evaluation.analysis.page.episodes import PageEpisodes
+from roboirg.evaluation.analysis.page.episodes import JsonObject, PageEpisodes
 from roboirg.evaluation.analysis.results.frame import MISSING
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.comparison import compare
@@ -44,13 +43,12 @@ def run_warnings(episodes: PageEpisodes) -> list[tuple[str, str]]:
     These are sentences above the results, each after its kind, ``warning`` or ``note``.
     """
     heard = heard_notes(episodes.data.frame, episodes.names)
-    warnings = (_incomplete(episodes), mixtures([one.record for one in episodes.all]), heard)
     headline = headline_notes(episodes.data.cells, episodes.names)
-    notes = (_without_reference(episodes), _private(episodes), headline)
-    return [
-        *(("warning", text) for text in chain(*warnings)),
-        *(("note", text) for text in chain(*notes)),
-    ]
+    kinds = {
+        "warning": (_incomplete(episodes), mixtures([one.record for one in episodes.all]), heard),
+        "note": (_without_reference(episodes), _private(episodes), headline),
+    }
+    return [(kind, text) for kind, parts in kinds.items() for text in chain(*parts)]
 
 
 def facts_of(episodes: PageEpisodes) -> list[tuple[str, str]]:
@@ -68,20 +66,14 @@ def facts_of(episodes: PageEpisodes) -> list[tuple[str, str]]:
     return [(label, text) for label, text in facts.items() if text]
 
 
-def comparisons(episodes: PageEpisodes) -> list[dict[str, Any]]:
+def comparisons(episodes: PageEpisodes) -> list[JsonObject]:
     """Return the comparison of the first pairs of policies in words."""
-    names = list(episodes.names)
-    arms = [one.conditions.arm for one in names]
-    alike = [pair for pair in combinations(range(len(names)), 2) if arms[pair[0]] == arms[pair[1]]]
-    pairs = alike[:MAX_COMPARISONS]
-    return [
-        {
-            "left": first,
-            "right": second,
-            "sentences": _compared(episodes, names[first], names[second]),
-        }
-        for first, second in pairs
-    ]
+    found: list[JsonObject] = []
+    for (left, first), (right, second) in combinations(enumerate(episodes.names), 2):
+        if first.conditions.arm == second.conditions.arm and len(found) < MAX_COMPARISONS:
+            words = _compared(episodes, first, second)
+            found.append({"left": left, "right": right, "sentences": words})
+    return found
 
 
 def _compared(episodes: PageEpisodes, first: PolicyRun, second: PolicyRun) -> list[str]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.core.arms import TOLD
+from roboirg.core.versions import Versions
 from roboirg.evaluation.analysis.results.option_labels import options_label, options_sort_key
 from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun, labels
 from roboirg.evaluation.records.record import Job, Summary
@@ -26,6 +27,12 @@ MISSING = "missing"
 Values = NDArray[np.object_]
 Runs = Sequence[tuple[str, Sequence[Summary]]]
 """Results of runs, each with its name."""
+
+
+RunNames = Mapping[PolicyRun, str]
+"""Labels of policy runs, in order."""
+_Row = tuple[PolicyRun, Job, str]
+"""Who plays; the result, or the job of an episode that was not played; and the outcome."""
 
 
 class FrameColumn(NamedTuple):
@@ -65,13 +72,7 @@ COLUMNS: Mapping[str, FrameColumn] = {
             "the policy as tables name it, with what distinguishes its runs",
             path="policy",
         ),
-        FrameColumn(
-            "privileged",
-            "flag",
-            "whether the policy reads the simulator's state",
-            "",
-            lambda one: one.ref is not None and one.ref.is_privileged,
-        ),
+        _field("privileged", "flag", "whether the policy reads the simulator's state"),
         _field("task", "text", "task"),
         FrameColumn(
             "suite", "text", "suite of the task", "not installed", lambda one: suite(one.task)
@@ -165,7 +166,8 @@ class Frame(Mapping[str, Any]):
         if name == "policy_label" and name not in self.columns:
             self.columns[name] = as_column([self.names[run] for run in self["run"]])
         elif name not in self.columns:
-            read, rows = COLUMNS[name].read, zip(self["result"], self["outcome"], strict=True)
+            read = COLUMNS[name].read
+            rows = zip(self["result"], self["outcome"], strict=True)
             found = [None if outcome == MISSING else read(one) for one, outcome in rows]
             self.columns[name] = as_column(found)
         return self.columns[name]
@@ -211,12 +213,12 @@ class Frame(Mapping[str, Any]):
         return list(self["result"][self["outcome"] != MISSING])
 
     @cached_property
-    def names(self) -> Mapping[PolicyRun, str]:
+    def names(self) -> RunNames:
         """Labels of the policy runs, in order."""
         return labels(self["run"])
 
     @property
-    def names_as_played(self) -> Mapping[PolicyRun, str]:
+    def names_as_played(self) -> RunNames:
         """Labels of the policy runs, in the order of their first records."""
         return {run: self.names[run] for run in self["run"][np.argsort(self["place"])]}
 
@@ -245,25 +247,27 @@ def make_frame(runs: Runs, planned: Sequence[Job] = (), *, named: str = "") -> F
         planned: jobs that should have a result; those without one are missing.
         named: name of a run that its policy runs bear in any case.
     """
-    jobs = {identity_key(job): job for job in planned}
+    missing = {identity_key(job): job for job in planned}
     apart = _played_twice(runs) if len(runs) > 1 else set()
-    rows: list[tuple[PolicyRun, Job, str]] = []
+    rows: list[_Row] = []
+    first_runs: dict[tuple[str, EvalConditions], PolicyRun] = {}
     for name, results in runs:
-        for one in results:
-            owner = PolicyRun.of(one, named or name * (one.policy in apart))
-            rows.append((owner, one, one.outcome))
-            if jobs:
-                jobs.pop(identity_key(one), None)
-    owners = {(one.policy, one.conditions): one for one, _, _ in reversed(rows if jobs else [])}
-    for job in jobs.values():
+        for result in results:
+            run = name if result.policy in apart else ""
+            policy_run = PolicyRun.of(result, named or run)
+            first_runs.setdefault((policy_run.policy, policy_run.conditions), policy_run)
+            rows.append((policy_run, result, result.outcome))
+            if missing:
+                missing.pop(identity_key(result), None)
+    for job in missing.values():
         conditions = EvalConditions.of(job)
-        unplayed = PolicyRun(job.policy, conditions, None, named)
-        rows.append((owners.get((job.policy, conditions), unplayed), job, MISSING))
+        unplayed = PolicyRun(job.policy, conditions, Versions(), named)
+        rows.append((first_runs.get((job.policy, conditions), unplayed), job, MISSING))
     return _sorted(rows, list(dict.fromkeys(job.policy for job in planned)))
 
 
-def _sorted(rows: Sequence[tuple[PolicyRun, Job, str]], policies: Sequence[str]) -> Frame:
-    """Return rows of policy run, result and outcome as a frame.
+def _sorted(rows: Sequence[_Row], policies: Sequence[str]) -> Frame:
+    """Return rows as a frame.
 
     Episodes end in any order, but the bootstrap draws for one group after the other.
     """
@@ -273,18 +277,21 @@ def _sorted(rows: Sequence[tuple[PolicyRun, Job, str]], policies: Sequence[str])
         versions = repr(one.versions)
         return (rank, one.policy, one.run, repr(one.conditions), versions, one.robot or "")
 
-    owners, owner_at = _distinct((owner for owner, _, _ in rows), place)
-    options, options_at = _distinct((job.column for _, job, _ in rows), options_sort_key)
-    tasks = task_order({job.task for _, job, _ in rows})
-    task_at = [tasks.index(job.task) for _, job, _ in rows]
-    numbers = np.array([(job.policy_seed, job.episode) for _, job, _ in rows], dtype=int)
-    order = np.lexsort((*numbers.reshape(-1, 2).T, options_at, task_at, owner_at))
+    columns = zip(*rows, strict=True) if rows else ((), (), ())
+    policy_runs, jobs, outcomes = map(as_column, columns)
+    runs, run_at = _distinct(policy_runs, place)
+    options, options_at = _distinct([job.column for job in jobs], options_sort_key)
+    tasks = task_order({job.task for job in jobs})
+    task_at = [tasks.index(job.task) for job in jobs]
+    episodes = [job.episode for job in jobs]
+    seeds = [job.policy_seed for job in jobs]
+    order = np.lexsort(np.array([seeds, episodes, options_at, task_at, run_at]))
     frame = Frame(
         {
             "place": order,
-            "run": owners[owner_at[order]],
-            "result": as_column([job for _, job, _ in rows])[order],
-            "outcome": as_column([outcome for _, _, outcome in rows])[order],
+            "run": runs[run_at[order]],
+            "result": jobs[order],
+            "outcome": outcomes[order],
             "options": options[options_at[order]],
         }
     )
@@ -297,11 +304,9 @@ def _sorted(rows: Sequence[tuple[PolicyRun, Job, str]], policies: Sequence[str])
 
 def _distinct(values: Iterable[Any], key: Callable[[Any], Any]) -> tuple[Values, NDArray[np.int64]]:
     """Return the distinct values in the order of a key, and for each value its place there."""
-    seen: dict[Any, int] = {}
-    found = np.array([seen.setdefault(one, len(seen)) for one in values], dtype=np.int64)
-    ordered = sorted(seen, key=key)
-    ranks = {seen[one]: rank for rank, one in enumerate(ordered)}
-    return as_column(ordered), np.array([ranks[one] for one in range(len(seen))], np.int64)[found]
+    ordered = sorted(dict.fromkeys(values), key=key)
+    places = {value: place for place, value in enumerate(ordered)}
+    return as_column(ordered), np.array([places[value] for value in values], dtype=np.int64)
 
 
 def task_order(names: Iterable[str]) -> list[str]:

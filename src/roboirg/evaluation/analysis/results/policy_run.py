@@ -13,6 +13,7 @@ from typing import NamedTuple
 from roboirg.core.arms import TOLD
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS, EnvironmentOptions
 from roboirg.core.subgoal_text import BETWEEN_VERSIONS, SCRIPTED_HANDS
+from roboirg.core.versions import Versions
 from roboirg.core.word_pools import words_label
 from roboirg.evaluation.records.record import Job, Summary
 
@@ -50,25 +51,13 @@ class EvalConditions(NamedTuple):
         return before + self.text(name)
 
 
-class Versions(NamedTuple):
-    """The versions that a result depends on."""
-
-    policy: str
-    language: str
-    environment: int
-
-    @classmethod
-    def of(cls, result: Summary) -> Versions:
-        return cls(result.played_version, result.language_version, result.environment_version)
-
-
 class PolicyRun(NamedTuple):
     """One policy under one set of conditions and versions.
 
     Attributes:
         policy: its name.
         conditions: under which it played.
-        versions: None before it has played.
+        versions: unknown before it has played; the policy's has that of its server.
         run: name of the run if several runs hold the same episodes, else empty.
         is_privileged: whether the policy read the simulator's state.
         robot: the real robot of a study; None in simulation.
@@ -76,26 +65,26 @@ class PolicyRun(NamedTuple):
 
     policy: str
     conditions: EvalConditions
-    versions: Versions | None
+    versions: Versions
     run: str = ""
     is_privileged: bool = False
     robot: str | None = None
 
     @classmethod
     def of(cls, result: Summary, run: str = "") -> PolicyRun:
-        return cls(
-            result.policy,
-            EvalConditions.of(result),
-            Versions.of(result),
-            run,
-            result.privileged,
-            result.robot,
+        versions = Versions(
+            result.ref.makeup,
+            result.environment_version,
+            result.language_version,
+            result.played_version,
         )
+        conditions = EvalConditions.of(result)
+        return cls(result.policy, conditions, versions, run, result.privileged, result.robot)
 
     @property
     def language(self) -> str:
         """The version of the language that it heard; empty before it has played."""
-        return "" if self.versions is None else self.versions.language
+        return self.versions.language_version or ""
 
     @property
     def marked_policy(self) -> str:
@@ -105,12 +94,12 @@ class PolicyRun(NamedTuple):
     @property
     def has_planner(self) -> bool:
         """Whether it has played as a planner with a policy."""
-        return self.versions is not None and BETWEEN_VERSIONS in self.versions.policy
+        return BETWEEN_VERSIONS in str(self.versions.policy_version)
 
     @property
     def mark(self) -> str:
         """The mark of a privileged policy; empty for the others."""
-        has_hands = self.versions is not None and SCRIPTED_HANDS in self.versions.policy
+        has_hands = SCRIPTED_HANDS in str(self.versions.policy_version)
         return (HANDS if has_hands else PRIVILEGED) * self.is_privileged
 
 
@@ -139,13 +128,13 @@ def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:
 
 
 def _version_labels(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> list[str]:
-    """Return the versions in which a policy run differs from others."""
-    if policy_run.versions is None:
-        return []
-    found = []
-    for name in Versions._fields:
-        # The version of a policy matters only among runs of the same policy.
-        others = [one for one in policy_runs if name != "policy" or one.policy == policy_run.policy]
-        if len({getattr(one.versions, name) for one in others if one.versions}) > 1:
-            found.append(f"{name} {getattr(policy_run.versions, name)}")
-    return found
+    """Return what a policy is and its versions, as far as it differs from others in them."""
+    found: dict[str, str] = {}
+    for other in policy_runs:
+        others = other.versions
+        if other.policy != policy_run.policy:
+            # What a policy is matters only among runs of the same policy.
+            others = others._replace(policy_version=None, makeup=())
+        for mismatch in policy_run.versions.differences(others):
+            found[mismatch.what] = mismatch.label
+    return [found[what] for what in sorted(found)]

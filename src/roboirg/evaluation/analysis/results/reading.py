@@ -116,12 +116,10 @@ def with_columns(
     for place, one in enumerate(frame["result"]):
         places.setdefault(_row_key(one), []).append(place)
     columns = {name: as_column([None] * len(frame["result"])) for name in reads}
-    known: dict[object, object] = {}  # equal values are kept once
     for record in records:
         if at := places.get(_row_key(record)):
             for name, read in reads.items():
-                value = read(record)
-                columns[name][at] = as_column([known.setdefault((type(value), value), value)])
+                columns[name][at] = as_column([read(record)])
     return frame.extended(columns)
 
 

@@ -86,7 +86,7 @@ def arm_figures(frame: Frame) -> tuple[ArmFigure, ...]:
 
 
 def _figure(key: ArmKey, trials: Iterable[Arms], rng: np.random.Generator) -> ArmFigure | None:
-    cells: tuple[dict[str, Cell], dict[str, Cell]] = {}, {}
+    cells: list[dict[str, Cell]] = [{}, {}]
     for arms in trials:
         for side, results in zip(cells, key.contrast.sides(arms) or (), strict=False):
             for one in results:
@@ -109,16 +109,16 @@ def _with_outcome(one: Summary, *, is_success: bool) -> Summary:
     return msgspec.structs.replace(one, outcome="success" if is_success else "failure")
 
 
-def _against(*others: str) -> Callable[[Arms], Sides | None]:
+def _against(other: str) -> Callable[[Arms], Sides | None]:
     def sides(arms: Arms) -> Sides | None:
-        other = next((arms[name] for name in others if name in arms), None)
-        return None if other is None or TOLD not in arms else ([arms[TOLD]], [other])
+        return ([arms[TOLD]], [arms[other]]) if TOLD in arms and other in arms else None
 
     return sides
 
 
 def _language_use(arms: Arms) -> Sides | None:
-    told, other = arms.get(TOLD), arms.get(OTHER_GOAL)
+    told = arms.get(TOLD)
+    other = arms.get(OTHER_GOAL)
     if told is None or other is None or told.goals is None or other.goals is None:
         return None
     own_twice = _won(told) and other.goals.original == "success"
@@ -140,7 +140,8 @@ def _paraphrases(arms: Arms) -> Sides | None:
 
 CONTRASTS = (
     ArmContrast(LANGUAGE_USE, "each reached when stated", "same pursued", _language_use),
-    ArmContrast(WORDS_WORTH, TOLD, SILENT, _against(SILENT, SILENT_EMPTY)),
+    ArmContrast(WORDS_WORTH, TOLD, SILENT, _against(SILENT)),
+    ArmContrast(WORDS_WORTH, TOLD, SILENT_EMPTY, _against(SILENT_EMPTY)),
     ArmContrast(ORDERS_WORTH, TOLD, SCRAMBLED, _against(SCRAMBLED)),
     ArmContrast("paraphrases", "all", "mean", _paraphrases),
     ArmContrast("repeat", TOLD, AGAIN, _against(AGAIN)),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.intervals import (
@@ -47,11 +48,6 @@ class Counts(NamedTuple):
     missing: int = 0
 
     @property
-    def rate(self) -> Fraction | None:
-        """Successes by trials; None without a verdict."""
-        return Fraction(self.successes, self.trials) if self.trials else None
-
-    @property
     def is_complete(self) -> bool:
         """Whether every planned trial has a verdict."""
         return self.trials > 0 and not self.errors and not self.missing
@@ -72,31 +68,42 @@ class Cell:
     missing: int = 0
 
     def add(self, trial: Trial, outcome: str) -> None:
-        """Count a trial: ``success``, ``failure``, ``error``, or ``missing``."""
-        if outcome == "error":
+        """Count a trial: ``success``, ``failure``, ``error``, or ``missing``.
+
+        Raises:
+            InvalidValueError: the outcome is none of these.
+        """
+        if outcome in ("success", "failure"):
+            self.verdicts[trial] = outcome == "success"
+        elif outcome == "error":
             self.errors += 1
         elif outcome == "missing":
             self.missing += 1
         else:
-            self.verdicts[trial] = outcome == "success"
+            raise InvalidValueError(
+                f"The column 'outcome' has {outcome!r}; it must be success, failure, error or "
+                "missing."
+            )
 
     @property
     def counts(self) -> Counts:
         episodes = {one.episode for one in self.verdicts}
-        successes, trials = sum(self.verdicts.values()), len(self.verdicts)
+        successes = sum(self.verdicts.values())
+        trials = len(self.verdicts)
         return Counts(successes, trials, len(episodes), self.errors, self.missing)
 
     @property
     def rate(self) -> Fraction | None:
         """Success rate, the mean over policy seeds; None without a verdict."""
-        return self.counts.rate
+        counts = self.counts
+        return Fraction(counts.successes, counts.trials) if counts.trials else None
 
     def by_episode(self) -> dict[int, dict[int, bool]]:
         """Return the verdicts of each episode by policy seed."""
         episodes: dict[int, dict[int, bool]] = defaultdict(dict)
         for (episode, seed), won in self.verdicts.items():
             episodes[episode][seed] = won
-        return dict(episodes)
+        return episodes
 
     def rows(self) -> Rows:
         """Return successes and trials of each episode, shape (episodes, 2)."""
@@ -120,6 +127,8 @@ Columns = Mapping[str, Any]
 """A frame, or the data frame that `roboirg.results` returns."""
 Key = tuple[Any, ...]
 """What a group is about: the values of the columns that it is grouped by."""
+TRIAL = ("task", "episode", "policy_seed", "outcome")
+"""Columns that tell a trial and its end."""
 ByTask = Mapping[str, Cell]
 NOTHING: ByTask = {}
 
@@ -127,14 +136,18 @@ NOTHING: ByTask = {}
 def gather(frame: Columns, by: Sequence[str]) -> Mapping[Key, ByTask]:
     """Group the rows of a frame by some columns, in the order in which their values occur.
 
-    The frame has the columns ``task``, ``episode``, ``policy_seed`` and ``outcome``, too.
+    The frame has the columns of `TRIAL`, too.
     """
     found: dict[Key, dict[str, Cell]] = {}
-    names = (*by, "task", "episode", "policy_seed", "outcome")
-    for *key, task, episode, seed, outcome in zip(*(frame[name] for name in names), strict=True):
+    for *key, task, episode, seed, outcome in rows_of(frame, *by, *TRIAL):
         cell = found.setdefault(tuple(key), {}).setdefault(task, Cell())
         cell.add(Trial(episode, seed), outcome)
     return found
+
+
+def rows_of(frame: Columns, *names: str) -> Iterator[Key]:
+    """Return the values of each row in some columns."""
+    return zip(*(frame[name] for name in names), strict=True)
 
 
 def cells_of(frame: Columns) -> Cells:

@@ -16,7 +16,6 @@ import functools
 from collections.abc import Iterable
 from fractions import Fraction
 
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.analysis.results.option_labels import is_usual
 from roboirg.evaluation.analysis.stats.measured_floors import (
     LEARNED,
@@ -48,8 +47,11 @@ def floor_level(floor: str, jobs: Iterable[Job], language: str = "") -> Fraction
         jobs: the jobs.
         language: version of the language in which they were played, of which learned floors are.
     """
-    instructions = dict.fromkeys((job.task, job.split, job.episode, job.column) for job in jobs)
-    found = [_level(floor, language, *each) for each in instructions]
+    instructions = dict.fromkeys(
+        Job(policy="", task=job.task, split=job.split, episode=job.episode, options=job.column)
+        for job in jobs
+    )
+    found = [_level(floor, language, job) for job in instructions]
     levels = [level for level in found if level is not None]
     return sum(levels, Fraction(0)) / len(levels) if levels else None
 
@@ -73,23 +75,22 @@ def silent_chance(task: str, split: str, number: int) -> float:
 
     Goals that begin with all stages of the right one succeed, too.
     """
-    episode, known = get_episode(task, split, number), get_task(task)
+    episode = get_episode(task, split, number)
+    known = get_task(task)
     plans = [known.stages(episode.scene, goal) for goal in known.goals(episode.scene)]
     return sum(begins_with(plan, episode.stages) for plan in plans) / len(plans)
 
 
 @functools.lru_cache(maxsize=65_536)
-def _level(
-    floor: str, language: str, task: str, split: str, number: int, options: InstructionOptions
-) -> Fraction | None:
+def _level(floor: str, language: str, job: Job) -> Fraction | None:
     if floor in LEARNED:
-        key = FloorKey(TEST if split == TEST else RANDOM, options.setting, task)
+        key = FloorKey(TEST if job.split == TEST else RANDOM, job.setting, job.task)
         found = (measured_floors(language) or {}).get(key)
-        return Fraction(str(found.shares[floor].goals)) if found and is_usual(options) else None
-    job = Job(policy="", task=task, split=split, episode=number, options=options)
-    episode, instruction = get_episode(task, split, number), instruct_job(job)
+        return Fraction(str(found.shares[floor].goals)) if found and is_usual(job.options) else None
+    episode = get_episode(job.task, job.split, job.episode)
+    instruction = instruct_job(job)
     if floor == CHANCE:
         return right_share(blind_goals(instruction, episode), episode)
     if floor == COMMAND:
         return right_share(goals_of_command(instruction, episode), episode)
-    return goal_share(guess_goal(floor, instruction.text, task), episode)
+    return goal_share(guess_goal(floor, instruction.text, job.task), episode)

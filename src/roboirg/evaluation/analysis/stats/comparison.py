@@ -67,8 +67,10 @@ def compare(first: Frame, second: Frame, breakdowns: Sequence[Breakdown] = ()) -
         InvalidValueError: one side has several policies or versions, the two have different
             conditions, or they have no episode in common.
     """
-    first, second = first.told(), second.told()
-    ours, theirs = _only_policy_run(first), _only_policy_run(second)
+    first = first.told()
+    second = second.told()
+    ours = _only_policy_run(first)
+    theirs = _only_policy_run(second)
     _check_fair(first, second)
     here, there = (dict(_groups(one, breakdowns)) for one in (first, second))
     others = {key: _shared(there[key], here[key]) for key in here if key in there}

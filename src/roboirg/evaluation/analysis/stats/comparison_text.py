@@ -104,7 +104,8 @@ class _Result:
         gap = self.gap
         words = f"{points(gap.value, 1)} points{interval_note(gap.interval)}"
         tasks = "" if gap.tasks == 1 else f" of {gap.tasks} tasks"
-        p_value, uncorrected = p_text(self.p_holm), p_text(gap.p_value)
+        p_value = p_text(self.p_holm)
+        uncorrected = p_text(gap.p_value)
         if self.is_surprising and uncorrected != p_value:
             p_value += f" (uncorrected {uncorrected.removeprefix('p ').removeprefix('= ')})"
         return f"{words}, {p_value}, {counted(gap.episodes, 'episode')}{tasks}"

@@ -12,7 +12,12 @@ from fractions import Fraction
 from roboirg.core.failures import FAILURE_KINDS, FailureKind
 from roboirg.evaluation.analysis.results.frame import Frame, as_column
 from roboirg.evaluation.analysis.stats.cells import ByTask, cells_of
-from roboirg.evaluation.analysis.stats.measure import Measured, ScopeKey, mean_rate, summarize
+from roboirg.evaluation.analysis.stats.measure import (
+    ScopeKey,
+    ScopeSummary,
+    mean_rate,
+    summarize,
+)
 from roboirg.evaluation.analysis.stats.run_data import RunData
 
 Ends = tuple[Fraction, Fraction]
@@ -21,7 +26,7 @@ Ends = tuple[Fraction, Fraction]
 
 def measure_ends(
     data: RunData, scopes: Collection[str]
-) -> Mapping[ScopeKey, tuple[Measured[ScopeKey], ...]]:
+) -> Mapping[ScopeKey, tuple[ScopeSummary, ...]]:
     """Measure success and each kind of failure, in the order of `FAILURE_KINDS`, in some scopes.
 
     All are rates of the episodes with a verdict, so they add up to 1, and their gaps to explicit

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboirg.core.plain_text import counted
+from roboirg.evaluation.analysis.results.frame import RunNames
 from roboirg.evaluation.analysis.results.option_labels import reference_of
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cell, Cells
 from roboirg.evaluation.analysis.stats.intervals import (
     SEED,
+    Draws,
     Interval,
     Rows,
     resampled_interval,
@@ -32,7 +33,8 @@ class Headline:
     Attributes:
         settings: over which the gap is the mean; a setting's is the mean over its tasks.
         gap: to explicit on the same episodes, -1 to 1.
-        interval: from the paired bootstrap over episodes, which all settings share.
+        interval: from the paired bootstrap over episodes, which all settings share; None with too
+            few episodes.
         episodes: number of episodes.
         is_complete: whether every planned trial of these cells has a verdict.
     """
@@ -54,7 +56,7 @@ class Headline:
         )
 
 
-def headline_notes(cells: Cells, names: Mapping[PolicyRun, str]) -> Iterator[str]:
+def headline_notes(cells: Cells, names: RunNames) -> Iterator[str]:
     """Yield a sentence with the headline number of each policy run that played what it needs.
 
     For a run in words whose floors were not measured, the sentence gives the reason.
@@ -77,7 +79,7 @@ def headline_notes(cells: Cells, names: Mapping[PolicyRun, str]) -> Iterator[str
                 f"{name} has no headline number: the floors are those of our own words of each "
                 f"split, and it was played in {policy_run.conditions.text('wordings')}."
             )
-        elif found.interval is None or not np.isfinite(found.interval).all():
+        elif found.interval is None:
             yield (
                 f"{name} has no headline number: {counted(found.episodes, 'episode')} cannot give "
                 "it an interval; play more."
@@ -90,20 +92,16 @@ def measure_headline(
     cells: Cells, policy_run: PolicyRun, settings: Sequence[str]
 ) -> Headline | None:
     """Return the headline number; None unless all settings were played next to explicit."""
-    explicit = {
-        key: cell
-        for key, cell in cells.items()
-        if key.policy_run == policy_run and key.options == reference_of(key.options)
-    }
-    own = {
-        key: [
-            cells.get(key._replace(options=replace(key.options, setting=one)), Cell())
-            for one in settings
-        ]
-        for key in explicit
-    }
-    rows = [_paired_rows(own[key], cell) for key, cell in explicit.items()]
-    rows = [one for one in rows if len(one)]
+    played = []
+    rows = []
+    for key, explicit in cells.items():
+        if key.policy_run == policy_run and key.options == reference_of(key.options):
+            words = [replace(key.options, setting=setting) for setting in settings]
+            own = [cells.get(key._replace(options=options), Cell()) for options in words]
+            played += [explicit, *own]
+            paired = _paired_rows(own, explicit)
+            if len(paired):
+                rows.append(paired)
     if not settings or not rows or not np.concatenate(rows)[:, 1::4].any(axis=0).all():
         return None
     rng = np.random.default_rng(SEED)
@@ -112,7 +110,6 @@ def measure_headline(
     value = _mean_gap([resampled_rates([one.sum(axis=0)[None]], rng, 1) for one in rows])
     drawn = _mean_gap([resampled_rates([one], rng) for one in rows])
     interval = resampled_interval(drawn, sizes, least=-1.0)
-    played = [cell for key in own for cell in (explicit[key], *own[key])]
     is_complete = not any(cell.errors or cell.missing for cell in played)
     return Headline(tuple(settings), float(value[0]), interval, sum(sizes), is_complete)
 
@@ -132,7 +129,7 @@ def _paired_rows(settings: Sequence[Cell], explicit: Cell) -> Rows:
     return rows[rows.any(axis=1)]
 
 
-def _mean_gap(rates: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _mean_gap(rates: Sequence[Draws]) -> Draws:
     """Return the mean gap of each resample, over settings, and before that over their tasks.
 
     Args:

@@ -23,9 +23,17 @@ SEED = 20_240_607
 """Of all bootstraps that are shown; the same records give the same numbers."""
 DRAWS = 4000
 """Bootstrap resamples; the ends of an interval then vary by about 3 % of its length."""
+TOO_FEW = "too few episodes"
+"""Printed in place of an interval: it takes more episodes than tasks."""
+_ROUNDING = 1e-9
+"""Ends of an interval that are closer are equal."""
 
 Rows = NDArray[np.int64]
 """A row for each episode with k pairs of successes and trials, shape (episodes, 2 k)."""
+
+
+Draws = NDArray[np.float64]
+"""A rate, a gap or several for each resample, shape (draws,) or (draws, k)."""
 
 
 class Interval(NamedTuple):
@@ -34,10 +42,16 @@ class Interval(NamedTuple):
     low: float
     high: float
 
+    @property
+    def has_width(self) -> bool:
+        """Whether the ends differ by more than rounding."""
+        return self.high - self.low > _ROUNDING
+
 
 def wilson_interval(successes: int, trials: int) -> Interval:
     """Return Wilson's score interval of a proportion, of one trial or more, all independent."""
-    rate, weight = successes / trials, Z_95 * Z_95 / trials
+    rate = successes / trials
+    weight = Z_95 * Z_95 / trials
     center = (rate + weight / 2) / (1 + weight)
     half = Z_95 * math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials)) / (1 + weight)
     # The formula gives exactly 0 and 1 at the ends; floating point may not.
@@ -46,9 +60,7 @@ def wilson_interval(successes: int, trials: int) -> Interval:
     return Interval(low, high)
 
 
-def resampled_rates(
-    tasks: Sequence[Rows], rng: np.random.Generator, draws: int = DRAWS
-) -> NDArray[np.float64]:
+def resampled_rates(tasks: Sequence[Rows], rng: np.random.Generator, draws: int = DRAWS) -> Draws:
     """Return success rates over resampled episodes, as unweighted means over tasks.
 
     Draws equal rows together, as multinomial counts. The distribution is that of drawing single
@@ -72,7 +84,7 @@ def resampled_rates(
     return np.asarray(np.mean(rates, axis=0), dtype=np.float64)
 
 
-def percentile_interval(values: NDArray[np.float64], sizes: Sequence[int]) -> Interval | None:
+def percentile_interval(values: Draws, sizes: Sequence[int]) -> Interval | None:
     """Return the middle 95 % of resampled values; None with too few episodes.
 
     Args:
@@ -90,14 +102,20 @@ def percentile_interval(values: NDArray[np.float64], sizes: Sequence[int]) -> In
     )
 
 
-def resampled_interval(
-    values: NDArray[np.float64], sizes: Sequence[int], least: float = 0.0
-) -> Interval | None:
-    """Return `percentile_interval`, or `without_spread` if all resamples have the same value."""
+def resampled_interval(values: Draws, sizes: Sequence[int], least: float = 0.0) -> Interval | None:
+    """Return `percentile_interval`, or `without_spread` if all resamples have the same value.
+
+    None with too few episodes: also if so many resamples have no trial that an end is not bounded,
+    or if the others all have the same value.
+    """
     interval = percentile_interval(values, sizes)
-    if interval is not None and np.ptp(values) == 0:
-        return without_spread(float(values[0]), sum(sizes), least)
-    return interval
+    if interval is None or not np.isfinite(interval).all():
+        return None
+    if interval.has_width:
+        return interval
+    if np.isnan(values).any():
+        return None
+    return without_spread(interval.low, sum(sizes), least)
 
 
 def without_spread(value: float, episodes: int, least: float = 0.0) -> Interval:

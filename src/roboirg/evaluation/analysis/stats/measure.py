@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, Generic, NamedTuple, TypeVar
@@ -17,6 +17,7 @@ from roboirg.evaluation.analysis.results.option_labels import reference_of
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import (
     NOTHING,
+    TRIAL,
     ByTask,
     Cell,
     Cells,
@@ -30,12 +31,12 @@ from roboirg.evaluation.analysis.stats.intervals import SEED, Interval
 from roboirg.evaluation.analysis.stats.paired_tests import Gap, Pairs, holm, measure_gap
 
 ALL_TASKS = "all tasks"
-TRIAL_OF = ("task", "episode", "outcome")
-TRIAL = (
-    *("split", "setting", "form", "delivery", "wordings", "arm", "policy_seed", "max_steps"),
-    *("meshes", "language_version", "environment_version"),
+KEPT_APART = (
+    *("policy", "form", "arm", "delivery", "split", "wordings", "max_steps", "meshes"),
+    *("observe_every", "demonstration_frames", "language_version", "environment_version"),
+    *("policy_version", "robot", "policy_label", "instruction_options"),
 )
-"""Columns that distinguish trials of a policy in an episode, unless they are grouped by."""
+"""Columns over whose values a rate is taken only if the call names them."""
 
 K = TypeVar("K", bound=tuple[Any, ...])
 
@@ -91,6 +92,7 @@ def measure(
     by: Sequence[str],
     against: Mapping[str, object] | None = None,
     family: Sequence[str] = (),
+    pool: Sequence[str] = (),
 ) -> tuple[Measured[tuple[Any, ...]], ...]:
     """Measure success in each group of episodes, as the mean over tasks.
 
@@ -100,20 +102,29 @@ def measure(
         against: values of some of these columns that make the group to compare with, such as
             ``{"setting": "explicit"}``; the gap is on the same episodes and policy seeds.
         family: columns of `by` within whose values p-values are corrected together.
+        pool: columns over whose values a rate may be taken, such as ``["form"]``. In the others
+            that tell policies, words and conditions apart, all rows of a group have one value.
 
     Returns:
         A row for each group, in the order in which they occur.
 
     Raises:
         UnknownNameError: the frame has no such column, or a column no such value.
-        InvalidValueError: a column is not in `by`, or rows of a group are about the same trial.
+        InvalidValueError: a column is not in `by` or stands twice, a row has no task, episode or
+            policy seed, an outcome is none, a group has several policies, words or conditions, or
+            rows of a group are about the same trial.
     """
     changed = against or {}
-    _check(frame, by, changed, family)
-    # What else distinguishes trials of an episode takes the place of the policy seed.
-    distinguishing = [name for name in TRIAL if name in frame and name not in by]
-    rows = {name: [_known(one) for one in frame[name]] for name in (*by, *TRIAL_OF)}
-    rows["policy_seed"] = list(zip(*(frame[name] for name in distinguishing), strict=True))
+    _check(frame, by, changed, family, pool)
+    apart = [name for name in KEPT_APART if name in frame and name not in (*by, *pool)]
+    names = (*by, *apart, *pool, *TRIAL)
+    rows = {name: [_known(value) for value in frame[name]] for name in names}
+    for name in TRIAL:
+        if None in rows[name]:
+            raise InvalidValueError(f"The column {name!r} has no value in some row; fill it in.")
+    _check_apart(rows, by, apart)
+    # What is pooled distinguishes trials of an episode, as the policy seed does.
+    rows["policy_seed"] = list(zip(*(rows[name] for name in ("policy_seed", *pool)), strict=True))
     groups = gather(rows, by)
     counts = [cell.counts for own in groups.values() for cell in own.values()]
     if sum(one.trials + one.errors + one.missing for one in counts) < len(rows["task"]):
@@ -136,11 +147,34 @@ def _known(value: object) -> object:
     return None if is_missing else value
 
 
-def _check(
-    frame: Columns, by: Sequence[str], against: Mapping[str, object], family: Sequence[str]
+def _check_apart(
+    rows: Mapping[str, Sequence[object]], by: Sequence[str], apart: Iterable[str]
 ) -> None:
-    columns = (*by, *family, *against, *TRIAL_OF, "policy_seed")
-    check_names("column", columns, map(str, frame))
+    """Check that in some columns all rows of a group have the same value."""
+    for name in apart:
+        found = set(zip(*(rows[column] for column in (*by, name)), strict=True))
+        groups = {values[:-1] for values in found}
+        if len(found) > len(groups):
+            known = ", ".join(sorted(map(str, set(rows[name]))))
+            raise InvalidValueError(
+                f"A rate would be over several values of {name} ({known}): add {name!r} to by, "
+                f"choose the rows of one value, or name {name!r} in pool."
+            )
+
+
+def _check(
+    frame: Columns,
+    by: Sequence[str],
+    against: Mapping[str, object],
+    family: Sequence[str],
+    pool: Sequence[str],
+) -> None:
+    columns = (*by, *family, *against, *pool, *TRIAL)
+    known_columns = list(map(str, frame))
+    check_names("column", columns, known_columns)
+    for name in known_columns:
+        if known_columns.count(name) > 1:
+            raise InvalidValueError(f"The frame has several columns {name!r}; keep one.")
     for name in (*family, *against):
         if name not in by:
             raise InvalidValueError(f"The column {name!r} is not in by: {', '.join(by)}.")
@@ -218,19 +252,23 @@ class ScopeKey(NamedTuple):
     options: InstructionOptions
 
 
+ScopeSummary = Measured[ScopeKey]
+"""What was measured in a scope."""
+Summaries = Mapping[ScopeKey, ScopeSummary]
+
+
 def by_scope(cells: Cells) -> Mapping[ScopeKey, ByTask]:
     """Group cells by scope, in their order: tasks, then suites, then all tasks."""
-    levels: tuple[dict[ScopeKey, dict[str, Cell]], ...] = ({}, {}, {})
-    for (policy_run, task, options), cell in cells.items():
-        for level, scope in zip(levels, (task, suite(task), ALL_TASKS), strict=True):
+    found: dict[ScopeKey, dict[str, Cell]] = {}
+    for scope_of in (str, suite, lambda _task: ALL_TASKS):
+        for (policy_run, task, options), cell in cells.items():
+            scope = scope_of(task)
             if scope is not None:
-                level.setdefault(ScopeKey(policy_run, scope, options), {})[task] = cell
-    return {key: own for level in levels for key, own in level.items()}
+                found.setdefault(ScopeKey(policy_run, scope, options), {})[task] = cell
+    return found
 
 
-def summarize(
-    cells: Cells, wanted: Collection[str] | None = None
-) -> Mapping[ScopeKey, Measured[ScopeKey]]:
+def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
     """Measure each policy run and set of options in each scope, or in those that are wanted.
 
     The gap is to explicit, the second gap is the implicit form less the resolved one. P-values are

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from roboirg.evaluation.analysis.stats.cells import Cell
 from roboirg.evaluation.analysis.stats.intervals import (
     DRAWS,
+    Draws,
     Interval,
     Rows,
     percentile_interval,
@@ -64,26 +66,28 @@ class Pairs:
     @classmethod
     def of(cls, first: Cell, second: Cell) -> Pairs:
         """Pair two cells of the same task."""
-        ours, theirs = first.by_episode(), second.by_episode()
+        ours = first.by_episode()
+        theirs = second.by_episode()
         rows = []
         for episode in sorted(ours.keys() & theirs.keys()):
-            here, there = ours[episode], theirs[episode]
+            here = ours[episode]
+            there = theirs[episode]
             shared = here.keys() & there.keys()
             ours_shared = [won for seed, won in here.items() if seed in shared or not shared]
             theirs_shared = [won for seed, won in there.items() if seed in shared or not shared]
             rows.append(
                 (sum(ours_shared), len(ours_shared), sum(theirs_shared), len(theirs_shared))
             )
-        trials = [
-            (won, second.verdicts[at])
-            for at, won in first.verdicts.items()
-            if at in second.verdicts
-        ]
+        counts = Counter(
+            (won, second.verdicts[trial])
+            for trial, won in first.verdicts.items()
+            if trial in second.verdicts
+        )
         overlap = Overlap(
-            both=trials.count((True, True)),
-            only_first=trials.count((True, False)),
-            only_second=trials.count((False, True)),
-            neither=trials.count((False, False)),
+            both=counts[True, True],
+            only_first=counts[True, False],
+            only_second=counts[False, True],
+            neither=counts[False, False],
         )
         return cls(np.array(rows, dtype=np.int64).reshape(-1, 4), overlap)
 
@@ -127,33 +131,46 @@ class Gap:
     overlap: Overlap
 
 
+class PairedRates(NamedTuple):
+    """Success rates of two cells on the same episodes, as means over tasks, 0 to 1."""
+
+    first: float
+    second: float
+
+
+def paired_rates(tasks: Sequence[Pairs]) -> PairedRates | None:
+    """Return the rates over the tasks that have pairs; None if no task has any."""
+    sums = [pairs.rows.sum(axis=0) for pairs in tasks if len(pairs.rows)]
+    if not sums:
+        return None
+    counts = np.array(sums, dtype=np.float64)
+    successes = counts[:, 0::2]
+    trials = counts[:, 1::2]
+    return PairedRates._make(np.mean(successes / trials, axis=0).tolist())
+
+
 def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = DRAWS) -> Gap | None:
     """Measure the gap over the tasks that have pairs; None if no task has any."""
     paired = [pairs for pairs in tasks if len(pairs.rows)]
-    if not paired:
+    rates = paired_rates(paired)
+    if rates is None:
         return None
+    first, second = rates
     rows = [pairs.rows for pairs in paired]
     sizes = [len(each) for each in rows]
-    sums = np.array([each.sum(axis=0) for each in rows], dtype=np.float64)
-    first, second = np.mean(sums[:, 0::2] / sums[:, 1::2], axis=0)
     drawn = resampled_rates(rows, rng, draws)
+    counts = zip(*(pairs.overlap for pairs in paired), strict=True)
     return Gap(
-        value=float(first - second),
+        value=first - second,
         interval=resampled_interval(drawn[:, 0] - drawn[:, 1], sizes, least=-1.0),
         p_value=sign_flip_test(np.concatenate([pairs.differences for pairs in paired])),
-        retention=float(first / second) if second else None,
-        retention_interval=_retention_interval(drawn, sizes) if second else None,
+        retention=first / second if second else None,
+        retention_interval=_retention_interval(drawn, sizes, rates) if second else None,
         tasks=len(paired),
         episodes=sum(sizes),
-        trials=int(sums[:, 1::2].sum()),
-        overlap=pooled_overlap(paired),
+        trials=int(np.concatenate(rows)[:, 1::2].sum()),
+        overlap=Overlap._make(map(sum, counts)),
     )
-
-
-def pooled_overlap(tasks: Sequence[Pairs]) -> Overlap:
-    """Add the overlaps of several tasks."""
-    counts = zip(*(pairs.overlap for pairs in tasks), strict=True)
-    return Overlap._make(map(sum, counts)) if tasks else Overlap(0, 0, 0, 0)
 
 
 def sign_flip_test(differences: NDArray[np.int64]) -> float:
@@ -179,15 +196,15 @@ def sign_flip_test(differences: NDArray[np.int64]) -> float:
     return min(1.0, float(chances[as_far].sum()))
 
 
-def _retention_interval(drawn: NDArray[np.float64], sizes: Sequence[int]) -> Interval | None:
+def _retention_interval(drawn: Draws, sizes: Sequence[int], rates: PairedRates) -> Interval | None:
     with np.errstate(divide="ignore", invalid="ignore"):
         values = drawn[:, 0] / drawn[:, 1]
     interval = percentile_interval(values, sizes)
     if interval is None:
         return None
-    if np.ptp(drawn, axis=0).any():
+    if interval.has_width:
         return Interval(max(0.0, interval.low), interval.high)
-    first, second = (without_spread(rate, sum(sizes)) for rate in drawn[0].tolist())
+    first, second = (without_spread(rate, sum(sizes)) for rate in rates)
     return Interval(first.low / second.high, first.high / second.low)
 
 

@@ -11,7 +11,7 @@ IDLE_STEPS = 400
 """Control steps, the most that a motion takes, without a new act: the planner had stopped."""
 WAITING = frozenset({"remain static", "static", "hold still"})
 
-_OF_ATTRIBUTION: Mapping[str, str] = {
+_OF_ATTRIBUTION = {
     "wrong_object": "wrong thing",
     "mirrored_pick": "wrong thing",
     "wrong_place": "wrong place",
@@ -19,7 +19,7 @@ _OF_ATTRIBUTION: Mapping[str, str] = {
     "wrong_order": "wrong time",
     "wrong_time": "wrong time",
 }
-_OF_VERDICT: Mapping[str, str] = {
+_OF_VERDICT = {
     "wrong_thing": "wrong thing",
     "wrong_place": "wrong place",
     "wrong_count": "wrong count",

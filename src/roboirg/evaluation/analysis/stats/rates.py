@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from decimal import ROUND_HALF_UP, Decimal
 from fractions import Fraction
 
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.intervals import TOO_FEW, Interval
 from roboirg.evaluation.analysis.stats.paired_tests import Gap
 
 NOT_APPLICABLE = "–"
@@ -41,6 +41,11 @@ def whole_percent(rate: float | Fraction) -> str:
     return f"{100 * float(rate):.0f}"
 
 
+def percent_range(low: Fraction, high: Fraction) -> str:
+    """Return two rates as whole percentages, one if they are equal then: ``3–7``."""
+    return "–".join(dict.fromkeys((whole_percent(low), whole_percent(high))))
+
+
 def points(gap: float, decimals: int = 0) -> str:
     """Return a gap in signed percentage points, with a proper minus: ``−12``, ``+3``, ``±0``."""
     text = f"{100 * gap:+.{decimals}f}".replace("-", "−")
@@ -48,9 +53,9 @@ def points(gap: float, decimals: int = 0) -> str:
 
 
 def interval_note(interval: Interval | None) -> str:
-    """Return the ends of a gap's interval in brackets, after a blank; empty without one."""
+    """Return the ends of a gap's interval in brackets, after a blank, or why it has none."""
     if interval is None:
-        return ""
+        return f" ({TOO_FEW})"
     low, high = (points(end, 1) for end in interval)
     return f" (95 % interval {low} to {high})"
 
@@ -62,14 +67,15 @@ def p_text(p_value: float) -> str:
 
 def gap_words(gap: Gap | None, p_value: float | None) -> tuple[str, str, str]:
     """Return a gap in points, its interval, and its corrected p-value; dashes without one."""
-    ends = None if gap is None else gap.interval
-    return (
-        NOT_APPLICABLE if gap is None else points(gap.value, 1),
-        NOT_APPLICABLE if ends is None else " to ".join(points(end, 1) for end in ends),
-        NOT_APPLICABLE
-        if p_value is None
-        else p_text(p_value).removeprefix("p ").removeprefix("= "),
-    )
+    if gap is None:
+        return NOT_APPLICABLE, NOT_APPLICABLE, NOT_APPLICABLE
+    ends = TOO_FEW
+    p_words = NOT_APPLICABLE
+    if gap.interval is not None:
+        ends = " to ".join(points(end, 1) for end in gap.interval)
+    if p_value is not None:
+        p_words = p_text(p_value).removeprefix("p ").removeprefix("= ")
+    return points(gap.value, 1), ends, p_words
 
 
 def _rounded(value: Fraction) -> Decimal:

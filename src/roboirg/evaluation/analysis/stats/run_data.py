@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 from roboirg.evaluation.analysis.results.frame import Frame
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cells, cells_of
-from roboirg.evaluation.analysis.stats.measure import Measured, ScopeKey, summarize
+from roboirg.evaluation.analysis.stats.measure import Summaries, summarize
 
 
 @dataclass(frozen=True)
@@ -23,7 +22,7 @@ class RunData:
         return cells_of(self.frame)
 
     @cached_property
-    def summaries(self) -> Mapping[ScopeKey, Measured[ScopeKey]]:
+    def summaries(self) -> Summaries:
         """What `summarize` measures, by policy run, scope and options."""
         return summarize(self.cells)
 

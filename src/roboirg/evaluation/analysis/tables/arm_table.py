@@ -19,7 +19,7 @@ from roboirg.evaluation.analysis.stats.arm_figures import (
 )
 from roboirg.evaluation.analysis.stats.cells import ByTask
 from roboirg.evaluation.analysis.stats.chance import silent_chance
-from roboirg.evaluation.analysis.stats.intervals import Interval
+from roboirg.evaluation.analysis.stats.intervals import TOO_FEW, Interval
 from roboirg.evaluation.analysis.stats.measure import mean_rate, measure_groups
 from roboirg.evaluation.analysis.stats.rates import (
     NOT_APPLICABLE,
@@ -34,7 +34,8 @@ from roboirg.evaluation.analysis.tables.table import Row, Table, named_columns
 _NOTE = (
     "Each figure compares two rates on the same scenes, as means over tasks, in percent with 95 "
     f"% intervals. {MEANING} Chance is the success of pursuing a random goal of the scene without "
-    "words. Differences are in points; p-values are corrected over all rows of the policy. "
+    "words. Differences are in points; p-values are after Holm's correction over all rows of the "
+    "policy. "
     "Scenes without an arm are left out of its figures."
 )
 
@@ -58,14 +59,14 @@ def make_arm_table(data: RunData) -> Table:
         columns=named_columns(
             "episodes", "first, %", "second, %", "chance", "difference", "95 % interval", "p"
         ),
-        rows=tuple(
+        rows=[
             Row(
                 f"{names[one.key.run]}, {options_label(one.key.options)}",
                 f"{one.key.contrast.name}: {one.key.contrast.first} − {one.key.contrast.second}",
                 _words(one),
             )
             for one in found
-        ),
+        ],
         notes=(_NOTE,),
     )
 
@@ -86,13 +87,13 @@ def language_use_sentences(first: Frame, second: Frame, names: tuple[str, str]) 
             yield (
                 f"Language use, {options_label(one.key[0])}: {names[0]} less {names[1]} "
                 f"{points(gap.value, 1)} points{interval_note(gap.interval)}, "
-                f"{p_text(one.p_holm)}, {gap.episodes} scenes."
+                f"{p_text(one.p_holm)} after Holm's correction, {gap.episodes} scenes."
             )
 
 
 def _words(one: ArmFigure) -> Sequence[str]:
-    sides = ((one.cells, one.interval), (one.others, one.other_interval))
-    rates = [_rate_text(*side) for side in sides]
+    first = _rate_text(one.cells, one.interval)
+    second = _rate_text(one.others, one.other_interval)
     chance = NOT_APPLICABLE
     if one.key.contrast.name == WORDS_WORTH:
         split = one.key.run.conditions.split
@@ -102,9 +103,11 @@ def _words(one: ArmFigure) -> Sequence[str]:
         ]
         chance = f"{100 * float(np.mean(chances)):.1f}"
     episodes = one.gap.episodes if one.gap else 0
-    return (str(episodes), *rates, chance, *gap_words(one.gap, one.p_holm))
+    return (str(episodes), first, second, chance, *gap_words(one.gap, one.p_holm))
 
 
 def _rate_text(cells: ByTask, interval: Interval | None) -> str:
-    ends = "" if interval is None else f" ({100 * interval.low:.1f} to {100 * interval.high:.1f})"
-    return f"{100 * float(mean_rate(cells) or 0):.1f}{ends}"
+    ends = TOO_FEW
+    if interval is not None:
+        ends = f"{100 * interval.low:.1f} to {100 * interval.high:.1f}"
+    return f"{100 * float(mean_rate(cells) or 0):.1f} ({ends})"

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,9 +18,8 @@ from roboirg.evaluation.analysis.results.option_labels import (
     reference_of,
     setting_sort_key,
 )
-from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.breakdowns import Breakdown, break_down
-from roboirg.evaluation.analysis.stats.cells import Counts, Key
+from roboirg.evaluation.analysis.stats.cells import NOTHING, Key, cells_of, rows_of
 from roboirg.evaluation.analysis.stats.comparison_text import incomplete_note
 from roboirg.evaluation.analysis.stats.failure_rates import (
     Ends,
@@ -36,13 +35,15 @@ from roboirg.evaluation.analysis.stats.measure import (
     ALL_TASKS,
     Measured,
     ScopeKey,
+    ScopeSummary,
+    by_scope,
     with_holm,
 )
 from roboirg.evaluation.analysis.stats.rates import (
     NOT_APPLICABLE,
     gap_words,
     percent,
-    whole_percent,
+    percent_range,
 )
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
@@ -65,12 +66,12 @@ FAILURES: Mapping[str, str] = {
 }
 """The names of failures with their kinds, in the order of the core's table."""
 OF_CELLS = ("policy and setting", "task")
-CELL = ("run", "options", "scope")
+RowCells = Sequence[Entry | str]
 
 _FORMS_NOTE = (
     "The same episodes in the implicit form and in the resolved one, which names the goal: trials "
     "solved in both, in one alone, in neither. The difference, the mean over tasks, and its "
-    "interval are in points; p-values are corrected over all rows of the policy."
+    "interval are in points; p-values are after Holm's correction over all rows of the policy."
 )
 _KINDS_NOTE = " ".join(
     f"{kind.capitalize()}: {means}." for kind, means in failures.FAILURE_KINDS.items()
@@ -89,14 +90,15 @@ _SHARES_NOTE = (
 )
 _BREAKDOWN_NOTE = (
     "Success in percent, the gap to explicit on the same episodes in points, its interval, and "
-    "its p-value corrected over all rows of the policy. Rates are means over the tasks that "
-    "have such instructions, so two rows may differ in their tasks, too."
+    "its p-value after Holm's correction over all rows of the policy. Rates are means over the "
+    "tasks that have such instructions, so two rows may differ in their tasks, too."
 )
 _HEARD_NOTE = (
     "Cut: the policy's model reads fewer tokens than the prompt needs, so the end of the prompt, "
     "where the command stands, does not arrive; between two bounds if the tokenizer is not "
     "known. Success in percent over all episodes with a verdict, and over those that were heard "
-    "whole. Policies that declare no limit (prompt_tokens) are not in this table."
+    "whole. Of all tasks, shares and rates are means over the tasks that have such episodes. "
+    "Policies that declare no limit (prompt_tokens) are not in this table."
 )
 
 
@@ -116,7 +118,8 @@ def make_forms_table(data: RunData) -> Table:
         and key.scope not in one.cells
         and (several or key.scope != ALL_TASKS)
     ]
-    runs, scopes = list(data.frame.names), [one.key.scope for one in found]
+    runs = list(data.frame.names)
+    scopes = [one.key.scope for one in found]
     found.sort(
         key=lambda one: (
             runs.index(one.key.policy_run), scopes.index(one.key.scope),
@@ -143,18 +146,17 @@ def make_forms_table(data: RunData) -> Table:
             "trials", "both", "only resolved", "only implicit", "neither", "implicit − resolved",
             "95 % interval", "p",
         ),
-        rows=tuple(rows),
+        rows=rows,
         notes=(_FORMS_NOTE,),
     )  # fmt: skip
 
 
 def count_failures(frame: Frame, by: Sequence[str]) -> Mapping[Key, Counter[str]]:
     """Return, by some columns, the number of ``trials`` with a verdict and of failures by name."""
-    found: dict[Key, Counter[str]] = {}
-    names = ("outcome", "failure", *by)
-    for outcome, failure, *key in zip(*(frame[name] for name in names), strict=True):
+    found: defaultdict[Key, Counter[str]] = defaultdict(Counter)
+    for *key, outcome, failure in rows_of(frame, *by, "outcome", "failure"):
         if outcome in ("success", "failure"):
-            counts = found.setdefault(tuple(key), Counter())
+            counts = found[tuple(key)]
             counts["trials"] += 1
             if outcome == "failure":
                 counts[failure if failure in FAILURES else UNATTRIBUTED] += 1
@@ -172,10 +174,7 @@ def make_failure_table(data: RunData, *, means: bool = False) -> Table:
         InvalidValueError: no episode failed.
     """
     scopes = {ALL_TASKS} if means else {ALL_TASKS, *data.frame["task"]}
-    found = {
-        (key.policy_run, key.options, key.scope): ends
-        for key, ends in measure_ends(data, scopes).items()
-    }
+    found = measure_ends(data, scopes)
     if all(success.rate == 1 for success, *_ in found.values()):
         raise InvalidValueError("No episode of the runs failed.")
     return Table(
@@ -187,15 +186,14 @@ def make_failure_table(data: RunData, *, means: bool = False) -> Table:
             *(f"{kind}, change" for kind in failures.FAILURE_KINDS), "grounding of failures",
             "the same in explicit",
         ),
-        rows=tuple(
-            Row(group, scope, _ends(*found[key])) for key, group, scope in _in_order(found, data)
-        ),
+        rows=_rows(found, data, lambda key: _ends(*found[key])),
         notes=(_RATES_NOTE, f"{_KINDS_NOTE} {_SHARES_NOTE}"),
     )  # fmt: skip
 
 
-def _ends(success: Measured[ScopeKey], *kinds: Measured[ScopeKey]) -> tuple[Entry | str, ...]:
-    counts, ends = success.counts, (success, *kinds)
+def _ends(success: ScopeSummary, *kinds: ScopeSummary) -> RowCells:
+    counts = success.counts
+    ends = (success, *kinds)
     gaps = (gap_words(one.gap, None) for one in ends)
     explicit = [
         {task: one.others[task] for task in success.tasks if task in one.others} for one in kinds
@@ -211,7 +209,7 @@ def _ends(success: Measured[ScopeKey], *kinds: Measured[ScopeKey]) -> tuple[Entr
 
 
 def _share_text(ends: Ends | None) -> str:
-    return NOT_APPLICABLE if ends is None else "–".join(dict.fromkeys(map(whole_percent, ends)))
+    return NOT_APPLICABLE if ends is None else percent_range(*ends)
 
 
 def make_failure_name_table(data: RunData) -> Table:
@@ -220,10 +218,18 @@ def make_failure_name_table(data: RunData) -> Table:
     Raises:
         InvalidValueError: no episode failed.
     """
-    found = count_failures(_with_scope(data.frame), CELL)
-    names = [name for name in FAILURES if any(counts[name] for counts in found.values())]
+    # Each row counts twice: for its task, and for all tasks.
+    frame = data.frame.spread("scope", [(task, ALL_TASKS) for task in data.frame["task"]])
+    counts = count_failures(frame, ("run", "scope", "options"))
+    found = {ScopeKey(*key): own for key, own in counts.items()}
+    names = [name for name in FAILURES if any(own[name] for own in found.values())]
     if not names:
         raise InvalidValueError("No episode of the runs failed.")
+
+    def words(key: ScopeKey) -> list[str]:
+        failed = [found[key][name] for name in names]
+        return list(map(str, (found[key]["trials"], sum(failed), *failed)))
+
     return Table(
         key="failure_names",
         title="Failures by name",
@@ -232,17 +238,7 @@ def make_failure_name_table(data: RunData) -> Table:
             *named_columns("trials", "failures"),
             *(Column(name.replace("_", " "), FAILURES[name]) for name in names),
         ),
-        rows=tuple(
-            Row(
-                group,
-                scope,
-                [
-                    str(found[key][name] if name else sum(found[key][one] for one in names))
-                    for name in ("trials", "", *names)
-                ],
-            )
-            for key, group, scope in _in_order(found, data)
-        ),
+        rows=_rows(found, data, words),
         notes=(f"Failed episodes, and how many of them failed in each way. {_KINDS_NOTE}",),
     )
 
@@ -253,60 +249,62 @@ def make_heard_table(data: RunData) -> Table:
     Raises:
         InvalidValueError: no policy declares how many tokens it reads.
     """
-    found = count_heard(_with_scope(data.frame), CELL[1:])
-    if not found:
+    counts = count_heard(data.frame, ("options", "task"))
+    if not counts:
         raise InvalidValueError(
             "No policy of the runs declares how many tokens it reads; prompt_tokens=N does."
         )
-    rows = []
-    for key, group, scope in _in_order(found, data):
-        one = found[key]
-        episodes, heard = str(one["episodes"]), str(one["heard trials"])
-        rates = (_heard_rate(one, ""), heard, _heard_rate(one, "heard "))
-        rows.append(Row(group, scope, (episodes, cut_text(one), *rates)))
+    scopes: defaultdict[ScopeKey, list[HeardCounts]] = defaultdict(list)
+    for (run, options, task), own in counts.items():
+        for scope in (task, ALL_TASKS):
+            scopes[ScopeKey(run, scope, options)].append(own)
+    played = by_scope(data.cells)
+    heard = by_scope(cells_of(data.frame.where(prompt="heard")))
+
+    def cells(key: ScopeKey) -> RowCells:
+        whole = Measured(key, played[key])
+        read = Measured(key, heard.get(key, NOTHING))
+        episodes = sum(own["episodes"] for own in scopes[key])
+        cut = cut_text(scopes[key])
+        return (str(episodes), cut, _rate(whole), str(read.counts.trials), _rate(read))
+
     return Table(
         key="heard",
         title="Instructions that the policies' models read to the end",
         heads=OF_CELLS,
         columns=named_columns("episodes", "cut, %", "success, all", "heard", "success, heard"),
-        rows=tuple(rows),
+        rows=_rows(scopes, data, cells),
         notes=(_HEARD_NOTE,),
     )
 
 
-def _heard_rate(one: HeardCounts, heard: str) -> Entry:
-    counts = Counts(one[f"{heard}successes"], one[f"{heard}trials"])
-    if counts.rate is None:
-        return Entry(word=NOT_APPLICABLE)
-    return Entry(percent=percent(counts.rate), counts=counts)
+def _rows(
+    found: Iterable[ScopeKey], data: RunData, cells: Callable[[ScopeKey], RowCells]
+) -> list[Row]:
+    """Return rows by policy run, options and scope, those of all tasks last.
 
-
-def _with_scope(frame: Frame) -> Frame:
-    """Return each row twice: for its task and for all tasks, in a column ``scope``."""
-    return frame.spread("scope", [(task, ALL_TASKS) for task in frame["task"]])
-
-
-def _in_order(found: Iterable[Key], data: RunData) -> Iterator[tuple[Key, str, str]]:
-    """Yield each key of `CELL` with its group's label and its scope; all tasks come last.
-
-    They are left out if there is only one task.
+    These are left out if there is only one task.
     """
-    runs = list(data.frame.names)
+    names = data.frame.names
+    runs = list(names)
     keys = sorted(
         found,
-        key=lambda key: (runs.index(key[0]), options_sort_key(key[1]), key[2] == ALL_TASKS),
-    )
-    for group, own in itertools.groupby(keys, lambda key: key[:2]):
+        key=lambda key: (
+            runs.index(key.policy_run), options_sort_key(key.options), key.scope == ALL_TASKS,
+        ),
+    )  # fmt: skip
+    rows = []
+    for (run, options), own in itertools.groupby(keys, lambda key: (key.policy_run, key.options)):
         scopes = list(own)
-        for key in scopes if len(scopes) > 2 else scopes[:1]:  # noqa: PLR2004 - a task and all
-            yield key, f"{data.frame.names[group[0]]}, {options_label(group[1])}", key[2]
+        shown = scopes if len(scopes) > 2 else scopes[:1]  # noqa: PLR2004 - a task and all
+        group = f"{names[run]}, {options_label(options)}"
+        rows += [Row(group, key.scope, cells(key)) for key in shown]
+    return rows
 
 
-def make_breakdown_table(
-    breakdown: Breakdown, frame: Frame, names: Mapping[PolicyRun, str] | None = None
-) -> Table:
+def make_breakdown_table(breakdown: Breakdown, frame: Frame) -> Table:
     """Make the table of gaps to explicit, broken down by a column that the frame has."""
-    names, found = names or frame.names, break_down(frame, breakdown)
+    found = break_down(frame, breakdown)
     left_out = sum(one not in ("success", "failure") for one in frame["outcome"])
     notes = [f"{_BREAKDOWN_NOTE} {breakdown.note}"]
     if any(one.gap is None and one.key.options != reference_of(one.key.options) for one in found):
@@ -318,21 +316,22 @@ def make_breakdown_table(
         title=f"Gap to explicit by {breakdown.title}",
         heads=(OF_CELLS[0], breakdown.title),
         columns=named_columns("episodes", "success", "gap", "95 % interval", "p"),
-        rows=tuple(
+        rows=[
             Row(
-                f"{names[one.key.run]}, {options_label(one.key.options)}",
+                f"{frame.names[one.key.run]}, {options_label(one.key.options)}",
                 one.key.label,
                 (str(one.counts.episodes), _rate(one), *gap_words(one.gap, one.p_holm)),
             )
             for one in found
-        ),
-        notes=tuple(notes),
+        ],
+        notes=notes,
     )
 
 
 def _rate(one: Measured[Any]) -> Entry:
-    rate = None if one.rate is None else percent(one.rate)
-    return Entry(percent=rate, counts=one.counts, interval=one.interval)
+    if one.rate is None:
+        return Entry(word=NOT_APPLICABLE)
+    return Entry(percent=percent(one.rate), counts=one.counts, interval=one.interval)
 
 
 DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData, Iterable[Record]], Table]] = {

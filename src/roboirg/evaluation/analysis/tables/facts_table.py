@@ -68,35 +68,39 @@ _DECLARED = (
 
 def make_facts_table(data: RunData, records: Iterable[Record]) -> Table:
     """Make the table from the whole records of the runs of `data`."""
-    results = [one for one in data.frame["result"] if isinstance(one, Summary)]
+    results = data.frame.played
     kept = {(one.slug, one.started_at) for one in results}
     known: defaultdict[tuple[str, str], dict[str, None]] = defaultdict(dict)
+
+    def add(owner: str, name: str, *values: object) -> None:
+        for value in values:
+            known[owner, name] |= dict.fromkeys(_words(value))
+
     totals: defaultdict[str, Counter[str]] = defaultdict(Counter)
     for record in records:
         if (record.slug, record.started_at) in kept:  # without what was played again
             for name, value in _of_policy(record):
-                known[record.policy, name] |= dict.fromkeys(_words(value))
+                add(record.policy, name, value)
             total = totals[record.policy]
             total.update(steps=record.steps, calls=record.calls)
             total["executed"] = max(total["executed"], record.executed)
     for name, values in _of_run(results, data):
-        known[RUN, name] |= dict.fromkeys(word for value in values for word in _words(value))
+        add(RUN, name, *values)
     for policy, total in totals.items():
-        mean = f"{total['steps'] / total['calls']:.1f}" if total["calls"] else ""
-        known[policy, "control steps per call, mean"] |= dict.fromkeys(_words(mean))
-        most = total["executed"] or None
-        known[policy, "actions executed per call, most"] |= dict.fromkeys(_words(most))
+        mean = f"{total['steps'] / total['calls']:.1f}" if total["calls"] else None
+        add(policy, "control steps per call, mean", mean)
+        add(policy, "actions executed per call, most", total["executed"] or None)
     return Table(
         key="facts",
         title="Facts of the run",
         heads=("of", "fact"),
         columns=(Column("value", is_text=True),),
-        rows=tuple(
+        rows=[
             Row(of, name, ["; ".join(values) or NOT_REPORTED])
             for of in (RUN, *totals)
             for (owner, name), values in known.items()
             if owner == of
-        ),
+        ],
     )
 
 
@@ -130,8 +134,12 @@ def _of_policy(record: Record) -> Iterator[tuple[str, object]]:
     declared = _metadata(record)
     found = None if SERVER in declared else record.inference  # a server's process is not asked
     if found is not None:
-        measured: dict[str, Any] = {"python": found.python, "libraries": found.libraries}
-        measured |= {"parameter_dtype": found.dtypes, "device": found.devices}
+        measured = {
+            "python": found.python,
+            "libraries": found.libraries,
+            "parameter_dtype": found.dtypes,
+            "device": found.devices,
+        }
         declared = {**{key: value for key, value in measured.items() if value}, **declared}
     if declared.get("network") == "none":
         declared = {**dict.fromkeys(_OF_NETWORKS, NOT_APPLICABLE), **declared}
@@ -150,7 +158,7 @@ def _metadata(record: Record) -> dict[str, Any]:
 
 def _words(value: object) -> list[str]:
     """Return a value in words; nothing if it is unknown."""
-    if value is None or value == "":
+    if value in (None, ""):
         return []
     if isinstance(value, Mapping):
         return [f"{key} {one}" for key, one in value.items()]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,12 +17,12 @@ from roboirg.evaluation.analysis.published import (
     published_lines,
     published_rows,
 )
+from roboirg.evaluation.analysis.results.frame import RunNames
 from roboirg.evaluation.analysis.results.option_labels import (
     reference_of,
     setting_sort_key,
     staged_options,
 )
-from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cell, CellKey, Cells, cell_interval
 from roboirg.evaluation.analysis.stats.chance import floor_level
 from roboirg.evaluation.analysis.stats.intervals import SEED
@@ -33,7 +35,9 @@ from roboirg.evaluation.analysis.tables.table import (
     Column,
     Entry,
     Row,
+    Source,
     Table,
+    grouped,
     named_columns,
     with_averages,
     with_best,
@@ -70,7 +74,7 @@ def make_table(
     if which == COVERAGE:
         return _coverage()
     check_names("table", [which], WHICH)
-    names: Mapping[PolicyRun, str] = {} if data is None else data.told.frame.names_as_played
+    names: RunNames = {} if data is None else data.told.frame.names_as_played
     cells: Cells = {} if data is None else data.told.cells
     table = PAPER_TABLES[which]
     tasks = table.tasks(cells)
@@ -80,7 +84,7 @@ def make_table(
         {key: differences_of(key, cell) for key, cell in cells.items()} if shows_published else {}
     )
     rng = np.random.default_rng(SEED)
-    rows = []
+    rows: list[Row] = []
     for policy_run, options, label in table.positions(cells, names):
         keys = [CellKey(policy_run, task, options) for task in tasks]
         entries = {key.task: _entry(key, cells.get(key), differences, rng) for key in keys}
@@ -89,14 +93,15 @@ def make_table(
         rows.extend(_floor_rows(floor, table, columns, cells))
     if shows_published and table.of_paper is not None:
         rows += [_published_row(table, columns, row) for row in published_rows(table.of_paper)]
-    rows = _grouped(table, rows)
+    if not table.is_by_stages:
+        rows.sort(key=lambda row: setting_sort_key(row.group))
     rows = list(with_best(with_changes(columns, zip(rows, _references(table, rows), strict=True))))
     return Table(
         key=table.name,
         title=table.title,
         heads=table.heads,
         columns=columns,
-        rows=tuple(_by_policy(rows) if table.heads == (POLICY, "setting") else rows),
+        rows=_by_policy(rows) if table.heads == (POLICY, "setting") else rows,
         notes=notes_of(table, columns, rows, cells, names, differences, floors),
     )
 
@@ -131,7 +136,8 @@ def _entry(
 
 def _applies(task: str, options: InstructionOptions) -> bool:
     """Whether a task has a setting; taken for granted if either is not installed."""
-    known, setting = every_task().get(task), options.setting
+    known = every_task().get(task)
+    setting = options.setting
     return known is None or setting not in all_settings() or setting in settings_of(known)
 
 
@@ -140,32 +146,44 @@ def _floor_rows(
 ) -> Iterator[Row]:
     """Yield a floor of each setting on the episodes that any policy played in it."""
     tasks = table.tasks(cells)
-    played = {
-        (row_order(key.options), key.policy_run.language, key.options)
-        for key, cell in cells.items()
-        if key.task in tasks and table.shows(key.options) and cell.verdicts
-    }
-    for _, language, options in sorted(played, key=lambda one: one[:2]):
+    played: defaultdict[_Instructions, defaultdict[str, list[Job]]]
+    played = defaultdict(lambda: defaultdict(list))
+    for key, cell in cells.items():
+        if key.task in tasks and table.shows(key.options) and cell.verdicts:
+            run = key.policy_run
+            words = _Instructions(run.language, run.conditions.split, key.options)
+            played[words][key.task] += _jobs(key, cell)
+    several_languages = len({words.language for words in played}) > 1
+    several_splits = len({words.split for words in played}) > 1
+    for words in sorted(played, key=lambda words: (row_order(words.options), *words[:2])):
         entries = {}
         for task in tasks:
-            level = floor_level(floor, _jobs(task, options, language, cells), language)
-            applies = _applies(task, options)
+            level = floor_level(floor, played[words][task], words.language)
+            applies = _applies(task, words.options)
             entries[task] = Entry(None if level is None else percent(level), applies=applies)
         if any(entry.percent is not None for entry in entries.values()):
-            name = floor + f", language {language}" * (len({one for _, one, _ in played}) > 1)
-            yield Row(options.setting, name, with_averages(columns, entries), "chance")
+            name = floor
+            if several_languages:
+                name += f", language {words.language}"
+            if several_splits:
+                name += f", split {words.split}"
+            yield Row(words.options.setting, name, with_averages(columns, entries), "chance")
 
 
-def _jobs(task: str, options: InstructionOptions, language: str, cells: Cells) -> Iterator[Job]:
-    """Yield the episodes with a verdict of a task in a setting, if both are installed."""
-    if task in every_task() and options.setting in all_settings():
-        for key, cell in cells.items():
-            if (key.task, key.options, key.policy_run.language) == (task, options, language):
-                split = key.policy_run.conditions.split
-                for trial in cell.verdicts:
-                    yield Job(
-                        policy="", task=task, split=split, episode=trial.episode, options=options
-                    )
+class _Instructions(NamedTuple):
+    """What instructions are of: a version of the language, a split, and options."""
+
+    language: str
+    split: str
+    options: InstructionOptions
+
+
+def _jobs(key: CellKey, cell: Cell) -> Iterator[Job]:
+    """Yield the episodes with a verdict of a cell, if its task and setting are installed."""
+    if key.task in every_task() and key.options.setting in all_settings():
+        split = key.policy_run.conditions.split
+        for episode in cell.by_episode():
+            yield Job(policy="", task=key.task, split=split, episode=episode, options=key.options)
 
 
 def _published_row(table: PaperTable, columns: Sequence[Column], row: PublishedRow) -> Row:
@@ -178,20 +196,10 @@ def _published_row(table: PaperTable, columns: Sequence[Column], row: PublishedR
     return replace(table.row(row.options, row.model, cells), source="published")
 
 
-def _grouped(table: PaperTable, rows: Iterable[Row]) -> list[Row]:
-    """Put the rows of each group together: settings in their order, policies as they come."""
-    found = list(rows)
-    if not table.is_by_stages:
-        return sorted(found, key=lambda row: setting_sort_key(row.group))
-    groups = list(dict.fromkeys(row.group for row in found))
-    return sorted(found, key=lambda row: groups.index(row.group))
-
-
 def _by_policy(rows: Sequence[Row]) -> list[Row]:
     """Return rows that are grouped by setting grouped by policy instead."""
-    owners = list(dict.fromkeys((row.source, row.name) for row in rows))
-    found = sorted(rows, key=lambda row: owners.index((row.source, row.name)))
-    return [replace(row, group=row.name, name=row.group) for row in found]
+    groups = grouped(rows, lambda row: (row.source, row.name))
+    return [replace(row, group=row.name, name=row.group) for group in groups for row in group]
 
 
 def _references(table: PaperTable, rows: Sequence[Row]) -> Iterator[Row | None]:
@@ -206,20 +214,22 @@ def _references(table: PaperTable, rows: Sequence[Row]) -> Iterator[Row | None]:
 
 def _coverage() -> Table:
     """Return the paper's table with this benchmark's row derived from its tasks."""
-    heads = ("kind", "benchmark")
     has = {setting for task in all_tasks().values() for setting in settings_of(task)}
     rows = []
     for line in published_lines(COVERAGE):
-        covers = {name: word for name, word in line.items() if name not in heads}
-        is_own = line["benchmark"] == OWN_NAME
-        own = {setting: "yes" if setting in has else "no" for setting in covers}
-        words = list((own if is_own else covers).values())
-        rows.append(Row(line["kind"], line["benchmark"], words, "ours" if is_own else "cited"))
+        kind = line.pop("kind")
+        benchmark = line.pop("benchmark")
+        words = list(line.values())
+        source: Source = "cited"
+        if benchmark == OWN_NAME:
+            words = ["yes" if setting in has else "no" for setting in line]
+            source = "ours"
+        rows.append(Row(kind, benchmark, words, source))
     return Table(
         key=COVERAGE,
         title="Implicit references in benchmarks",
-        heads=heads,
-        columns=named_columns(*covers),
-        rows=tuple(rows),
+        heads=("kind", "benchmark"),
+        columns=named_columns(*line),
+        rows=rows,
         notes=("partial: pronouns within a chain of actions only. Source: the paper.",),
     )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Set
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence, Set
 from fractions import Fraction
 
 from rich.console import Console
@@ -29,10 +28,12 @@ from roboirg.evaluation.analysis.stats.measure import (
     ALL_TASKS,
     Measured,
     ScopeKey,
+    ScopeSummary,
+    Summaries,
     by_scope,
     pair,
 )
-from roboirg.evaluation.analysis.stats.paired_tests import pooled_overlap
+from roboirg.evaluation.analysis.stats.paired_tests import paired_rates
 from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, points, whole_percent
 from roboirg.evaluation.analysis.tables.table import (
     ERROR_MARK,
@@ -64,6 +65,8 @@ def make_run_tables(frame: Frame) -> list[Table]:
         if key.scope == ALL_TASKS or key.scope in own
     }
     gaps = {key: gap_text(key, scopes) for key in found}
+    legend = "; ".join(_legend(found, set(gaps.values())))
+    last = list(frame.names)[-1:]
     tables = []
     for policy_run, label in frame.names.items():
         names = {policy_run: label}
@@ -74,30 +77,25 @@ def make_run_tables(frame: Frame) -> list[Table]:
             if key.policy_run == policy_run and key.options == reference_of(key.options)
         }
         own = {key: one for key, one in found.items() if key.policy_run == policy_run}
-        notes = (
+        notes = [
             f"{where_played([policy_run.conditions])} {_sizes(own)}",
             *comparison_notes(differences, names),
             *heard_notes(frame.where(run=policy_run), names),
             *headline_notes(cells, names),
-        )
+        ]
+        if policy_run in last:
+            notes.append(legend)
         tables.append(_make_run_table(label, own, gaps, differences, notes))
-    legend = "; ".join(_legend(found, set(gaps.values())))
-    last = (replace(table, notes=(*table.notes, legend)) for table in tables[-1:])
-    return [*tables[:-1], *last]
+    return tables
 
 
 def print_failures(frame: Frame, console: Console) -> None:
     """List the episodes of each policy run without success and the cause; count the rest."""
     for run, label in frame.names.items():
-        own = frame.where(run=run)
+        failures = [one for one in frame.where(run=run).played if one.outcome != "success"]
         # The same order for any number of worker processes.
-        failures = sorted(
-            (
-                one
-                for one, outcome in zip(own["result"], own["outcome"], strict=True)
-                if outcome in ("failure", "error")
-            ),
-            key=lambda one: (one.task, one.split, one.episode, options_sort_key(one.options)),
+        failures.sort(
+            key=lambda one: (one.task, one.split, one.episode, options_sort_key(one.options))
         )
         if failures:
             title = f"{counted(len(failures), 'episode')} without success"
@@ -118,27 +116,27 @@ def failure_text(record: Summary) -> str:
 
 
 def gap_text(key: ScopeKey, scopes: Mapping[ScopeKey, ByTask]) -> str:
-    """Return the gap to explicit over paired trials.
+    """Return the gap to explicit on the same episodes, the mean over tasks.
 
     A dash if neither has a success, which says nothing; empty without pairs.
     """
     reference = key._replace(options=reference_of(key.options))
     if key == reference:
         return ""
-    found = pooled_overlap(pair(scopes[key], scopes.get(reference, NOTHING)))
-    if not found.trials:
+    rates = paired_rates(pair(scopes[key], scopes.get(reference, NOTHING)))
+    if rates is None:
         return ""
-    if found.neither == found.trials:
+    if not any(rates):
         return NOT_APPLICABLE
-    return points((found.only_first - found.only_second) / found.trials)
+    return points(rates.first - rates.second)
 
 
 def _make_run_table(
     label: str,
-    found: Mapping[ScopeKey, Measured[ScopeKey]],
+    found: Summaries,
     gaps: Mapping[ScopeKey, str],
     differences: AllDifferences,
-    notes: tuple[str, ...],
+    notes: Sequence[str],
 ) -> Table:
     """Return tasks × settings: the success rate and, in brackets, the gap to explicit."""
     policy_run = next(iter(found)).policy_run
@@ -153,20 +151,19 @@ def _make_run_table(
         key="run",
         title=label,
         heads=("task",),
-        columns=tuple(Column(options_label(one), one.setting) for one in options),
-        rows=tuple(rows),
+        columns=[Column(options_label(one), one.setting) for one in options],
+        rows=rows,
         notes=notes,
     )
 
 
-def _entry(one: Measured[ScopeKey] | None, gap: str, differences: AllDifferences) -> Entry:
+def _entry(one: ScopeSummary | None, gap: str, differences: AllDifferences) -> Entry:
     if one is None:
         return Entry(applies=False)
     counts = one.counts
     shown = ((counts.errors, ERROR_MARK), (counts.missing, MISSING_MARK))
     marks = " ".join(f"{count}{mark}" for count, mark in shown if count)
-    # Pooled over trials: the gaps are over trials too.
-    rate = counts.rate
+    rate = one.rate
     if rate is None:
         return Entry(word=NOT_APPLICABLE, marks=marks)
     return Entry(
@@ -177,7 +174,7 @@ def _entry(one: Measured[ScopeKey] | None, gap: str, differences: AllDifferences
     )
 
 
-def _legend(found: Mapping[ScopeKey, Measured[ScopeKey]], gaps: Set[str]) -> Iterator[str]:
+def _legend(found: Summaries, gaps: Set[str]) -> Iterator[str]:
     """Yield what the signs mean that occur."""
     compared = ", in brackets the gap to explicit on the same episodes in points"
     yield f"success rate in %{compared if any(gaps) else ''}"
@@ -191,10 +188,10 @@ def _legend(found: Mapping[ScopeKey, Measured[ScopeKey]], gaps: Set[str]) -> Ite
         yield "privileged policies and scripted hands use the simulator's state"
 
 
-def _sizes(found: Mapping[ScopeKey, Measured[ScopeKey]]) -> str:
+def _sizes(found: Summaries) -> str:
     single = [one.counts.trials for key, one in found.items() if key.scope != ALL_TASKS]
     text = f"n = {range_text(single, 'episode')} per cell"
     if len({key.scope for key in found}) > 2:  # noqa: PLR2004 - a task and all of them
         every = [one.counts.trials for key, one in found.items() if key.scope == ALL_TASKS]
-        text += f", {range_text(every, 'episode')} for {ALL_TASKS}"
+        text += f", {range_text(every, 'episode')} for {ALL_TASKS}, the mean over tasks"
     return text

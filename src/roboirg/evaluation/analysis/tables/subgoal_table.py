@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.evaluation.analysis.results.option_labels import options_label
 from roboirg.evaluation.analysis.results.reading import with_columns
-from roboirg.evaluation.analysis.stats.cells import CellKey
+from roboirg.evaluation.analysis.stats.cells import CellKey, rows_of
 from roboirg.evaluation.analysis.stats.planner_failures import PLANNER_FAILURES, planner_failure
 from roboirg.evaluation.analysis.stats.run_data import RunData
 from roboirg.evaluation.analysis.tables.table import Column, Row, Table
@@ -21,7 +22,7 @@ _NOTE = (
     "count (the right act at another time), or lost (an act that was not due). Shares are of the "
     "cell's subgoals."
 )
-_COSTS: Mapping[str, str] = {
+_COSTS = {
     "calls": "calls",
     "input_tokens": "tokens in",
     "output_tokens": "tokens out",
@@ -32,12 +33,20 @@ _COSTS: Mapping[str, str] = {
     "missed": "misses",
 }
 """What a planner costs: keys of a record's usage, and their headings."""
+_UNKNOWN_IF_ABSENT = ("input_tokens", "output_tokens", "cost_usd")
+"""What a service may not report, so that the records of its replies lack it."""
+
+
+def _usage(record: Record) -> dict[str, float]:
+    """Return the usage of a record, with NaN for what is unknown of the models that it asked."""
+    unknown = dict.fromkeys(_UNKNOWN_IF_ABSENT, math.nan) if "calls" in record.usage else {}
+    return {**unknown, **record.usage}
 
 
 _READ: Mapping[str, Callable[[Record], object]] = {
     "verdicts": lambda record: tuple(one.verdict for one in record.subgoals),
     "planner_failure": planner_failure,
-    "usage": lambda record: tuple(record.usage.items()),
+    "usage": _usage,
 }
 
 
@@ -50,23 +59,24 @@ def make_subgoal_table(data: RunData, records: Iterable[Record]) -> Table:
     frame = with_columns(data.frame, records, _READ)
     found: defaultdict[CellKey, Counter[str]] = defaultdict(Counter)
     names = ("run", "task", "options", *_READ)
-    for run, task, options, verdicts, failure, usage in zip(
-        *(frame[name] for name in names), strict=True
-    ):
+    for run, task, options, verdicts, failure, usage in rows_of(frame, *names):
         if usage is not None:  # else the episode was not played
             counts = found[CellKey(run, task, options)]
-            counts.update(("episodes", *verdicts, *([failure] if failure else ())))
-            counts.update({name: value for name, value in usage if name in _COSTS})
+            counts.update(("episodes", *verdicts))
+            counts.update({name: value for name, value in usage.items() if name in _COSTS})
+            if failure:
+                counts[failure] += 1
     known = (*SUBGOAL_VERDICTS, *PLANNER_FAILURES)
     shown = {key: one for key, one in found.items() if any(one[name] for name in known)}
     if not shown:
         raise InvalidValueError("No planner of the runs named a subgoal; their records hold none.")
-    failures, costs = (
-        [name for name in names if any(one[name] for one in shown.values())]
-        for names in (PLANNER_FAILURES, _COSTS)
-    )
-    meanings = "; ".join(f"{one}: {PLANNER_FAILURES[one]}" for one in failures)
-    notes = (_NOTE, *([f"Failed episodes, by what the planner did: {meanings}."] * bool(failures)))
+    occurring = {name for counts in shown.values() for name in counts if counts[name] > 0}
+    failures = [name for name in PLANNER_FAILURES if name in occurring]
+    costs = [name for name in _COSTS if name in occurring]
+    notes = [_NOTE]
+    if failures:
+        meanings = "; ".join(f"{name}: {PLANNER_FAILURES[name]}" for name in failures)
+        notes.append(f"Failed episodes, by what the planner did: {meanings}.")
     return Table(
         key="subgoals",
         title="Subgoals of planners",
@@ -77,14 +87,14 @@ def make_subgoal_table(data: RunData, records: Iterable[Record]) -> Table:
             *(Column(one, "failed episodes") for one in failures),
             *(Column(_COSTS[one], "per episode") for one in costs),
         ),
-        rows=tuple(
+        rows=[
             Row(
                 f"{data.frame.names[key.policy_run]}, {options_label(key.options)}",
                 key.task,
-                tuple(_words(counts, failures, costs)),
+                list(_words(counts, failures, costs)),
             )
             for key, counts in shown.items()
-        ),
+        ],
         notes=notes,
     )
 
@@ -95,4 +105,6 @@ def _words(counts: Counter[str], failures: Iterable[str], costs: Iterable[str]) 
     for one in SUBGOAL_VERDICTS:
         yield f"{counts[one]} ({100 * counts[one] / max(total, 1):.0f} %)"
     yield from (str(counts[one]) for one in failures)
-    yield from (f"{counts[one] / counts['episodes']:.3g}" for one in costs)
+    for name in costs:
+        mean = counts[name] / counts["episodes"]
+        yield "unknown" if math.isnan(mean) else f"{mean:.3g}"

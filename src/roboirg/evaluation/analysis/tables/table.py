@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Literal, NamedTuple
@@ -134,9 +133,9 @@ class Table:
     key: str
     title: str
     heads: tuple[str, ...]
-    columns: tuple[Column, ...]
-    rows: tuple[Row, ...]
-    notes: tuple[str, ...] = ()
+    columns: Sequence[Column]
+    rows: Sequence[Row]
+    notes: Sequence[str] = ()
 
     @property
     def headings(self) -> tuple[str, ...]:
@@ -151,22 +150,29 @@ class Table:
                 names_group = not number or len(labels) == 1
                 yield not number, labels if names_group else ("", *labels[1:]), row
 
-    def groups(self) -> Iterable[list[Row]]:
+    def groups(self) -> list[list[Row]]:
         """Return the rows of each group; published policies are apart from others of the name."""
         is_by_policy = self.heads[0] == POLICY
-        groups: dict[object, list[Row]] = {}
-        for row in self.rows:
-            groups.setdefault((row.group, is_by_policy and row.source), []).append(row)
-        return groups.values()
+        return grouped(self.rows, lambda row: (row.group, is_by_policy and row.source))
 
     def labels(self, row: Row) -> tuple[str, ...]:
         """Return the label of a row below each head; names of published policies are marked."""
-        listed = row.name.split(",")
-        checks = [CHECK_MARK if head in listed else "" for head in self.heads[1:]]
-        labels = [row.group, *(checks if len(checks) > 1 else [row.name])][-len(self.heads) :]
+        names = [row.name]
+        if len(self.heads) > 2:  # noqa: PLR2004 - a group and a name
+            listed = row.name.split(",")
+            names = [CHECK_MARK if head in listed else "" for head in self.heads[1:]]
+        labels = [row.group, *names][-len(self.heads) :]
         if row.source == "published" and POLICY in self.heads:
             labels[self.heads.index(POLICY)] += PUBLISHED_MARK
         return tuple(labels)
+
+
+def grouped(rows: Iterable[Row], key: Callable[[Row], object]) -> list[list[Row]]:
+    """Return the rows of each key; groups are in the order of their first rows."""
+    groups: dict[object, list[Row]] = {}
+    for row in rows:
+        groups.setdefault(key(row), []).append(row)
+    return list(groups.values())
 
 
 def average(entries: Sequence[Entry]) -> Entry:
@@ -203,7 +209,7 @@ def with_changes(columns: Sequence[Column], rows: Iterable[tuple[Row, Row | None
     some settings.
     """
     return [
-        row if reference is None else replace(row, cells=tuple(_changed(columns, row, reference)))
+        row if reference is None else replace(row, cells=list(_changed(columns, row, reference)))
         for row, reference in rows
     ]
 
@@ -221,18 +227,23 @@ def _changed(columns: Sequence[Column], row: Row, reference: Row) -> Iterator[En
 
 
 def with_best(rows: Iterable[Row]) -> Iterator[Row]:
-    """Yield the rows with the best entries of each column, group and source marked.
+    """Yield rows, those of a group together, with its best entries in each column marked.
 
-    None is the best if all have the same rate, only one has a rate, or one is incomplete.
+    The sources are apart. None is the best if all have the same rate, only one has a rate, or one
+    is incomplete.
     """
-    for _, rivals in itertools.groupby(rows, lambda row: (row.group, row.source)):
-        found = list(rivals)
-        columns = zip(*(row.entries for row in found), strict=True)
-        for row, cells in zip(found, zip(*map(_with_best, columns), strict=True), strict=True):
-            yield replace(row, cells=cells)
+    for group in grouped(rows, lambda row: row.group):
+        for rivals in grouped(group, lambda row: row.source):
+            columns = zip(*(row.entries for row in rivals), strict=True)
+            best = [_best(column) for column in columns]
+            for row in rivals:
+                entries = zip(row.entries, best, strict=True)
+                cells = [replace(entry, best=entry.percent in rates) for entry, rates in entries]
+                yield replace(row, cells=cells)
 
 
-def _with_best(rivals: Sequence[Entry]) -> list[Entry]:
+def _best(rivals: Sequence[Entry]) -> set[Decimal | None]:
+    """Return the best rate, if there is one."""
     rates = {entry.percent for entry in rivals if entry.percent is not None}
     is_fair = len(rates) > 1 and not any(entry.marks for entry in rivals)
-    return [replace(one, best=is_fair and one.percent == max(rates)) for one in rivals]
+    return {max(rates)} if is_fair else set()

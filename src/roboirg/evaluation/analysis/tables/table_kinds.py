@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from roboirg.core.instruction_options import ALL_STAGES, InstructionOptions
 from roboirg.evaluation.analysis.published import AVERAGE, RateTable, published_tasks
+from roboirg.evaluation.analysis.results.frame import RunNames
 from roboirg.evaluation.analysis.results.option_labels import (
     has_default_options,
     is_usual,
@@ -26,7 +27,8 @@ TWIN_MARK = " (twin)"
 
 
 def row_order(options: InstructionOptions) -> tuple[object, ...]:
-    stages, language = options.stages, options.language
+    stages = options.stages
+    language = options.language
     return (*setting_sort_key(options.setting), len(stages), stages, language)
 
 
@@ -76,18 +78,14 @@ class PaperTable:
             suites: dict[str, list[str]] = {}
             for task in tasks:
                 suites.setdefault(all_tasks()[task].suite.capitalize(), []).append(task)
-            columns = [
-                column
-                for suite, own in suites.items()
-                for column in (
-                    *(Column(name, suite) for name in own),
-                    Column(f"{suite} {AVERAGE}", suite, tuple(own)),
-                )
-            ]
+            columns = []
+            for suite, own in suites.items():
+                columns += [Column(name, suite) for name in own]
+                columns.append(Column(f"{suite} {AVERAGE}", suite, tuple(own)))
         return (*columns, Column(AVERAGE, averages=tuple(tasks)))
 
     def positions(
-        self, cells: Cells, names: Mapping[PolicyRun, str]
+        self, cells: Cells, names: RunNames
     ) -> Iterator[tuple[PolicyRun, InstructionOptions, str]]:
         """Yield policy run, options and label of the policy of each row."""
         tasks = set(self.tasks(cells))

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.evaluation.analysis.comparability import AllDifferences, comparison_notes
 from roboirg.evaluation.analysis.published import NOTES
-from roboirg.evaluation.analysis.results.frame import Frame
+from roboirg.evaluation.analysis.results.frame import Frame, RunNames
 from roboirg.evaluation.analysis.results.option_labels import (
     is_usual,
     options_label,
     options_sort_key,
 )
-from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun
+from roboirg.evaluation.analysis.results.policy_run import EvalConditions
 from roboirg.evaluation.analysis.stats.cells import Cells, Counts
 from roboirg.evaluation.analysis.stats.chance import unmeasured_note
 from roboirg.evaluation.analysis.stats.headline import headline_notes
@@ -49,9 +49,9 @@ def notes_of(
     columns: Sequence[Column],
     rows: Sequence[Row],
     cells: Cells,
-    names: Mapping[PolicyRun, str],
+    names: RunNames,
     differences: AllDifferences,
-    floors: Sequence[str] = (),
+    floors: Sequence[str],
 ) -> tuple[str, ...]:
     """Return the notes of a table of rates, for which some floors are asked for."""
     tasks = columns[-1].averages
@@ -75,7 +75,7 @@ def notes_of(
         _absent_tasks({key.task for key in shown}),
         _TWIN_NOTE * any(row.name.endswith(TWIN_MARK) for row in rows),
         _FLOORS_NOTE * ("chance" in sources),
-        unmeasured_note(floors, [one.language for one in policy_runs if one.versions]),
+        unmeasured_note(floors, [one.language for one in policy_runs if one.language]),
         *(NOTES[table.of_paper] if table.of_paper and "published" in sources else ()),
         *comparison_notes(compared, names),
         *_average_notes(columns, rows),
@@ -110,24 +110,18 @@ def range_text(counts: Sequence[int], noun: str) -> str:
     return f"{low} to " * (low < high) + counted(high, noun)
 
 
-def _sign_notes(table: PaperTable, entries: Sequence[Entry]) -> list[str]:
-    reference = "the shortest context" if table.is_by_stages else "explicit"
-    whose = "policy in a setting" if table.name == "planner" else "of its group"
-    signs = (
-        (
-            any(entry.change is not None for entry in entries),
-            (
-                f"↑ above, ↓ below, → equal to {reference} of the same policy, by how many points, "
-                "as printed, on the same tasks; an arrow does not imply a significant difference."
-            ),
-        ),
-        (any(entry.best for entry in entries), f"Bold: the best {whose}."),
-        (
-            any(not entry.applies for entry in entries),
-            f"{NOT_APPLICABLE} the setting is not defined for the task.",
-        ),
-    )
-    return [text for occurs, text in signs if occurs]
+def _sign_notes(table: PaperTable, entries: Sequence[Entry]) -> Iterator[str]:
+    if any(entry.change is not None for entry in entries):
+        reference = "the shortest context" if table.is_by_stages else "explicit"
+        yield (
+            f"↑ above, ↓ below, → equal to {reference} of the same policy, by how many points, "
+            "as printed, on the same tasks; an arrow does not imply a significant difference."
+        )
+    if any(entry.best for entry in entries):
+        whose = "policy in a setting" if table.name == "planner" else "of its group"
+        yield f"Bold: the best {whose}."
+    if any(not entry.applies for entry in entries):
+        yield f"{NOT_APPLICABLE} the setting is not defined for the task."
 
 
 def _sizes(judged: Sequence[Counts]) -> str:
@@ -141,33 +135,23 @@ def _sizes(judged: Sequence[Counts]) -> str:
     return f"{episodes} and {trials} per cell: several policy seeds."
 
 
-def _incomplete_notes(counts: Sequence[Counts], entries: Sequence[Entry]) -> list[str]:
-    errors, missing = sum(one.errors for one in counts), sum(one.missing for one in counts)
-    signs = (
-        (
-            errors,
-            (
-                f"{ERROR_MARK} {counted(errors, 'trial')} ended in an error and "
-                f"{verb_for(errors, 'are')} left out of the rates."
-            ),
-        ),
-        (
-            missing,
-            (
-                f"{MISSING_MARK} {counted(missing, 'trial')} of the plan "
-                f"{verb_for(missing, 'are')} still to be played."
-            ),
-        ),
-        (
-            any(PARTIAL_MARK in entry.marks for entry in entries),
-            f"{PARTIAL_MARK} a partial average: a task is incomplete or was not played.",
-        ),
-        (
-            errors or missing,
-            "Incomplete entries have no arrow, and their columns no best entry.",
-        ),
-    )
-    return [text for occurs, text in signs if occurs]
+def _incomplete_notes(counts: Sequence[Counts], entries: Sequence[Entry]) -> Iterator[str]:
+    errors = sum(one.errors for one in counts)
+    missing = sum(one.missing for one in counts)
+    if errors:
+        yield (
+            f"{ERROR_MARK} {counted(errors, 'trial')} ended in an error and "
+            f"{verb_for(errors, 'are')} left out of the rates."
+        )
+    if missing:
+        yield (
+            f"{MISSING_MARK} {counted(missing, 'trial')} of the plan "
+            f"{verb_for(missing, 'are')} still to be played."
+        )
+    if any(PARTIAL_MARK in entry.marks for entry in entries):
+        yield f"{PARTIAL_MARK} a partial average: a task is incomplete or was not played."
+    if errors or missing:
+        yield "Incomplete entries have no arrow, and their columns no best entry."
 
 
 def _omission_notes(table: PaperTable, cells: Cells, tasks: Sequence[str]) -> Iterator[str]:
@@ -190,7 +174,11 @@ def _absent_tasks(names: set[str]) -> str:
 
 def _average_notes(columns: Sequence[Column], rows: Sequence[Row]) -> Iterator[str]:
     """Say which changes of averages are over fewer tasks than the reference's own average."""
-    own = [index for index, column in enumerate(columns) if not column.averages]
+    own = [
+        index
+        for index, column in enumerate(columns)
+        if not column.averages and any(row.entries[index].percent is not None for row in rows)
+    ]
     fewer = {row.group: sum(row.entries[index].applies for index in own) for row in rows}
     for group, number in fewer.items():
         if 0 < number < len(own):

@@ -25,7 +25,7 @@ from pydantic import Field
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.policies.contract.base import SubgoalFollower
-from roboirg.policies.contract.option_checking import Seconds
+from roboirg.policies.contract.option_checking import NOT_COMPARED, Seconds
 from roboirg.policies.remote.endpoints import MIB, RemoteOptions
 from roboirg.policies.remote.protocols import Protocol
 from roboirg.policies.remote.remote_policy import RemotePolicy
@@ -54,11 +54,11 @@ class MmeVlaOptions(RemoteOptions):
         part: frames per message.
     """
 
-    timeout: Seconds = Field(600.0, gt=0)
+    timeout: Seconds = Field(600.0, gt=0, exclude=NOT_COMPARED)
     execute: int = Field(EXECUTED, ge=1)
     history: bool = True
     subgoals: SubgoalField = "grounded"
-    part: int = Field(EXECUTED, ge=1)
+    part: int = Field(EXECUTED, ge=1, exclude=NOT_COMPARED)
 
 
 class MmeVlaPolicy(RemotePolicy):

@@ -16,6 +16,7 @@ from pydantic import Field
 
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.policies.contract.base import close_policy
+from roboirg.policies.contract.option_checking import NOT_COMPARED
 from roboirg.policies.remote.endpoints import MIB, ActionSpaceName, RemoteOptions
 from roboirg.policies.remote.protocols import Protocol
 from roboirg.policies.remote.remote_policy import RemotePolicy
@@ -34,7 +35,7 @@ class OpenpiOptions(RemoteOptions):
         prompt: key of the instruction.
     """
 
-    shared: bool = True
+    shared: bool = Field(True, exclude=NOT_COMPARED)
     execute: int | None = Field(None, ge=1)
     actions: ActionSpaceName = "joint_angle"
     front: str = "observation/image"

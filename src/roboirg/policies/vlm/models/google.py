@@ -9,9 +9,10 @@ from typing import Any
 from urllib.parse import quote
 
 from roboirg.policies.vlm.model_content import Part
-from roboirg.policies.vlm.models.http_model import HttpModel, given
+from roboirg.policies.vlm.models.http_model import HttpModel, given, reported_count
 from roboirg.policies.vlm.models.model import ModelQuery, ModelReply
 from roboirg.util.media import Picture, encode_png
+from roboirg.util.reply_reading import with_thoughts
 
 
 class GoogleModel(HttpModel):
@@ -48,13 +49,17 @@ class GoogleModel(HttpModel):
         return f"{url}:generateContent", headers, json.dumps(body).encode()
 
     def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
-        """Return the text of the first candidate; thoughts are left out but counted as output."""
+        """Return the text of the first candidate and its thoughts, which count as output."""
         first = (reply.get("candidates") or [{}])[0]
         parts = first.get("content", {}).get("parts", [])
-        text = "".join(part.get("text", "") for part in parts if not part.get("thought"))
-        usage = reply.get("usageMetadata", {})
-        output = usage.get("candidatesTokenCount", 0) + usage.get("thoughtsTokenCount", 0)
-        return ModelReply(text, usage.get("promptTokenCount", 0), output)
+        answer = "".join(part.get("text", "") for part in parts if not part.get("thought"))
+        thoughts = [part for part in parts if part.get("thought")]
+        # The service leaves out what is 0.
+        usage = reply.get("usageMetadata")
+        output_tokens = reported_count(usage, "candidatesTokenCount", absent=0)
+        output_tokens += reported_count(usage, "thoughtsTokenCount", absent=0)
+        text = with_thoughts(answer, thoughts)
+        return ModelReply(text, reported_count(usage, "promptTokenCount"), output_tokens)
 
     def _part(self, part: Part) -> dict[str, Any]:
         if isinstance(part, str):

@@ -17,10 +17,12 @@ from roboirg.core.errors import (
     PolicyConnectionError,
     PolicyReplyError,
     PolicyTimeoutError,
+    UnknownCostError,
 )
 from roboirg.core.extras import extra_needed
+from roboirg.core.handed_keys import without_keys
 from roboirg.core.waiting import waiting
-from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
+from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply, tokens_of
 from roboirg.util.proxies import proxy_of
 
 with extra_needed("Models need httpx", "vlm"):
@@ -65,9 +67,9 @@ class HttpModel(ABC):
 
     @abstractmethod
     def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
-        """Return the text and the tokens of a reply in JSON.
+        """Return a reply in JSON as ours; token counts that cannot be are unknown.
 
-        It may raise any error of a missing or wrong value.
+        It may raise any error of a missing or wrong text.
         """
 
     def answer(self, query: ModelQuery) -> ModelReply:
@@ -85,8 +87,8 @@ class HttpModel(ABC):
                 ).start()
                 response, content = found.result(timeout=self.options.timeout_s)
             if response.status_code == HTTPStatus.OK:
-                text, *tokens = self.read(json.loads(content))
-                return ModelReply(str(text), *map(int, tokens))
+                reply = self.read(json.loads(content))
+                return reply._replace(text=without_keys(reply.text))
         except (TimeoutError, httpx.TimeoutException):
             raise PolicyTimeoutError(
                 f"{self._name} did not answer within {self.options.timeout_s:g} s; raise "
@@ -97,7 +99,7 @@ class HttpModel(ABC):
                 f"{self._name} cannot be reached ({type(error).__name__}: {self._quote(error)})."
             ) from None
         except MALFORMED as error:
-            raise PolicyReplyError(
+            raise UnknownCostError(
                 f"{self._name} replied with something else ({type(error).__name__}: "
                 f"{self._quote(error)})."
             ) from None
@@ -130,12 +132,25 @@ class HttpModel(ABC):
             found.set_exception(error)
 
     def _quote(self, words: object) -> str:
-        return " ".join(str(words).replace(self.key, "…").split())[:MAX_ERROR_LENGTH]
+        return " ".join(without_keys(str(words)).split())[:MAX_ERROR_LENGTH]
 
 
 def given(**entries: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
     """Return the entries that are not None."""
     return {name: value for name, value in entries.items() if value is not None}
+
+
+def reported_count(usage: object, name: str, absent: int | None = None) -> float:
+    """Return a count of tokens from what a service reports; NaN if it is unknown.
+
+    Args:
+        usage: the counts by name, or anything else.
+        name: of the count.
+        absent: the count if there is none of that name.
+    """
+    if not isinstance(usage, dict):
+        return math.nan
+    return tokens_of(usage.get(name, absent))
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from typing import Any, Literal, NamedTuple, Protocol
@@ -11,8 +12,10 @@ from urllib.parse import urlsplit
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from roboirg.core.errors import MissingDependencyError
-from roboirg.policies.contract.option_checking import Seconds
+from roboirg.core.handed_keys import remember_key
+from roboirg.policies.contract.option_checking import NOT_COMPARED, Seconds
 from roboirg.policies.vlm.model_content import ChatTurn
+from roboirg.util.reply_reading import whole_number
 from roboirg.util.short_hash import short_hash
 
 Provider = Literal["openai", "google"]
@@ -21,6 +24,8 @@ KEY_VARIABLES: Mapping[Provider, str] = {"openai": "OPENAI_API_KEY", "google": "
 """Environment variables with the keys of the providers' own services, by default."""
 NO_KEY = "none"
 """Sent as the key to a server that needs none."""
+MOST_TOKENS = 100_000_000
+"""Of one query or reply: ten times the longest context of a model, ten million tokens."""
 
 
 class ModelOptions(BaseModel):
@@ -46,20 +51,20 @@ class ModelOptions(BaseModel):
         sampling_fps: frames per second at which Google samples a clip; None for its default, 1.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     provider: Provider = "openai"
     model: str = Field(min_length=1)
-    base_url: str | None = None
-    api_key_env: str | None = None
-    timeout_s: Seconds = Field(default=120.0, gt=0)
-    retries: int = Field(default=2, ge=0, le=10)
-    patience_s: Seconds = Field(default=300.0, ge=0)
-    requests_per_minute: float | None = Field(default=None, ge=0.001)
+    base_url: str | None = Field(default=None, exclude=NOT_COMPARED)
+    api_key_env: str | None = Field(default=None, exclude=NOT_COMPARED)
+    timeout_s: Seconds = Field(default=120.0, gt=0, exclude=NOT_COMPARED)
+    retries: int = Field(default=2, ge=0, le=10, exclude=NOT_COMPARED)
+    patience_s: Seconds = Field(default=300.0, ge=0, exclude=NOT_COMPARED)
+    requests_per_minute: float | None = Field(default=None, ge=0.001, exclude=NOT_COMPARED)
     temperature: float | None = Field(default=0.0, ge=0)
     max_output_tokens: int | None = Field(default=None, ge=1)
-    input_price: float | None = Field(default=None, ge=0)
-    output_price: float | None = Field(default=None, ge=0)
+    input_price: float | None = Field(default=None, ge=0, exclude=NOT_COMPARED)
+    output_price: float | None = Field(default=None, ge=0, exclude=NOT_COMPARED)
     video: Literal["frames", "mp4"] = "frames"
     clip_frames: int = Field(default=16, ge=1)
     structured: bool = True
@@ -78,6 +83,15 @@ class ModelOptions(BaseModel):
             )
         return url
 
+    def model_post_init(self, _context: object) -> None:
+        """Remember the key, if there is one, before stored replies are read."""
+        remember_key(os.environ.get(self.key_variable or ""))
+
+    @property
+    def key_variable(self) -> str | None:
+        """The environment variable with the key; None if none is needed."""
+        return self.api_key_env or (None if self.base_url else KEY_VARIABLES.get(self.provider))
+
     def key(self) -> str:
         """Return the key, or `NO_KEY` if none is needed.
 
@@ -85,7 +99,7 @@ class ModelOptions(BaseModel):
             MissingDependencyError: the environment variable is not set; a run stops, as it could
                 play no episode.
         """
-        variable = self.api_key_env or (None if self.base_url else KEY_VARIABLES[self.provider])
+        variable = self.key_variable
         if variable is None:
             return NO_KEY
         key = os.environ.get(variable, "").strip()
@@ -102,16 +116,7 @@ class ModelOptions(BaseModel):
 
     def about(self) -> dict[str, str | float | int | bool | None]:
         """Return, for records, the address and all that may change a reply; never a key."""
-        return {
-            **self.model_dump(
-                mode="json",
-                exclude={
-                    *("base_url", "api_key_env", "timeout_s", "retries", "patience_s"),
-                    *("requests_per_minute", "input_price", "output_price"),
-                },
-            ),
-            "address": self.address(),
-        }
+        return {**self.model_dump(mode="json"), "address": self.address()}
 
     @property
     def has_prices(self) -> bool:
@@ -119,9 +124,9 @@ class ModelOptions(BaseModel):
         return (self.input_price, self.output_price) != (None, None)
 
     def cost_usd(self, reply: ModelReply) -> float:
-        """Return what a reply costs; 0 without prices."""
+        """Return what a reply costs: 0 without prices, NaN if tokens with a price are unknown."""
         paid = ((reply.input_tokens, self.input_price), (reply.output_tokens, self.output_price))
-        return sum(tokens * (price or 0.0) for tokens, price in paid) / 1_000_000
+        return sum(tokens * price for tokens, price in paid if price) / 1_000_000
 
 
 class ModelQuery(NamedTuple):
@@ -139,11 +144,28 @@ class ModelQuery(NamedTuple):
 
 
 class ModelReply(NamedTuple):
-    """A model's reply, possibly empty, and its tokens."""
+    """A model's reply.
+
+    Attributes:
+        text: what it said, possibly nothing; thoughts may be in it as `with_thoughts` marks them.
+        input_tokens: of the query; NaN if it is unknown.
+        output_tokens: of the reply and its thoughts; NaN if it is unknown.
+    """
 
     text: str
-    input_tokens: int = 0
-    output_tokens: int = 0
+    input_tokens: float = math.nan
+    output_tokens: float = math.nan
+
+
+def tokens_of(count: object) -> float:
+    """Return a number of tokens as a service reports it; NaN, which is unknown, if it is none.
+
+    Such a number is whole and at most `MOST_TOKENS`.
+    """
+    number = whole_number(count)
+    if number is None or not 0 <= number <= MOST_TOKENS:
+        return math.nan
+    return number
 
 
 class Model(Protocol):
@@ -155,7 +177,8 @@ class Model(Protocol):
         Raises:
             PolicyConnectionError: the service cannot be reached or is overloaded.
             PolicyTimeoutError: there was no reply in time.
-            PolicyReplyError: the service replied with an error or with something else.
+            PolicyReplyError: the service replied with an error.
+            UnknownCostError: it replied with something else.
         """
 
 

@@ -8,9 +8,13 @@ from collections.abc import Iterator
 from typing import Any
 
 from roboirg.policies.vlm.model_content import ChatTurn, Part
-from roboirg.policies.vlm.models.http_model import HttpModel, given
+from roboirg.policies.vlm.models.http_model import HttpModel, given, reported_count
 from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
 from roboirg.util.media import Picture, encode_png, sample_evenly
+from roboirg.util.reply_reading import with_thoughts
+
+_ANSWERS = frozenset({"text", "output_text"})
+"""Types of parts that are answers; all others are thoughts, or nothing that can be read."""
 
 
 class OpenAIModel(HttpModel):
@@ -34,11 +38,22 @@ class OpenAIModel(HttpModel):
         return url, {"Authorization": f"Bearer {self.key}"}, text.encode()
 
     def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
-        """Return the text of the first choice."""
-        text, usage = reply["choices"][0]["message"].get("content"), reply.get("usage")
-        if usage is None:
-            return ModelReply(text or "")
-        return ModelReply(text or "", usage["prompt_tokens"], usage["completion_tokens"])
+        """Return the text of the first choice, which may come in parts, and its thoughts."""
+        message = reply["choices"][0]["message"]
+        parts = message.get("content") or ""
+        if isinstance(parts, str):
+            parts = [{"type": "text", "text": parts}]
+        answer = "".join(part["text"] for part in parts if part["type"] in _ANSWERS)
+        thoughts = [part for part in parts if part["type"] not in _ANSWERS]
+        said_apart = message.get("reasoning_content") or message.get("reasoning")
+        if said_apart:
+            thoughts.append(said_apart)
+        usage = reply.get("usage")
+        return ModelReply(
+            with_thoughts(answer, thoughts),
+            reported_count(usage, "prompt_tokens"),
+            reported_count(usage, "completion_tokens"),
+        )
 
 
 def chat_messages(query: ModelQuery, options: ModelOptions) -> list[dict[str, Any]]:

@@ -11,6 +11,7 @@ import contextlib
 import functools
 import hashlib
 import json
+import math
 import sqlite3
 import time
 from collections.abc import Iterator
@@ -20,8 +21,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.core.errors import BudgetError
+from roboirg.core.handed_keys import without_keys
+from roboirg.core.plain_text import counted
 from roboirg.core.waiting import waiting
-from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
+from roboirg.policies.vlm.models.model import (
+    MOST_TOKENS,
+    ModelOptions,
+    ModelQuery,
+    ModelReply,
+    tokens_of,
+)
 from roboirg.util.media import Clip, Picture
 
 REPLIES_FILE = "models.sqlite"
@@ -34,6 +43,15 @@ CREATE TABLE IF NOT EXISTS replies (
     PRIMARY KEY (episode, call, sent)
 ) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS services (name TEXT PRIMARY KEY, next_at REAL) WITHOUT ROWID;
+"""
+
+_REPLIES = """
+SELECT sent, text, input_tokens, output_tokens
+FROM replies WHERE episode = ? AND call = ? AND sent NOT LIKE 'unread %'
+"""
+# Older stores may hold costs that cannot be, which are unknown.
+_SPENT = """
+SELECT total(cost_usd), count(*) - count(CASE WHEN cost_usd >= 0 THEN 1 END) FROM replies
 """
 
 _POSTPONE = """
@@ -91,29 +109,38 @@ class ReplyStore:
     def replies(self) -> dict[str, ModelReply]:
         """Return the stored replies to the next call, by the digest of what was sent.
 
-        There are none in a run that passes them over.
+        There are none in a run that passes them over. Earlier versions stored keys in them, and
+        counts that cannot be.
         """
         if self.settings.anew:
             return {}
-        rows = self._database.execute(
-            "SELECT sent, text, input_tokens, output_tokens FROM replies "
-            "WHERE episode = ? AND call = ?",
-            (self.episode, self.calls),
-        )
-        return {sent: ModelReply(*reply) for sent, *reply in rows}
+        rows = self._database.execute(_REPLIES, (self.episode, self.calls))
+        replies: dict[str, ModelReply] = {}
+        for sent, text, input_tokens, output_tokens in rows:
+            replies[sent] = ModelReply(
+                without_keys(text), tokens_of(input_tokens), tokens_of(output_tokens)
+            )
+        return replies
 
     def keep(self, sent: str, reply: ModelReply, cost_usd: float) -> None:
-        """Store the reply to the next call; when this returns, it is on disk."""
+        """Store the reply to the next call; when this returns, it is on disk.
+
+        SQLite stores NULL for NaN, which is unknown.
+        """
         self._database.execute(
             "INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?, ?, ?, ?)",
             (self.episode, self.calls, sent, *reply, cost_usd),
         )
 
+    def keep_unread(self) -> None:
+        """Store that a reply to the next call could not be read: what it cost is unknown."""
+        self.keep(f"unread {time.time()}", ModelReply(""), math.nan)
+
     def check_budget(self, model: ModelOptions) -> None:
         """Raise if the run may not ask a model.
 
         Raises:
-            BudgetError: it has spent what it may, or what the model costs is not known.
+            BudgetError: it has spent what it may, or what the model costs or has cost is unknown.
         """
         most = self.settings.max_cost_usd
         if most is None:
@@ -123,7 +150,14 @@ class ReplyStore:
                 f"--max-cost needs the prices of model {model.model!r}; give input_price and "
                 "output_price, in US dollars per million tokens."
             )
-        spent = float(self._database.execute("SELECT total(cost_usd) FROM replies").fetchone()[0])
+        spent, unknown = self._database.execute(_SPENT).fetchone()
+        if unknown:
+            raise BudgetError(
+                f"--max-cost cannot be kept: what {counted(unknown, 'reply', 'replies')} cost is "
+                f"unknown, as the service of model {model.model!r} did not report its tokens in "
+                f"whole numbers from 0 to {MOST_TOKENS:,}; run the same command without --max-cost "
+                "to go on."
+            )
         if spent >= most:
             raise BudgetError(
                 f"The models have cost {spent:.2f} of at most {most:.2f} US dollars; run the same "

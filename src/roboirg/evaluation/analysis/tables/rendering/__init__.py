@@ -10,7 +10,6 @@ from roboirg.evaluation.analysis.tables.rendering.csv_lines import csv_text, jso
 from roboirg.evaluation.analysis.tables.rendering.latex import latex
 from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
 from roboirg.evaluation.analysis.tables.rendering.terminal import plain
-from roboirg.evaluation.analysis.tables.table import Table
 
 
 class Format(NamedTuple):
@@ -18,19 +17,22 @@ class Format(NamedTuple):
 
     Attributes:
         suffix: of files in the format.
-        draw: returns a table as text that ends in a newline.
+        draw: returns a table as text that ends in a newline; of a format for programs, several
+            tables as one document.
+        is_for_programs: whether its texts have no notes.
     """
 
     suffix: str
-    draw: Callable[[Table], str]
+    draw: Callable[..., str]
+    is_for_programs: bool = False
 
 
 FORMATS: Mapping[str, Format] = {
     "terminal": Format(".txt", plain),
     "markdown": Format(".md", markdown),
     "latex": Format(".tex", latex),
-    "csv": Format(".csv", csv_text),
-    "json": Format(".json", json_text),
+    "csv": Format(".csv", csv_text, is_for_programs=True),
+    "json": Format(".json", json_text, is_for_programs=True),
 }
 
 

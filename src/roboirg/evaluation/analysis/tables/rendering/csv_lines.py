@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
+from collections.abc import Sequence
 
 from roboirg.evaluation.analysis.tables.table import (
     ERROR_MARK,
@@ -15,6 +14,7 @@ from roboirg.evaluation.analysis.tables.table import (
     Row,
     Table,
 )
+from roboirg.util.csv_text import csv_lines
 
 HEAD = (
     "table",
@@ -44,21 +44,28 @@ HEAD = (
 _MARK_NAMES = {ERROR_MARK: "errors", MISSING_MARK: "missing", PARTIAL_MARK: "partial"}
 
 
-def csv_text(table: Table) -> str:
-    """Return every entry of a table with its counts and the interval of its rate."""
-    file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
-    writer.writerow(HEAD)
-    for row in table.rows:
-        for column, entry in zip(table.columns, row.entries, strict=True):
-            writer.writerow(_line(table, row, column, entry))
-    return file.getvalue()
+_ASCII = str.maketrans({"−": "-", "±": None})
+"""For programs, which read −0.5 and ±0.0 as no numbers."""
 
 
-def json_text(table: Table) -> str:
-    """Return a list with an object for each row: what is printed, by heading."""
-    rows = [(*table.labels(row), *(entry.text for entry in row.entries)) for row in table.rows]
-    found = [dict(zip(table.headings, row, strict=True)) for row in rows]
+def csv_text(*tables: Table) -> str:
+    """Return every entry of some tables with its counts and the interval of its rate."""
+    lines: list[Sequence[object]] = [HEAD]
+    for table in tables:
+        for row in table.rows:
+            for column, entry in zip(table.columns, row.entries, strict=True):
+                lines.append(_line(table, row, column, entry))
+    return csv_lines(lines)
+
+
+def json_text(*tables: Table) -> str:
+    """Return a list with an object for each row: its table, and what is printed, by heading."""
+    found = []
+    for table in tables:
+        for row in table.rows:
+            entries = (entry.text.translate(_ASCII) for entry in row.entries)
+            texts = (*table.labels(row), *entries)
+            found.append({"table": table.key, **dict(zip(table.headings, texts, strict=True))})
     return json.dumps(found, ensure_ascii=False, indent=1) + "\n"
 
 
@@ -72,7 +79,7 @@ def _line(table: Table, row: Row, column: Column, entry: Entry) -> list[object]:
         column.name,
         _flag(bool(column.averages)),
         "" if entry.percent is None else entry.percent,
-        entry.word,
+        entry.word.translate(_ASCII),
         _flag(entry.applies),
         "" if entry.change is None else entry.change,
         _flag(entry.best),

@@ -99,11 +99,12 @@ def _blocks(table: Table) -> Iterator[list[Row]]:
     most = _LINES // max([1 + len(row.name) // _NAME for row in table.rows], default=1)
     block: list[Row] = []
     for group in table.groups():
-        for piece in (group[at : at + most] for at in range(0, len(group), most)):
+        for at in range(0, len(group), most):
+            piece = group[at : at + most]
             if block and len(block) + len(piece) > most:
                 yield block
                 block = []
-            block = [*block, *piece]
+            block += piece
     yield block
 
 
@@ -111,9 +112,9 @@ def _float(table: Table, indices: list[int], number: int, count: int) -> str:
     columns = [table.columns[index] for index in indices]
     heads = [*map(escaped, table.heads[1:])]
     is_long = any(len(row.name) > _NAME for row in table.rows)
-    names = (
-        [_FOLDED.format(_NAME / 2)] if is_long else ["l"] if len(heads) == 1 else "c" * len(heads)
-    )
+    names = "l" if len(heads) == 1 else "c" * len(heads)
+    if is_long:
+        names = _FOLDED.format(_NAME / 2)
     sides = [_FOLDED.format(30) if column.is_text else "r" for column in columns]
     lines = _column_groups(columns, len(heads))
     lines.append(_line([*heads, *(_head(column.name) for column in columns)]))
@@ -126,7 +127,7 @@ def _float(table: Table, indices: list[int], number: int, count: int) -> str:
     return _FLOAT.format(
         caption=escaped(table.title) + (f" ({number} of {count})" if count > 1 else ""),
         label=table.key + (f"-{number}" if number > 1 else ""),
-        columns="".join([*names, *sides]),
+        columns=names + "".join(sides),
         lines="\n".join(lines),
         notes=" ".join(map(_foldable, table.notes)) if number == count else "",
     )
@@ -135,7 +136,9 @@ def _float(table: Table, indices: list[int], number: int, count: int) -> str:
 def _column_groups(columns: Sequence[Column], names: int) -> list[str]:
     if not any(column.group for column in columns):
         return []
-    cells, rules, place = [""] * names, "", names + 1
+    cells = [""] * names
+    rules = ""
+    place = names + 1
     for name, members in itertools.groupby(column.group for column in columns):
         width = len(list(members))
         cells.append(rf"\multicolumn{{{width}}}{{c}}{{{escaped(name)}}}")

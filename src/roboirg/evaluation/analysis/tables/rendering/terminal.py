@@ -32,10 +32,10 @@ def renderable(table: Table, console: Console) -> RenderableType:
     parts = split_columns(table, shown, line_width(console) - names)
     grids = [_grid(table, indices) for indices in parts]
     widen(console, *grids)
-    titled = zip([Text(one, "bold") for one in _titles(table, parts)], grids, strict=True)
-    return Group(
-        *(line for part in titled for line in part), *(Text(note, "dim") for note in table.notes)
-    )
+    lines: list[RenderableType] = []
+    for title, grid in zip(_titles(table, parts), grids, strict=True):
+        lines += [Text(title, "bold"), grid]
+    return Group(*lines, *(Text(note, "dim") for note in table.notes))
 
 
 def print_tables(tables: Iterable[Table], console: Console) -> None:

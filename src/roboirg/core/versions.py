@@ -1,0 +1,72 @@
+"""What a result depends on and a later one may not share, and in what two results differ."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+NO_VERSION = "none"
+"""Of a server that reported none, and without a server."""
+
+Makeup = tuple[tuple[str, str], ...]
+"""What a policy is besides its version, wherever it is: what makes it, under `POLICY`, then the
+options that change what it sees or does, but not those with their defaults. Empty if unknown."""
+
+POLICY = "policy"
+_DEFAULT = "at its default"
+
+
+class Mismatch(NamedTuple):
+    """A version, an option, or the policy itself, that two do not share, with the value of each."""
+
+    what: str
+    first: object
+    second: object
+
+    @property
+    def label(self) -> str:
+        """The first value for a table, with the name of what it is."""
+        if self.what == POLICY:
+            return str(self.first)
+        return f"{self.what.removeprefix('option ').removesuffix(' version')} {self.first}"
+
+
+class Versions(NamedTuple):
+    """What a result depends on; None for what is not known or not to be compared.
+
+    Attributes:
+        makeup: what the policy is.
+        environment_version: of scenes, rules and physics.
+        language_version: of the words.
+        policy_version: distinguishes it from an earlier policy of the same name.
+        server_version: that the policy's server reported, or `NO_VERSION`.
+        seed: of the scene.
+    """
+
+    makeup: Makeup = ()
+    environment_version: int | None = None
+    language_version: str | None = None
+    policy_version: str | None = None
+    server_version: str | None = None
+    seed: int | None = None
+
+    def differences(self, other: Versions) -> list[Mismatch]:
+        """Return all in which two differ, in the order of the fields."""
+        if self == other:
+            return []
+        first, second = dict(self.makeup), dict(other.makeup)
+        maker = Mismatch(POLICY, first.pop(POLICY, None), second.pop(POLICY, None))
+        found = [maker]
+        if maker.first == maker.second:
+            for name in sorted(first | second):
+                what = f"option {name}"
+                found.append(Mismatch(what, first.get(name, _DEFAULT), second.get(name, _DEFAULT)))
+        for field in self._fields[1:]:
+            what = field.replace("_", " ")
+            found.append(Mismatch(what, getattr(self, field), getattr(other, field)))
+        return [pair for pair in found if pair.first != pair.second and None not in pair]
+
+
+def makeup_text(makeup: Makeup) -> str | None:
+    """Return what makes a policy, with its options; None if it is not known."""
+    words = [value if name == POLICY else f"{name}={value}" for name, value in makeup]
+    return " ".join(words) or None

@@ -1,0 +1,223 @@
+"""What holds of every number that any table, page or call gives: whose rate, and its interval."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from flat_jobs import make_result
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import roboirg
+from roboirg.core.errors import InvalidValueError
+from roboirg.evaluation.analysis.page.matrix import notes as cell_notes
+from roboirg.evaluation.analysis.results.frame import Frame, make_frame
+from roboirg.evaluation.analysis.stats.arm_figures import arm_figures
+from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS, break_down
+from roboirg.evaluation.analysis.stats.comparison import compare
+from roboirg.evaluation.analysis.stats.comparison_text import sentences
+from roboirg.evaluation.analysis.stats.failure_rates import measure_ends
+from roboirg.evaluation.analysis.stats.headline import measure_headline
+from roboirg.evaluation.analysis.stats.intervals import TOO_FEW, Interval
+from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, KEPT_APART, Measured
+from roboirg.evaluation.analysis.stats.run_data import RunData
+from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
+from roboirg.evaluation.analysis.tables.diagnostic_tables import (
+    make_breakdown_table,
+    make_failure_table,
+    make_forms_table,
+    make_heard_table,
+)
+from roboirg.evaluation.analysis.tables.paper_tables import make_table
+from roboirg.evaluation.analysis.tables.run_tables import make_run_tables
+from roboirg.evaluation.analysis.tables.table import Table
+from roboirg.evaluation.api.results import Results
+from roboirg.evaluation.records.record import Summary
+
+TASKS = ("PickXtimes", "BinFill")
+
+
+class Words(NamedTuple):
+    """What no rate is over two of, unless it is asked for."""
+
+    policy: str
+    policy_version: str
+    setting: str
+    form: str
+    delivery: str
+    arm: str
+    wordings: str | None
+    split: str
+    max_steps: int
+    language_version: str
+    environment_version: int
+
+
+WORDS = st.builds(
+    Words,
+    policy=st.sampled_from(["one", "other"]),
+    policy_version=st.sampled_from(["a", "b"]),
+    setting=st.sampled_from(["explicit", "direct"]),
+    form=st.sampled_from(["implicit", "resolved"]),
+    delivery=st.sampled_from(["prompt", "turns"]),
+    arm=st.sampled_from(["told", "silent", "silent-empty", "scrambled"]),
+    wordings=st.sampled_from([None, "test"]),
+    split=st.sampled_from(["test", "val"]),
+    max_steps=st.sampled_from([40, 1300]),
+    language_version=st.sampled_from(["1", "2"]),
+    environment_version=st.sampled_from([1, 2]),
+)
+PLAIN = Words("one", "a", "direct", "implicit", "prompt", "told", None, "test", 40, "1", 1)
+
+
+@st.composite
+def alike(draw: st.DrawFn) -> list[Words]:
+    """Words that differ from others in one or two things, so that they could be taken together."""
+    found = [draw(st.sampled_from([PLAIN, PLAIN._replace(setting="explicit")]))]
+    for other in draw(st.lists(WORDS, min_size=1, max_size=5)):
+        changed = draw(st.lists(st.sampled_from(Words._fields), min_size=1, max_size=2))
+        found.append(found[-1]._replace(**{name: getattr(other, name) for name in changed}))
+    return list(dict.fromkeys(found))
+
+
+def numbers(table: Table, *names: str) -> Iterator[float]:
+    """Yield the numbers of a table in some columns, or in all, without what is behind them."""
+    for row in table.rows:
+        for column, entry in zip(table.columns, row.entries, strict=True):
+            word = entry.text.split(" ")[0].replace("−", "-").lstrip("±")
+            if (not names or column.name in names) and word not in ("", "–"):
+                yield float(word)
+
+
+def rates_of(frame: Frame) -> Iterator[float]:
+    """Yield every rate in percent, and every difference of two in points."""
+    data = RunData(frame)
+    for table in make_run_tables(frame):
+        yield from numbers(table)
+    yield from numbers(make_table("main", data))
+    yield from numbers(make_breakdown_table(BREAKDOWNS["difficulty"], frame), "success", "gap")
+    yield from numbers(make_heard_table(data), "cut, %", "success, all", "success, heard")
+    tables = {
+        make_arm_table: ("first, %", "second, %", "difference"),
+        make_forms_table: ("implicit − resolved",),
+        make_failure_table: ("success", "execution", "gap to explicit"),
+    }
+    for make, names in tables.items():
+        with contextlib.suppress(InvalidValueError):  # nothing to show
+            yield from numbers(make(data), *names)
+    for one in data.summaries.values():
+        yield 100 * float(one.rate or 0)
+    results = Results(Path())
+    results.__dict__["_data"] = data
+    yield from (100 * rate for rate in results.rates().values())
+
+
+@settings(max_examples=60, deadline=None)
+@given(alike(), st.data())
+def test_no_rate_is_over_two_forms_arms_policies_words_or_worlds(
+    found: list[Words], data: st.DataObject
+) -> None:
+    """All episodes of the same words end alike, so that a rate over others too is in between."""
+    results: list[Summary] = []
+    places = st.lists(st.tuples(st.sampled_from(TASKS), st.integers(0, 2)), min_size=1, unique=True)
+    for words in found:
+        outcome = data.draw(st.sampled_from(["success", "failure"]))
+        prompt = data.draw(st.sampled_from(["heard", "cut"]))
+        for task, episode in data.draw(places):
+            fields = {**words._asdict(), "task": task, "prompt_verdict": prompt}
+            results.append(make_result(outcome, episode, **fields))
+    frame = make_frame([("", results)])
+    assert {abs(rate) for rate in rates_of(frame)} <= {0, 100}
+    told = [one for one in found if one.arm == "told"] or found
+    holder = Results(Path())
+    holder.__dict__["_data"] = RunData(frame)
+    assert len(holder.rates()) == len(told), "none hides another one"
+    by = data.draw(st.lists(st.sampled_from([*KEPT_APART, "setting"]), unique=True))
+    with contextlib.suppress(InvalidValueError):  # refused
+        assert {one.rate for one in roboirg.measure(frame, by)} <= {0, 1}
+
+
+def test_all_tasks_are_one_mean_in_the_terminal_on_the_page_and_in_python() -> None:
+    """Nine of ten are won in one task and one of two in the other: 70 %, not ten of twelve."""
+    results = [make_result("success" if episode else "failure", episode) for episode in range(10)]
+    results += [
+        make_result("success" if episode else "failure", episode, task="BinFill", policy_seed=1)
+        for episode in range(2)
+    ]
+    frame = make_frame([("", results)])
+    data = RunData(frame)
+    (table,) = make_run_tables(frame)
+    assert table.rows[-1].name == ALL_TASKS
+    assert [*numbers(table)][-1] == 70
+    (whole,) = (one for key, one in data.summaries.items() if key.scope == ALL_TASKS)
+    assert cell_notes(whole, "")[1].startswith("70 % success, mean of 2 tasks")
+    holder = Results(Path())
+    holder.__dict__["_data"] = data
+    assert holder.rates() == {("listener", "explicit"): 0.7}
+
+
+def intervals(one: Measured) -> Iterator[Interval | None]:
+    yield from (one.interval, one.other_interval)
+    for gap in (one.gap, one.second_gap):
+        if gap is not None:
+            yield from (gap.interval, gap.retention_interval)
+
+
+TABLES = st.dictionaries(
+    st.tuples(
+        st.sampled_from(["listener", "other"]),
+        st.sampled_from(["PickXtimes", "BinFill", "VideoUnmask"]),
+        st.sampled_from(["explicit", "direct", "reasoning"]),
+        st.sampled_from(["implicit", "resolved"]),
+        st.sampled_from(["told", "silent"]),
+        st.sampled_from([0, 1]),
+    ),
+    st.text("10!", min_size=1, max_size=6),
+    min_size=1,
+    max_size=8,
+)
+"""The outcomes of episodes by policy, task, setting, form, arm and policy seed."""
+OUTCOMES = {"1": "success", "0": "failure", "!": "error"}
+
+
+@settings(max_examples=150, deadline=None)
+@given(TABLES)
+def test_an_interval_has_a_width_or_there_is_a_reason_why_there_is_none(
+    tables: dict[tuple[str, str, str, str, str, int], str],
+) -> None:
+    results = []
+    for (policy, task, setting, form, arm, seed), letters in tables.items():
+        words = {"policy": policy, "task": task, "setting": setting, "form": form, "arm": arm}
+        for episode, letter in enumerate(letters):
+            results.append(make_result(OUTCOMES[letter], episode, policy_seed=seed, **words))
+    frame = make_frame([("", results)])
+    data = RunData(frame)
+    difficulty = break_down(frame, BREAKDOWNS["difficulty"])
+    ends = measure_ends(data, {ALL_TASKS}).values()
+    measured = [*data.summaries.values(), *difficulty, *arm_figures(frame), *sum(ends, ())]
+    found = [interval for one in measured for interval in intervals(one)]
+    for run in frame.names:
+        headline = measure_headline(data.cells, run, ("direct", "reasoning"))
+        found.append(headline and headline.interval)
+    for interval in found:
+        assert interval is None or interval.low < interval.high
+        assert interval is None or not any(map(math.isnan, interval))
+    table = make_breakdown_table(BREAKDOWNS["difficulty"], frame)
+    for row in table.rows:
+        *_, gap, ends, _ = row.entries
+        assert (gap.text == "–") == (ends.text == "–")
+        assert (" to " in ends.text) + (ends.text == TOO_FEW) + (ends.text == "–") == 1
+    for one in data.summaries.values():
+        lacks = one.rate is not None and one.interval is None
+        assert lacks == (TOO_FEW in cell_notes(one, ""))
+    try:
+        comparison = compare(*(frame.where(policy=one) for one in ("listener", "other")))
+    except InvalidValueError:
+        return  # nothing in common
+    for sentence in sentences(comparison, "listener", "other"):
+        if " points" in sentence and "p = " in sentence:
+            assert ("95 % interval" in sentence) != (TOO_FEW in sentence)

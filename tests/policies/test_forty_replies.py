@@ -1,0 +1,284 @@
+"""One rule reads the replies of all models: right or unreadable, and what is unreadable counts."""
+
+import json
+from string import Template
+from types import SimpleNamespace
+
+import pytest
+from forty_replies import FORTY
+from planning_fakes import Garbage, fake_vlm, model_options
+
+from roboirg.policies.planners.model_planners import StatelessOptions, StatelessPlanner
+from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.policies.vlm.model_content import ChatTurn
+from roboirg.policies.vlm.models import ModelOptions, ModelQuery, make_model
+from roboirg.policies.vlm.vlm_query import VLMQuery
+from roboirg.util.reply_reading import (
+    UnparsableReplyError,
+    answer_of,
+    chosen_letter,
+    json_object,
+    last_json,
+    whole_number,
+    with_thoughts,
+)
+
+QUERY = ModelQuery("system", (ChatTurn("user", ("words",)),))
+
+
+def reply_of(styled):
+    return make_model(styled.options()).read(styled.body())
+
+
+def goal_in(text):
+    schema = goal_schema("PickXtimes")
+    return schema.answers[schema.read(text)]
+
+
+def letter_in(text):
+    return chosen_letter(text, "ABC")
+
+
+def subgoal_in(text):
+    options = StatelessOptions(model=ModelOptions(model="m"))
+    return StatelessPlanner(options, "stateless").take(text)
+
+
+READERS = {"goal": goal_in, "letter": letter_in, "subgoal": subgoal_in}
+
+
+def same_json(reading):
+    return json.dumps(json.loads(reading), sort_keys=True)
+
+
+def test_there_are_forty_of_five_families():
+    assert len(FORTY) == 40
+    assert len({reply.style for reply in FORTY}) == 40
+
+
+@pytest.mark.parametrize("styled", FORTY, ids=lambda styled: styled.style)
+def test_each_reply_is_read_right_or_counted_as_unreadable(styled):
+    """A model that answers so is asked twice; what it means comes out, or the count is one more."""
+    connect = lambda _: SimpleNamespace(answer=lambda _query: reply_of(styled))  # noqa: E731
+    vlm = VLMQuery(ModelOptions(model="m"), Template("$why"), connect)
+    found = vlm.ask(QUERY, READERS[styled.question])
+    wanted = styled.reading
+    if styled.question == "goal" and wanted is not None:
+        found, wanted = same_json(found), same_json(wanted)
+    assert found == wanted
+    assert vlm.usage()["unparsed"] == (wanted is None)
+
+
+@pytest.mark.parametrize("styled", FORTY, ids=lambda styled: styled.style)
+def test_thoughts_are_kept_with_the_reply(styled):
+    """All words that the server sent are in the text that is stored."""
+    kept = reply_of(styled).text
+    for words in _words(styled.content) + _words(styled.more.get("reasoning_content")):
+        assert words in kept or json.dumps(words, ensure_ascii=False)[1:-1] in kept
+
+
+def _words(sent):
+    if isinstance(sent, str):
+        return [sent]
+    if isinstance(sent, dict):
+        return [words for name, held in sent.items() if name != "type" for words in _words(held)]
+    if isinstance(sent, list):
+        return [words for held in sent for words in _words(held)]
+    return []
+
+
+def test_a_rejected_reply_is_quoted_without_its_thoughts():
+    with fake_vlm(["<think>so many words</think>no idea"]) as server:
+        VLMQuery(model_options(server), Template("$why")).ask(QUERY, goal_in)
+        assert server.requests[1]["messages"][2]["content"] == "no idea"
+
+
+@pytest.mark.parametrize("tag", ["<think>", "</think>"])
+def test_a_tag_that_ends_a_text_in_json_cuts_no_answer(tag):
+    assert letter_in(f'<think>A</think>{{"answer": "C", "note": "{tag}"}}') == "C"
+
+
+@pytest.mark.parametrize("thoughts", [["</think> B"], [{"a": "<think>"}], []])
+def test_tags_in_thoughts_end_nothing(thoughts):
+    assert answer_of(with_thoughts("A", thoughts)) == "A"
+
+
+@pytest.mark.parametrize(
+    ("reply", "letter"),
+    [
+        ("The answer is not A but C", None),
+        ("B and C are wrong", None),
+        ("Answer: a cube", None),
+        ("\\boxed{A cube}", None),
+        ("A is correct.", "A"),
+        ("There is no red cube, so the answer is B.", "B"),
+        ("I first thought A, but the answer is C.", "C"),
+        ("C\nIt is not the red one.", "C"),
+        ("$\\boxed{\\text{C}}$", "C"),
+        ("C – the green cube", "C"),
+        ("Option B", "B"),
+        ("My choice is B.", "B"),
+        ("Answer:\n\nB) Put it there.", "B"),
+        ('{"choice": "B. Put it there."}', "B"),
+        ('{"choice": "", "answer": "B"}', "B"),
+        ('{"choice": "B"', None),
+        ("D", None),  # there are three
+    ],
+)
+def test_a_letter_counts_where_it_is_given_as_the_answer(reply, letter):
+    if letter is not None:
+        assert letter_in(reply) == letter
+    else:
+        with pytest.raises(UnparsableReplyError, match=r"one of the letters|breaks off"):
+            letter_in(reply)
+
+
+@pytest.mark.parametrize(
+    "reply",
+    [
+        "The wrong answer is C",
+        "Wrong answer: C",
+        "The least likely answer is C",
+        "I do not think that the answer is C",
+        "Is the answer C? No.",
+        "If the answer is C then it is red.",
+        "Not this:\n\nC",
+        "answer: A and not B",
+        "Answer: C is excluded, B",
+        "Answer: A. Hmm, C",
+        "The answer: C would be green, so B",
+        "answer: ~~C~~",
+        "C. is wrong",
+        "**C** is wrong",
+        "C - no, wait.",
+        "C isn't it.",
+        "C?",
+        '{"answer": "not C"}',
+        '{"answer": "C?"}',
+        '{"choice": "C", "answer": "B"}',
+    ],
+)
+def test_a_letter_that_is_denied_questioned_or_next_to_another_is_no_answer(reply):
+    with pytest.raises(UnparsableReplyError, match="one of the letters"):
+        letter_in(reply)
+
+
+@pytest.mark.parametrize("read", [letter_in, goal_in], ids=["letter", "goal"])
+@pytest.mark.parametrize(
+    "later",
+    [
+        "No: {answer: B, color: red, repeats: 1}",
+        "{“answer”: “B”}",
+        '{/* rather */ "answer": "B"}',
+        '{\n// rather\n"answer": "B"}',
+        "{answer",
+        "}\n} extra",
+        '{"answer": "B", "answer": "C"}',
+    ],
+)
+def test_no_object_is_read_next_to_a_malformed_one(read, later):
+    good = '{"answer": "C", "color": "green", "repeats": 3}'
+    read(good)
+    for reply in (f"{good}\n{later}", f"{later}\n{good}", f"{{{good}}}"):
+        with pytest.raises(UnparsableReplyError, match="breaks off or is malformed"):
+            read(reply)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '{"a": 1} {"b": ',
+        '{"a": {"b": 1}, "c',
+        "{\"a\": 1} {'b': 2}",
+        '{"a": 1} {',
+        "[" + '{"a":' * 9,
+    ],
+)
+def test_an_object_that_breaks_off_is_not_replaced_by_an_earlier_one(text):
+    with pytest.raises(UnparsableReplyError, match="breaks off or is malformed"):
+        json_object(text)
+
+
+def test_an_object_may_have_line_breaks_in_texts_and_braces_around_it():
+    assert json_object('{so} {"a": "b\nc } {"} {there}') == {"a": "b\nc } {"}
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["</s>" * 20_000 + "x", '{"a":' * 50_000, "[{" * 50_000, "answer" + " " * 200_000,
+     "\n" * 200_000, "answer A " * 20_000, "{" + "a" * 200_000],
+)  # fmt: skip
+def test_no_reply_is_read_for_long(text):
+    """A quadratic reading would take minutes."""
+    for read in (letter_in, last_json):
+        try:
+            read(text)
+        except UnparsableReplyError:
+            continue
+
+
+@pytest.mark.parametrize(
+    ("value", "number"),
+    [(3, 3), (3.0, 3), ("3", 3), (-0.0, 0), (10**400, 10**400), (True, None), (2.5, None),
+     ("two", None), ("9" * 5000, None), (float("inf"), None), (None, None), ([3], None)],
+)  # fmt: skip
+def test_whole_numbers_in_json(value, number):
+    found = whole_number(value)
+    assert (found, type(found)) == (number, type(number))
+
+
+def body_with(provider, usage):
+    """A good reply whose service reports this usage."""
+    if provider == "google":
+        parts = {"content": {"parts": [{"text": "fine"}]}}
+        reply = {"candidates": [parts], "usageMetadata": usage}
+    else:
+        reply = {"choices": [{"message": {"content": "fine"}}], "usage": usage}
+    return Garbage(json.dumps(reply).encode())
+
+
+NAMES = {
+    "openai": ("prompt_tokens", "completion_tokens"),
+    "google": ("promptTokenCount", "candidatesTokenCount"),
+}
+
+
+def ask_with(provider, usage, **prices):
+    with fake_vlm([body_with(provider, usage)]) as server:
+        vlm = VLMQuery(model_options(server, provider, **prices), Template(""))
+        assert vlm.ask(QUERY, str) == "fine"
+        return vlm.usage()
+
+
+@pytest.mark.parametrize("provider", NAMES)
+@pytest.mark.parametrize("count", [None, "many", True, 1.5, [], {}])
+def test_an_answer_is_not_lost_if_its_tokens_are_unknown(provider, count):
+    sent, received = NAMES[provider]
+    usage = ask_with(provider, {sent: 5, received: count}, input_price=2.0, output_price=3.0)
+    assert usage["input_tokens"] == 5
+    assert usage["output_tokens"] != usage["output_tokens"]
+    assert usage["cost_usd"] != usage["cost_usd"]
+    # Tokens without a price do not make the cost unknown.
+    usage = ask_with(provider, {sent: 5, received: count}, input_price=2.0)
+    assert usage["cost_usd"] == pytest.approx(1e-5)
+
+
+@pytest.mark.parametrize("provider", NAMES)
+@pytest.mark.parametrize("usage", [None, [], "none", 3, {}])
+def test_an_answer_is_not_lost_if_there_is_no_usage(provider, usage):
+    found = ask_with(provider, usage)
+    assert found["input_tokens"] != found["input_tokens"]
+
+
+@pytest.mark.parametrize("provider", NAMES)
+@pytest.mark.parametrize("count", [7, 7.0, "7"])
+def test_tokens_may_be_written_in_any_form_of_a_whole_number(provider, count):
+    assert ask_with(provider, dict.fromkeys(NAMES[provider], count))["output_tokens"] == 7
+
+
+@pytest.mark.parametrize("provider", NAMES)
+@pytest.mark.parametrize("count", [-(10**6), 10**9, 10**400])
+def test_tokens_that_cannot_be_are_unknown_and_so_is_their_cost(provider, count):
+    usage = ask_with(provider, dict.fromkeys(NAMES[provider], count), input_price=2.0)
+    for name in ("input_tokens", "output_tokens", "cost_usd"):
+        assert usage[name] != usage[name]

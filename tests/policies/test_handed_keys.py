@@ -1,0 +1,163 @@
+"""Servers and models that send their client's key back: it is neither kept nor shown."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import html
+import json
+import re
+import sqlite3
+import struct
+from pathlib import Path
+from string import Template
+from urllib.parse import quote
+
+import msgpack
+import pytest
+from attackers import answering, frame, shake_hands, wait_for_end
+from planning_fakes import fake_vlm, model_options
+
+from roboirg.core import handed_keys
+from roboirg.core.errors import InvalidValueError, PolicyServerError
+from roboirg.core.plain_text import printable
+from roboirg.evaluation.episode_errors import describe_error
+from roboirg.evaluation.records.episode_log import EpisodeLog
+from roboirg.policies import make_policy
+from roboirg.policies.vlm.model_content import ChatTurn
+from roboirg.policies.vlm.models import ModelQuery
+from roboirg.policies.vlm.models.reply_store import REPLIES_FILE, ReplySettings, use_replies
+from roboirg.policies.vlm.vlm_query import VLMQuery
+from roboirg.util.proxies import proxy_of
+
+KEY = 'k7-"X/+secret\\of~ours'
+VARIABLE = "KEY_OF_A_TEST"
+ENCODED = [base64.b64encode(f"{before}{KEY}".encode()).decode() for before in ("", "u:", "me:")]
+SPELLINGS = [
+    KEY,
+    quote(KEY, safe=""),
+    quote(KEY, safe="").lower(),
+    json.dumps(KEY)[1:-1],
+    json.dumps(KEY)[1:-1].replace("/", "\\/"),
+    "".join(f"\\u{ord(letter):04X}" for letter in KEY),
+    html.escape(KEY),
+    repr(KEY.encode())[2:-1],
+    *ENCODED,
+    base64.urlsafe_b64encode(KEY.encode()).decode(),
+    f"{ENCODED[0][:8]}\n{ENCODED[0][8:]}",
+]
+
+
+@pytest.fixture(autouse=True)
+def key(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(handed_keys, "_spellings", set())
+    monkeypatch.setenv(VARIABLE, KEY)
+
+
+@pytest.mark.parametrize("spelling", SPELLINGS)
+def test_a_key_is_found_however_software_writes_it(spelling: str) -> None:
+    handed_keys.remember_key(KEY)
+    cleaned = printable(f"Error: no key {spelling} here")
+    # What stands before a key in Base64 may stay.
+    assert re.fullmatch(r"Error: no key (\w{0,5})\*{20,} here", cleaned)
+
+
+def test_the_key_behind_its_scheme_is_found_alone() -> None:
+    handed_keys.remember_key(f"Bearer {KEY}")
+    assert KEY not in printable(f"401: {KEY}")
+    assert printable("Bearer") == "Bearer"
+
+
+@pytest.mark.parametrize("letters", ["\\", "s", "\\s", "sk-", "&amp;", "%73", "=\n"])
+def test_what_looks_like_a_key_over_and_over_is_searched_to_its_end(letters: str) -> None:
+    handed_keys.remember_key("\\" * 20)
+    handed_keys.remember_key("sk-" * 20)
+    text = f"{letters * 19}x" * 5_000
+    assert len(printable(text)) >= len(text)
+
+
+def test_a_short_text_is_no_key() -> None:
+    handed_keys.remember_key("none")
+    assert printable("none of the cubes") == "none of the cubes"
+
+
+METADATA = msgpack.packb({"version": KEY, "seen": {"Authorization": [f"Api-Key {KEY}"]}})
+SAYS = {
+    "metadata": frame(METADATA),
+    "an error": frame(f"Traceback …\nValueError: {'x' * 280}{KEY}".encode(), 1),
+    "the reason of a close": frame(struct.pack(">H", 1008) + f"no {KEY}".encode(), 8),
+}
+
+
+@pytest.mark.parametrize("place_of_key", SAYS)
+def test_a_key_that_a_policy_server_sends_back_is_not_kept(place_of_key: str) -> None:
+    def answer(peer: object) -> None:
+        shake_hands(peer)
+        peer.sendall(SAYS[place_of_key])  # type: ignore[attr-defined]
+        wait_for_end(peer)
+
+    with answering(answer) as place:
+        policy = make_policy(f"openpi://{place}?api_key_env={VARIABLE}", 0)
+        kept = ""
+        try:
+            policy.reset("Do it.", {})
+        except PolicyServerError as error:
+            described = describe_error("policy", error)
+            kept = f"{described.cause} {described.details}"
+        kept += f"{policy.metadata} {policy.version}"
+        policy.close()
+    assert "****" in kept
+    assert KEY[:6] not in kept
+    assert KEY[-6:] not in kept
+
+
+def test_a_key_in_the_reply_of_a_model_is_neither_stored_nor_read_from_an_earlier_store(
+    tmp_path: Path,
+) -> None:
+    query = ModelQuery("system", (ChatTurn("user", ("words",)),))
+    with fake_vlm([f"my key is {KEY}"]) as server:
+        vlm = VLMQuery(model_options(server, api_key_env=VARIABLE), Template("$why"))
+        with use_replies(ReplySettings(tmp_path), "a"):
+            first = vlm.ask(query, str)
+    with contextlib.closing(sqlite3.connect(tmp_path / REPLIES_FILE)) as database:
+        (stored,) = database.execute("SELECT text FROM replies").fetchone()
+        assert first == stored == f"my key is {'*' * len(KEY)}"
+        database.execute("UPDATE replies SET text = ?", (f"my key is {KEY}",))
+        database.commit()
+    with use_replies(ReplySettings(tmp_path), "a"):
+        again = VLMQuery(vlm.options.model_copy(), Template("$why")).ask(query, str)
+    assert again == stored
+
+
+def test_a_key_that_a_library_prints_is_not_in_the_log(tmp_path: Path) -> None:
+    handed_keys.remember_key(KEY)
+    with EpisodeLog(tmp_path / "log.txt") as log:
+        log.path.write_text(f"closed: {KEY}\n")
+    assert (tmp_path / "log.txt").read_text() == f"closed: {'*' * len(KEY)}\n"
+
+
+def test_the_password_of_a_proxy_is_removed_from_what_it_sends(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("NO_PROXY", raising=False)
+    monkeypatch.delenv("no_proxy", raising=False)
+    monkeypatch.setenv("HTTPS_PROXY", "http://me:pass%21word@proxy.example:3128")
+    monkeypatch.setenv("https_proxy", "http://me:pass%21word@proxy.example:3128")
+    proxy_of("https://models.example/v1")
+    sent = base64.b64encode(b"me:pass!word").decode()
+    assert printable(f"407 pass!word Basic {sent}") == f"407 {'*' * 9} Basic {'*' * len(sent)}"
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        "vlm-listener:openai?model=x&base_url=http://me:{key}@host/v1",
+        "vlm-listener:openai?model=x&api_key={key}",
+        "openpi://{key}@host:8000",
+        "openpi://host:8000?token={key}",
+    ],
+)
+def test_a_policy_that_is_named_with_a_key_is_refused_without_showing_it(spec: str) -> None:
+    with pytest.raises(InvalidValueError, match="holds a key or password") as caught:
+        make_policy(spec.format(key="hunter2hunter2"), 0)
+    assert "hunter2" not in str(caught.value)

@@ -1,0 +1,50 @@
+"""Which secrets of the environment a policy of others gets."""
+
+import os
+
+import pytest
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.policies.by_name.finding import read_policy
+from roboirg.policies.by_name.key_variables import environment_for, forget_secrets
+
+SECRETS = (
+    *("GOOGLE_API_KEY", "OPENAI_API_KEY", "LAB_KEY", "HF_TOKEN", "MY_PASSWORD", "AWS_SECRET"),
+    *("HF_TOKENS", "OPENAI_API_KEY2", "HTTP_AUTHORIZATION", "MY_CREDS", "SESSION_COOKIE", "DB_PW"),
+)
+
+
+@pytest.fixture(autouse=True)
+def _secrets(monkeypatch):
+    for name in SECRETS:
+        monkeypatch.setenv(name, "secret")
+
+
+@pytest.mark.parametrize(
+    ("spec", "kept"),
+    [
+        ("mine:It", set()),
+        ("planner:mine:Planner", set()),
+        ("planner:stateless?model=m&hands=mine:It", {"OPENAI_API_KEY"}),
+        ("planner:stateless?model=m&provider=google&hands=mine:It", {"GOOGLE_API_KEY"}),
+        ("planner:stateless?model=m&base_url=http://here&hands=mine:It", set()),
+        ("planner:stateless?model=m&api_key_env=LAB_KEY&hands=mine:It", {"LAB_KEY"}),
+        ("planner:mine:Planner?hands=openpi://here:1?api_key_env=LAB_KEY", {"LAB_KEY"}),
+        ("lerobot://some/checkpoint", {"HF_TOKEN"}),
+    ],
+)
+def test_a_hosted_policy_has_the_keys_that_our_own_parts_of_it_read_and_those_that_are_named(
+    spec, kept
+):
+    found = environment_for(read_policy(spec).hosted_part, ("MY_PASSWORD",))
+    assert found.keys() & set(SECRETS) == {*kept, "MY_PASSWORD"}
+    assert found["PATH"] == os.environ["PATH"]
+
+
+def test_a_policy_in_the_process_of_a_command_finds_no_secrets_there_if_it_is_of_others():
+    forget_secrets("random", "")
+    assert set(SECRETS) <= os.environ.keys()
+    with pytest.raises(InvalidValueError, match="NOT_SET is not set here, so the policy cannot"):
+        forget_secrets("mine:It", "HF_TOKEN,NOT_SET")
+    forget_secrets("mine:It", "HF_TOKEN")
+    assert os.environ.keys() & set(SECRETS) == {"HF_TOKEN"}

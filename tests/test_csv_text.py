@@ -1,0 +1,18 @@
+"""Texts of strangers in CSV files: a spreadsheet shows them and computes none."""
+
+from decimal import Decimal
+
+import pytest
+
+from roboirg.util.csv_text import csv_text
+
+
+@pytest.mark.parametrize("text", ["=cmd|' /C calc'!A0", "@SUM(1)", "+1+1", "-2+3", "-x", "\t=1"])
+def test_a_text_that_a_spreadsheet_would_compute_gets_an_apostrophe(text: str) -> None:
+    assert csv_text([{"name": text}]).strip() == f"name\n'{text}"
+
+
+def test_numbers_and_plain_texts_stay_as_they_are() -> None:
+    row = {"change": Decimal("-3.2"), "excess": "-0.0125", "share": "-5%", "name": "pick-2=a"}
+    assert csv_text([row]) == "change,excess,share,name\n-3.2,-0.0125,-5%,pick-2=a\n"
+    assert csv_text([]) == ""

@@ -1,0 +1,41 @@
+"""With ``python -O`` nothing is missing: no assert does work, and none guards what users give."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HOUSE = Path(__file__).parents[1]
+PLAY = """
+import roboirg
+
+env = roboirg.make("PickXtimes", max_steps=1)
+observation, _ = env.reset()
+observation, *_ = env.step(env.action_space.low)
+print(__debug__, observation["front_rgb"].any())
+"""
+
+
+def test_no_source_has_an_assert():
+    files = [
+        path
+        for folder in ("src", "packages", "integrations")
+        for path in (HOUSE / folder).rglob("*.py")
+        if "tests" not in path.parts
+    ]
+    assert len(files) > 500
+    for path in files:
+        nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        lines = [node.lineno for node in nodes if isinstance(node, ast.Assert)]
+        assert not lines, f"{path} has an assert in the lines {lines}, which -O leaves out"
+
+
+@pytest.mark.sim
+def test_an_episode_is_drawn_and_played_without_asserts(monkeypatch):
+    monkeypatch.setenv("PYTHONOPTIMIZE", "1")
+    child = subprocess.run(
+        [sys.executable, "-c", PLAY], capture_output=True, text=True, check=False
+    )
+    assert child.stdout == "False True\n", child.stderr
