@@ -4,9 +4,8 @@ import os
 
 import pytest
 
-from roboirg.core.errors import InvalidValueError
 from roboirg.policies.by_name.finding import read_policy
-from roboirg.policies.by_name.key_variables import environment_for, forget_secrets
+from roboirg.policies.by_name.key_variables import environment_for
 
 SECRETS = (
     *("GOOGLE_API_KEY", "OPENAI_API_KEY", "LAB_KEY", "HF_TOKEN", "MY_PASSWORD", "AWS_SECRET"),
@@ -39,12 +38,3 @@ def test_a_hosted_policy_has_the_keys_that_our_own_parts_of_it_read_and_those_th
     found = environment_for(read_policy(spec).hosted_part, ("MY_PASSWORD",))
     assert found.keys() & set(SECRETS) == {*kept, "MY_PASSWORD"}
     assert found["PATH"] == os.environ["PATH"]
-
-
-def test_a_policy_in_the_process_of_a_command_finds_no_secrets_there_if_it_is_of_others():
-    forget_secrets("random", "")
-    assert set(SECRETS) <= os.environ.keys()
-    with pytest.raises(InvalidValueError, match="NOT_SET is not set here, so the policy cannot"):
-        forget_secrets("mine:It", "HF_TOKEN,NOT_SET")
-    forget_secrets("mine:It", "HF_TOKEN")
-    assert os.environ.keys() & set(SECRETS) == {"HF_TOKEN"}

@@ -21,7 +21,7 @@ _PANELS = {
         "policies", "tasks", "settings", "forms", "split", "episodes", "policy_seeds", "arms",
     ),
     WORDS: ("stages", "wordings"),
-    PLAY: ("max_steps", "max_cost", "policy_env", "video"),
+    PLAY: ("max_steps", "max_cost", "video"),
 }  # fmt: skip
 """The fields of a plan that are used daily; a plan file has all."""
 

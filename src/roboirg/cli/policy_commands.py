@@ -26,12 +26,6 @@ PolicySpec = Annotated[
     str,
     typer.Argument(help=f"Built-in name, package.module:Class, or a URL ({_URL_SCHEMES})."),
 ]
-PolicyEnv = Annotated[
-    str,
-    typer.Option(
-        help="Environment variables with secrets, such as HF_TOKEN, that a policy of your own gets."
-    ),
-]
 
 
 class ProtocolHelpCommand(TyperCommand):
@@ -59,7 +53,6 @@ def serve(
     host: Annotated[str, typer.Option(help="Address to listen on.")] = LOOPBACK,
     port: Annotated[int, typer.Option(help="Port to listen on; 0 for any free port.")] = 8000,
     seed: Annotated[int, typer.Option(help="Seed of the policy's random choices.")] = 0,
-    policy_env: PolicyEnv = "",
     api_key_env: Annotated[
         str | None,
         typer.Option(help="Environment variable with the key that clients must send."),
@@ -77,7 +70,6 @@ def serve(
 
     Example: roboirg serve my_policy:MyPolicy --protocol openpi
     """
-    from roboirg.policies.by_name.key_variables import forget_secrets
     from roboirg.policies.policy_server import open_server
     from roboirg.policies.remote.websocket_server import ServerOptions
     from roboirg.util.freed_memory import keep_freed_memory
@@ -88,7 +80,6 @@ def serve(
     if api_key_env is not None and not key:
         raise InvalidValueError(f"The environment variable {api_key_env} holds no key.")
     options = ServerOptions(host, port, key, timeout_s)
-    forget_secrets(policy, policy_env)
     server = open_server(policy, protocol, options, seed=seed)
     for number in _STOPPED:
         signal.signal(number, _stop)

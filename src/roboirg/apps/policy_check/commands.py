@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from roboirg.cli.options import add_working_directory
-from roboirg.cli.policy_commands import PolicyEnv, PolicySpec, ProtocolHelpCommand
+from roboirg.cli.policy_commands import PolicySpec, ProtocolHelpCommand
 from roboirg.cli.run_commands import USAGE_ERROR
 
 
@@ -17,7 +17,6 @@ def check_policy(
         bool,
         typer.Option(help="Compare with an expert's episode, if the simulator is installed."),
     ] = True,
-    policy_env: PolicyEnv = "",
 ) -> None:
     """Check a policy on synthetic episodes, and next to the scripted expert.
 
@@ -28,10 +27,8 @@ def check_policy(
     from roboirg.apps.policy_check.expert_episode import record_expert
     from roboirg.apps.policy_check.policy_check import check_policy as check
     from roboirg.apps.policy_check.policy_check import print_check_results
-    from roboirg.policies.by_name.key_variables import forget_secrets
 
     add_working_directory()
-    forget_secrets(policy, policy_env)
     results = check(policy, record_expert=record_expert if expert else None)
     print_check_results(results, Console())
     if any(result.verdict == "fail" for result in results):

@@ -272,9 +272,9 @@ class Plan(BaseModel):
 
     @model_validator(mode="after")
     def _check_size(self) -> Plan:
-        several = (self.policies, self.tasks, self.forms, self.episodes, self.policy_seeds)
-        words = (self.setting_names, self.stages, self.arms)
-        size = math.prod(map(len, (*several, *words)))
+        played = (self.policies, self.tasks, self.episodes, self.policy_seeds, self.arms)
+        worded = (self.setting_names, self.forms, self.stages)
+        size = math.prod(map(len, played + worded))
         if size > MOST_JOBS:
             raise InvalidValueError(
                 f"The plan has up to {size:,} episodes; a plan has at most {MOST_JOBS:,}."

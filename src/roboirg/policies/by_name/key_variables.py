@@ -9,7 +9,6 @@ from collections.abc import Iterable
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_ref import PolicyRef
-from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.by_name.policy_kinds import split_spec, system_of
 from roboirg.policies.vlm.models import ModelOptions
 
@@ -50,25 +49,6 @@ def environment_for(ref: PolicyRef, named: Iterable[str]) -> dict[str, str]:
     kept = key_variables(ref).union(named)
     variables = os.environ.items()
     return {name: text for name, text in variables if name in kept or not _SECRET.search(name)}
-
-
-def forget_secrets(policy: str, named: str) -> None:
-    """Remove from this process what a user's policy that runs in it is not meant to have.
-
-    Args:
-        policy: its spec.
-        named: variables that it may have, separated by commas.
-
-    Raises:
-        InvalidValueError: one of them is not set.
-    """
-    names = named.replace(",", " ").split()
-    check_variables(names, "the policy")
-    with contextlib.suppress(InvalidValueError):  # there is no such policy, as the command reports
-        ref = read_policy(policy)
-        if ref.is_foreign:
-            for name in os.environ.keys() - environment_for(ref, names).keys():
-                del os.environ[name]
 
 
 def key_variables(ref: PolicyRef) -> set[str | None]:

@@ -132,15 +132,14 @@ def first_color() -> str:
     return str(mpl.rcParams["lines.color"])
 
 
-def _new_figure(width: float, height: float, below: float) -> Figure:
-    """Return an empty figure of the given size in inches, with `below` of it left free below."""
+def new_figure(width: float, height: float, below: float = 0) -> Figure:
+    """Return an empty figure of the given size in inches, with a share of it left free below."""
     # Without pyplot, which keeps every figure and looks for a display.
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    share = below / height
     engine = ConstrainedLayoutEngine(
-        w_pad=0.03, h_pad=0.03, wspace=0.04, rect=(0, share, 1, 1 - share)
+        w_pad=0.03, h_pad=0.03, wspace=0.04, rect=(0, below, 1, 1 - below)
     )
     return Figure(figsize=(width, height), layout=engine)
 
@@ -200,7 +199,7 @@ def panels(
     title_inches = TITLE_LINE_INCHES * max(title.count("\n") + 1 for title in titles)
     panel_inches = ROW_LINE_INCHES * max(map(sum, sizes)) + title_inches + AXIS_INCHES
     height = down * panel_inches + below
-    figure = _new_figure(width, height, below)
+    figure = new_figure(width, height, below / height)
     is_shared = all(own == labels[0] for own in labels)
     grid = figure.subplots(down, across, sharey=is_shared, squeeze=False).ravel()
     found = []
