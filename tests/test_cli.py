@@ -90,7 +90,7 @@ def planned(**fields: object) -> tuple[str, ...]:
         ((*RUN, "--episodes", "010"), "'010' is not a valid episode"),
         ((*RUN, "--tasks", ""), "No task was given"),
         ((*RUN, "--out", "o", "--max-steps", f"{10**22}"), f"max_steps is {10**22}; it must be"),
-        ((*RUN, "--out", "o", "--max-cost", "inf"), "max_cost is 'inf'; it must be finite"),
+        ((*RUN, "--out", "o", "--max-cost", "inf"), "max_cost is 'inf'; it must be a"),
         (("report", "x" * 260), "xxx' cannot be used: File name too long."),
         ((*RUN, "--out", "o", "--max-steps", "0"), "max_steps is 0"),
         ((*RUN, "--episodes", "50,"), "no episode 50: split 'test' has episodes 0 to 49."),

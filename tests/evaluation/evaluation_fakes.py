@@ -14,7 +14,7 @@ import msgspec
 from made_records import make_record
 
 from roboirg.core.errors import RenderDeviceError
-from roboirg.evaluation.plan.plan import Plan
+from roboirg.evaluation.plan.plan import SECTION_KEYS, Plan
 from roboirg.evaluation.records.record import NON_DETERMINISTIC_FIELDS, EventRecord, Job, Record
 from roboirg.evaluation.records.store import RECORDS_FILE, read_records
 from roboirg.evaluation.run.executor import LocalProcesses
@@ -142,7 +142,11 @@ def small_plan(episodes: int = 4, policies: tuple[str, ...] = ("random",), seeds
 
 def changed(plan: Plan, **options: object) -> Plan:
     """Return a plan with other options, which may stand in sections of it."""
-    return Plan.model_validate({**plan.model_dump(), **options})
+    given = plan.model_dump()
+    for section, keys in SECTION_KEYS.items():
+        for key in options.keys() & keys:
+            given[section] = {**given[section], key: options.pop(key)}
+    return Plan.model_validate({**given, **options})
 
 
 if __name__ == "__main__":
