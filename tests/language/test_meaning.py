@@ -159,7 +159,7 @@ def entry(table, key, value):
 FAULTS = {
     "minus adds": entry(declared._DIRECTIONS, "minus", 1),
     "earlier is later": entry(declared._DIRECTIONS, "earlier", 1),
-    "right before is two before": entry(declared._STEPS, "before", -2),
+    "right after is two after": entry(declared._STEPS, "after", 2),
     "the former is the second": entry(declared._RANKS, "former", 2),
     "a rank is the next one": change(declared, "_rank_of", lambda rank, *given: rank(*given) + 1),
     "the other one is the one that was taken": change(

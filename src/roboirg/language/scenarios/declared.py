@@ -24,7 +24,7 @@ _STEPS: Mapping[Operation, int] = {"before": -1, "after": 1}
 """Steps that the operation itself names."""
 
 
-class Remark(NamedTuple):
+class ChoosingRemark(NamedTuple):
     """Words before the command that choose from a list of two, such as *Let's skip the former*.
 
     Attributes:
@@ -123,7 +123,7 @@ def _step_of(operation: Operation, said: SaidValues) -> int:
     return _STEPS.get(operation, 0)
 
 
-def chosen_term(pointer: Pointer, remark: Remark, said: SaidValues) -> Term:
+def chosen_term(pointer: Pointer, remark: ChoosingRemark, said: SaidValues) -> Term:
     """Return the term of words for a value that a remark has chosen from a list of two.
 
     *The other one* is the one that was not chosen.

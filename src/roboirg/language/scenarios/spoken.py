@@ -28,7 +28,7 @@ from roboirg.language.request import (
 )
 from roboirg.language.scenarios.choice import Chosen, choose, rival_values
 from roboirg.language.scenarios.declared import (
-    Remark,
+    ChoosingRemark,
     SaidValues,
     chosen_term,
     pointed_term,
@@ -138,7 +138,7 @@ def say_chosen(
     return InstructionSpec(tuple(utterances), notes, speech.meaning(pointing=fields.keys()))
 
 
-def _lead(request: InstructionRequest, chosen: Chosen) -> tuple[Text, Remark | None]:
+def _lead(request: InstructionRequest, chosen: Chosen) -> tuple[Text, ChoosingRemark | None]:
     """Return the words before the command, and the remark in them that chooses, if one does."""
     scenario = chosen.scenario
     if request.resolved and "resolved.lead" in scenario.texts:
@@ -146,7 +146,7 @@ def _lead(request: InstructionRequest, chosen: Chosen) -> tuple[Text, Remark | N
     if not chosen.remark:
         return scenario.text("lead"), None
     text = request.sampler.pick("remark", scenario.texts[f"remarks.{chosen.remark}"])
-    remark = Remark(next(pointers_in(text)), chosen.remark.startswith("not_"))
+    remark = ChoosingRemark(next(pointers_in(text)), chosen.remark.startswith("not_"))
     return (*scenario.text("lead"), *text), remark
 
 
@@ -229,7 +229,7 @@ class Speech:
             return (TaggedText("the "), Slot(name), TaggedText(ends[kind]))
         return (Slot(name, "times" if kind == "number" and name != REFERENCE else None),)
 
-    def field(self, name: str, words: Text, remark: Remark | None = None) -> Phrase:
+    def field(self, name: str, words: Text, remark: ChoosingRemark | None = None) -> Phrase:
         """Return the words for a field of the command, resolved if these are asked for.
 
         A remark, if there is one, has chosen what they point at.
