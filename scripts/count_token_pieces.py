@@ -2,12 +2,14 @@
 
 Run it after a change of wording: ``python scripts/count_token_pieces.py``. It needs
 `mistral-common`, whose first tokenizer is a SentencePiece vocabulary of 32,000 pieces. A test
-compares the counts of whole instructions with that tokenizer's.
+compares the counts of whole instructions with that tokenizer's, another one looks for words of the
+scenarios that the table lacks.
 """
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from importlib.resources import files
@@ -17,6 +19,10 @@ from sentencepiece import SentencePieceProcessor
 
 from roboirg.core.word_pools import POOLS
 from roboirg.language.generator import find_refusal, instruct_with
+from roboirg.language.number_words import CARDINALS, ORDINALS, plural
+from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text
+from roboirg.language.scenarios.scenario import PERSON, Scenario
+from roboirg.language.scenarios.scenario_file import general, task_scenarios
 from roboirg.language.token_counts import split_words
 from roboirg.language.variants import expressible_options
 from roboirg.tasks import every_task
@@ -26,8 +32,9 @@ from roboirg.util.atomic_write import write_atomically
 TABLE = Path(__file__).parent.parent / "src/roboirg/language/token_pieces.json"
 EPISODES = 400
 """Random scenes for each task; their words repeat long before the last one."""
-VARIANTS = 4
-"""Texts of language 4 for each of them: its scenarios and people are many."""
+FORMS = ("ordinal", "cardinal", "times", "or", "nor", "spot")
+"""What a slot may have after its colon that is no noun to be counted."""
+_BEGINNING = re.compile(r"(?:^|[.!?:] )([a-z])")
 
 
 def tokenizer() -> SentencePieceProcessor:
@@ -45,16 +52,62 @@ def texts() -> Iterator[str]:
                 yield instruct_with(episode, options).text
                 scenario = replace(options, language=4)
                 if find_refusal(episode, scenario) is None:
-                    for variant in range(VARIANTS):
-                        yield instruct_with(episode, scenario, variant).text
+                    yield instruct_with(episode, scenario).text
+
+
+def scenario_words() -> frozenset[str]:
+    """Return all words and marks that scenarios can say, but those for colors and places."""
+    words = {*CARDINALS[1:], *ORDINALS[1:], "once", "twice", "times"}
+    for pool in POOLS:
+        for remark in general().distractors[pool]:
+            words |= split_words(remark)
+    for task in every_task():
+        written = task_scenarios(task)
+        for scenario in written.scenarios if written else ():
+            words |= _words_of(scenario)
+    return frozenset(words)
+
+
+def _words_of(scenario: Scenario) -> set[str]:
+    """Return the words of a scenario, each person of his or her own in all of its sentences."""
+    words: set[str] = set()
+    for person in scenario.people or ((),):
+        for sentences in scenario.texts.values():
+            for sentence in sentences:
+                for said in _spellings(sentence, person):
+                    # A sentence begins with a capital, unless a lead goes before it.
+                    words |= split_words(said)
+                    words |= split_words(_BEGINNING.sub(lambda found: found[0].upper(), said))
+    return words
+
+
+def _spellings(text: Text, person: tuple[str, ...]) -> tuple[str, str]:
+    """Return what a sentence says of one thing, and of several."""
+    one = many = ""
+    for part in text:
+        if isinstance(part, Slot):
+            name = part.name.partition(".")[0]
+            if name in PERSON:
+                value = person[PERSON.index(name)]
+                one, many = one + value, many + value
+            elif part.form and part.form not in FORMS:
+                one, many = one + part.form, many + plural(part.form)
+        elif isinstance(part, Agreement):
+            one, many = one + part.one, many + part.many
+        elif isinstance(part, Pointer):
+            inner_one, inner_many = _spellings(part.parts, person)
+            one, many = one + inner_one, many + inner_many
+        else:
+            one, many = one + part.text, many + part.text
+    return one, many
 
 
 def main() -> None:
     """Write the table: the words by their number of pieces."""
     encode = tokenizer().encode
-    words = sorted(frozenset[str]().union(*map(split_words, texts())))
+    words = scenario_words().union(*map(split_words, texts()))
     by_count: dict[str, list[str]] = {}
-    for word in words:
+    for word in sorted(words):
         # A mark is written without a space before it.
         count = len(encode(word)) if word[0].isalnum() else 1
         by_count.setdefault(str(count), []).append(word)

@@ -125,3 +125,13 @@ def test_the_page_strikes_out_what_was_cut(open_page: Any, run: Path) -> None:
         turns = zip(record.instruction, record.prompt.reached, strict=True)  # type: ignore[union-attr]
         cut = "".join(turn.text[end:] for turn, end in turns).replace(" ", ""), True
         assert found == {"whole": ("", False), "silent": ("", False), "cutting": cut}
+
+
+def test_a_guess_without_a_meaning_stands_next_to_the_rate(result: MakeResult) -> None:
+    known = [result("success", number) for number in range(3)]
+    guess = result("failure", 3, guessed=True)
+    (table,) = make_run_tables(make_frame([("", [*known, guess])]))
+    words = "guessed a goal in 1 of 4 episodes, whose words have no meaning for it."
+    assert [note for note in table.notes if words in note]
+    (table,) = make_run_tables(make_frame([("", known)]))
+    assert not [note for note in table.notes if "guessed" in note]

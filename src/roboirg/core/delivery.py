@@ -28,7 +28,7 @@ class HeardUtterance(NamedTuple):
     Attributes:
         text: its words.
         step: control step of the policy's turn at which it was heard; 0 is before its first step,
-            and before the video if there is one.
+            and after the video if there is one.
     """
 
     text: str

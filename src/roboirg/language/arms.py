@@ -23,7 +23,7 @@ from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import instruct_with
-from roboirg.language.instruction import Instruction, Utterance
+from roboirg.language.instruction import Instruction, Meaning, Utterance
 from roboirg.language.settings import EXPLICIT
 from roboirg.language.worded_command import goal_name
 from roboirg.tasks import get_task, with_goal
@@ -105,7 +105,9 @@ def say_arm(episode: Episode, options: InstructionOptions, arm: str = TOLD) -> A
     if number is not None:
         told = _paraphrase(stated, options, told, number)
     elif arm in SILENT_TEXTS:
-        told = _with_texts(told, (SILENT_TEXTS[arm],))
+        # No words leave all goals, where scrambled ones have a meaning that is not known.
+        nothing = None if told.meaning is None else Meaning({})
+        told = _with_texts(told, (SILENT_TEXTS[arm],), nothing)
     elif arm == SCRAMBLED:
         told = _scramble(stated, told)
     return ArmWords(stated, told, None if stated is episode else episode)
@@ -157,8 +159,10 @@ def _scramble(episode: Episode, told: Instruction) -> Instruction:
     return _with_texts(told, tuple(" ".join(next(rest) for _ in each) for each in words))
 
 
-def _with_texts(told: Instruction, texts: tuple[str, ...]) -> Instruction:
+def _with_texts(
+    told: Instruction, texts: tuple[str, ...], meaning: Meaning | None = None
+) -> Instruction:
     """Return an instruction of other texts, which mention nothing; the last is the command."""
-    stages = [one.stage for one in told.utterances][-len(texts) :]
+    stages = [utterance.stage for utterance in told.utterances][-len(texts) :]
     utterances = tuple(map(Utterance, stages, texts))
-    return replace(told, utterances=utterances, mentions=())
+    return replace(told, utterances=utterances, mentions=(), meaning=meaning)

@@ -231,6 +231,7 @@ def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> In
             "language_version": LANGUAGE_VERSIONS[request.options.language],
             "templates": list(request.sampler.log),
         },
+        meaning=spec.meaning,
     )
     hidden = _hidden_slots(request, found)
     return replace(found, metadata={**found.metadata, "hidden_slots": hidden})

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, cast, get_args
+from typing import Any, Literal, NamedTuple, cast, get_args
 
 from roboirg.core.episode import Goal
+from roboirg.language.landmarks import Frame
 
 Form = Literal["implicit", "resolved"]
 UtteranceStage = Literal["introduction", "reinforcement", "distractor", "cue", "command"]
@@ -59,6 +60,52 @@ class Mention:
     value: str | int
 
 
+class Described(NamedTuple):
+    """A thing or a number that is described instead of named; the scene tells which one it is.
+
+    Attributes:
+        phrase: the description, as it was said.
+        kind: whether it names a place on the table, or what there is to see.
+        frame: whose left and right a place means.
+    """
+
+    phrase: str
+    kind: Literal["place", "clue"]
+    frame: Frame
+
+
+class Term(NamedTuple):
+    """How the value of a field of the command follows from what was said.
+
+    Attributes:
+        operation: ``same``, the only operand; ``rank``, the operand of a position; ``other``, of
+            two operands the one without that position; ``without``, what the operands leave of all
+            that the scene has; ``double`` and ``half`` of a number; ``step``, a number and some
+            more or less.
+        operands: what was said, in the order of speaking.
+        rank: the position, from 1; 0 without one.
+        step: added to the number; negative for less.
+    """
+
+    operation: Literal["same", "rank", "other", "without", "double", "half", "step"]
+    operands: tuple[str | int | Described, ...]
+    rank: int = 0
+    step: int = 0
+
+
+class Meaning(NamedTuple):
+    """What an instruction means by declaration; `roboirg.language.meaning` finds the goals.
+
+    Attributes:
+        terms: by field of the command; empty if the words say nothing about the goal.
+        settled: the fields that the last utterance settles alone, as it has all that their terms
+            need.
+    """
+
+    terms: Mapping[str, Term]
+    settled: frozenset[str] = frozenset()
+
+
 @dataclass(frozen=True, slots=True)
 class Instruction:
     """Everything said to the robot in one episode.
@@ -73,6 +120,7 @@ class Instruction:
         mentions: in the order of their position.
         metadata: reasoning pattern, context stages, landmarks, frame of reference, template
             ids, language version; plain JSON values.
+        meaning: what it means by declaration; None if none is declared.
     """
 
     task: str
@@ -82,6 +130,7 @@ class Instruction:
     utterances: tuple[Utterance, ...]
     mentions: tuple[Mention, ...] = ()
     metadata: Mapping[str, object] = field(default_factory=dict)
+    meaning: Meaning | None = None
 
     @property
     def text(self) -> str:

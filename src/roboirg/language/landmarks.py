@@ -193,15 +193,24 @@ def candidates_in(scene: Scene, thing: ObjectKind) -> tuple[SceneObject, ...]:
     return tuple(cube for cube in scene.of_kind("cube") if cube.name not in late)
 
 
-class _Direction(NamedTuple):
+class Direction(NamedTuple):
+    """Words and a ranking along one of four directions.
+
+    Attributes:
+        extreme: the first in that direction.
+        rank: after *second* and *third*.
+        ranking: the first one first.
+        sided: whether it is left or right, so that the frame matters.
+    """
+
     extreme: str
     rank: str
     ranking: Ranking
     sided: bool = False
 
 
-def _directions(frame: Frame) -> tuple[_Direction, ...]:
-    # Left and right come first: `_sides` and `_far_sides` take these two.
+def directions(frame: Frame) -> tuple[Direction, ...]:
+    """Return left, right, near and far of a frame, in this order."""
     if frame == "robot":
         robot, owner = "you", "your"
         left = Ranking(lambda item: item.position.y)
@@ -211,10 +220,10 @@ def _directions(frame: Frame) -> tuple[_Direction, ...]:
     right = Ranking(_negated(left.quantity), left.margin)
     near, far = f"closest to {robot}", f"farthest from {robot}"
     return (
-        _Direction(f"farthest to {owner} left", f"from {owner} left", left, sided=True),
-        _Direction(f"farthest to {owner} right", f"from {owner} right", right, sided=True),
-        _Direction(near, near, Ranking(lambda item: -item.position.x)),
-        _Direction(far, far, Ranking(lambda item: item.position.x)),
+        Direction(f"farthest to {owner} left", f"from {owner} left", left, sided=True),
+        Direction(f"farthest to {owner} right", f"from {owner} right", right, sided=True),
+        Direction(near, near, Ranking(lambda item: -item.position.x)),
+        Direction(far, far, Ranking(lambda item: item.position.x)),
     )
 
 
@@ -229,7 +238,7 @@ def _column(item: SceneObject) -> float:
 
 
 def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    for direction in _directions(frame):
+    for direction in directions(frame):
         yield Selector(
             Landmark(direction.extreme, LandmarkClass.EXTREME, direction.sided),
             (direction.ranking,),
@@ -239,7 +248,7 @@ def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sel
 
 def _sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
     owner = "your" if frame == "robot" else "the camera's"
-    for side, direction in zip(("left", "right"), _directions(frame), strict=False):
+    for side, direction in zip(("left", "right"), directions(frame), strict=False):
         yield Selector(
             Landmark(f"on {owner} {side}", LandmarkClass.EXTREME, sided=True),
             (direction.ranking,),
@@ -251,7 +260,7 @@ def _far_sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Se
     """Yield *at your far right*, where the side and the far corner mean the same object."""
     if frame != "robot":
         return
-    for side, direction in zip(("left", "right"), _directions(frame), strict=False):
+    for side, direction in zip(("left", "right"), directions(frame), strict=False):
         corners = tuple(nearness((area["far"], area[side])) for area in (WORK_AREA, TABLE))
         landmark = Landmark(f"at your far {side}", LandmarkClass.EXTREME, sided=True)
         yield Selector(landmark, (direction.ranking, *corners), candidates)
@@ -281,7 +290,7 @@ def _ranks(
         # The last one in a row is the extreme of the other end.
         if rank > len(candidates) - 2:
             continue
-        for direction in _directions(frame):
+        for direction in directions(frame):
             landmark = Landmark(f"{ordinal} {direction.rank}", kind, direction.sided)
             yield Selector(landmark, (direction.ranking,), candidates, rank)
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping
 from typing import Any
 
 from roboirg.core.episode import Episode, Scene, SceneObject
 from roboirg.language.instruction import Instruction
-from roboirg.language.landmarks import FRAMES, selectors
+from roboirg.language.landmarks import FRAMES
+from roboirg.language.places import things_at
 from roboirg.tasks import get_task
 
 _SIDES = {"left": "right", "right": "left", "leftmost": "rightmost", "rightmost": "leftmost"}
-_SIDE = re.compile(rf"\b({'|'.join(_SIDES)})\b")
+_SIDE = re.compile(rf"\b({'|'.join(_SIDES)})\b(?! (?:by|next))")
 
 
 def exchange_sides(words: str) -> str:
@@ -35,16 +37,13 @@ def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str,
     frame = metadata["frame"]
     if frame not in FRAMES or not any(map(_SIDE.search, places)):
         return {}
-    objects: dict[str, SceneObject | None] = {}
-    for selector in selectors(episode.scene, get_task(episode.task).commands.pointed, frame):
-        phrase = selector.landmark.phrase
-        if phrase in places or exchange_sides(phrase) in places:
-            objects.setdefault(phrase, selector.select())
+    objects = things_at(episode.scene, get_task(episode.task).commands.pointed, frame)
     alike = _of_same_color if "counts" in episode.goal.as_mapping() else _alone
-    names = {
-        phrase: frozenset() if item is None else alike(episode.scene, item)
-        for phrase, item in objects.items()
-    }
+    names: dict[str, frozenset[str]] = {}
+    for phrase in itertools.chain(places, map(exchange_sides, places)):
+        item = objects.get(phrase)
+        if item is not None:
+            names[phrase] = alike(episode.scene, item)
     all_meant = frozenset[str]().union(*(names[place] for place in places if place in names))
     found: dict[str, frozenset[str]] = {}
     for place in places:

@@ -17,7 +17,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES, SlotTypeName
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName, Pools, pool_of
-from roboirg.language.instruction import Expression, UtteranceStage
+from roboirg.language.instruction import Expression, Meaning, UtteranceStage
 from roboirg.language.landmarks import Frame
 from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, swap_particles
 from roboirg.language.template_sampler import TemplateSampler
@@ -323,10 +323,12 @@ class InstructionSpec:
     Attributes:
         utterances: in the order of speaking; the last one is the command.
         notes: entries of the metadata.
+        meaning: by declaration; None if none is declared.
     """
 
     utterances: tuple[UtteranceSpec, ...]
     notes: Mapping[str, object] = field(default_factory=dict)
+    meaning: Meaning | None = None
 
 
 # Cached: all settings and forms of an episode ask for the same.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -42,6 +42,15 @@ class TemplateSampler:
         index = _drawn(self.key, purpose, count, hashed=self.hashed) if count > 1 else 0
         return self._take(purpose, options, index)
 
+    def pick_named(self, purpose: str, options: Mapping[str, Option]) -> Option:
+        """Pick one of the options, all equally likely; a further option takes some draws only.
+
+        Each name has a number of its own, and the smallest number wins.
+        """
+        name = min(options, key=lambda name: _hash(self.key, f"{purpose}|{name}"))
+        self.log.append(f"{purpose}/{name}")
+        return options[name]
+
     def cycle(self, purpose: str, options: Sequence[Option]) -> Iterator[Option]:
         """Yield all options in random order, repeating the cycle forever; log what is used."""
         order = _shuffled(self.key, purpose, len(options), hashed=self.hashed)
@@ -57,10 +66,15 @@ def sampler_of(
     episode: Episode, variant: int = 0, language: int = DEFAULT_LANGUAGE
 ) -> TemplateSampler:
     """Return the sampler of an episode; each variant draws its words anew, 0 is the usual one."""
-    usual = language == DEFAULT_LANGUAGE
-    draws = DRAWS if usual else LANGUAGE_VERSIONS[language]
-    key = f"{draws}|{episode.task}|{episode.seed}"
-    return TemplateSampler(f"{key}|{variant}" if variant else key, hashed=not usual)
+    key = f"{episode.task}|{episode.seed}"
+    return sampler_for(f"{key}|{variant}" if variant else key, language)
+
+
+def sampler_for(key: str, language: int) -> TemplateSampler:
+    """Return the sampler of a key in a language."""
+    is_usual = language == DEFAULT_LANGUAGE
+    draws = DRAWS if is_usual else LANGUAGE_VERSIONS[language]
+    return TemplateSampler(f"{draws}|{key}", hashed=not is_usual)
 
 
 def _hash(key: str, purpose: str) -> int:

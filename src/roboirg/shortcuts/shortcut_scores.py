@@ -8,6 +8,7 @@ from functools import partial
 from typing import NamedTuple, cast
 
 from roboirg.core.episode import Goal, values_in
+from roboirg.core.errors import InvalidValueError
 from roboirg.language.instruction import hidden_slots as hidden_in
 from roboirg.shortcuts.command_chance import blind_goals, right_share
 from roboirg.shortcuts.goal_learner import Told
@@ -50,11 +51,14 @@ def score_chance(told: Told) -> ShortcutScore:
     """Score a blind guess among the goals that command and scene leave; see `blind_goals`."""
     episode, instruction = told
     goals = blind_goals(instruction, episode)
-    slots = {
-        slot: sum((_overlap(goal, episode.goal, slot) for goal in goals), Fraction(0)) / len(goals)
-        for slot in counted_slots(told)
-    }
-    return ShortcutScore(slots, right_share(goals, episode))
+    share = right_share(goals, episode)
+    if share is None:
+        raise InvalidValueError(f"{episode.key}: no meaning is known of {instruction.text!r}.")
+    slots: dict[str, Fraction] = {}
+    for slot in counted_slots(told):
+        overlaps = [_overlap(goal, episode.goal, slot) for goal in goals]
+        slots[slot] = sum(overlaps, Fraction(0)) / len(goals)
+    return ShortcutScore(slots, share)
 
 
 def _overlap(guess: Goal, goal: Goal, slot: str) -> Fraction:

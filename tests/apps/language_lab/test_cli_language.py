@@ -116,7 +116,8 @@ def test_an_author_sees_texts_and_the_broken_rule(tmp_path: Path, snapshot):
     file = tmp_path / "mine.toml"
     file.write_text(
         'task = "PickXtimes"\n[[scenario]]\nframe = "far"\npool = "train"\nsetting = "spatial"\n'
-        'introduction = "Look at the cube {place}."\nsay.color = ["<there place: the one there>"]\n'
+        'introduction = "Look at the cube {place}."\n'
+        'say.color = ["the cube <there place: there>"]\n'
     )
     words = ["language", "check-scenarios", str(file), "--seeds", "0"]
     result = CliRunner().invoke(cli.app, words)

@@ -6,17 +6,21 @@ import functools
 import json
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from roboirg.apps.grounding.answer_scores import OWN_WORDS
 from roboirg.core.episode import Episode, Goal
-from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.instruction_options import DEFAULT_LANGUAGE, InstructionOptions
 from roboirg.evaluation.grounding_items.answer_file import Answer
 from roboirg.evaluation.grounding_items.grounding_item import LETTERS, GroundingItem
 from roboirg.evaluation.grounding_items.verdicts import right_reply
+from roboirg.language.generator import instruct_with
 from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.reader import interpret
 from roboirg.shortcuts import SURFACE_RULES, draw_goal, guess_goal
-from roboirg.shortcuts.command_chance import fitting_goals
+from roboirg.shortcuts.command_chance import goals_of_command
 from roboirg.shortcuts.goal_learner import Heard
 from roboirg.shortcuts.shortcut_tables import learn_goals
 from roboirg.shortcuts.text_guess import TextGuess
@@ -86,8 +90,17 @@ def _random_goal(_item: GroundingItem, episode: Episode, rng: np.random.Generato
 
 
 def _command_goal(item: GroundingItem, episode: Episode, rng: np.random.Generator) -> Goal:
-    goals = fitting_goals(item.turns[-1], episode)
+    goals = _left_by_command(item, episode) or goals_of(episode)
     return goals[int(rng.integers(len(goals)))]
+
+
+def _left_by_command(item: GroundingItem, episode: Episode) -> tuple[Goal, ...]:
+    """Return the goals that fit the command alone; none if they are not known."""
+    if item.options.language == DEFAULT_LANGUAGE:
+        return interpret(item.turns[-1], episode.scene, item.task).goals
+    wordings = None if item.wordings == OWN_WORDS else item.wordings
+    instruction = instruct_with(episode, replace(item.options, wordings=wordings))
+    return goals_of_command(instruction, episode)
 
 
 def _rule_goal(

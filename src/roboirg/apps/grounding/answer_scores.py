@@ -185,11 +185,12 @@ def _row(score: GroundingScore, summary: Measured[ScopeKey]) -> ScoreRow:
     )
 
 
-def _mean_over_tasks(values: Iterable[tuple[GroundingItem, float]]) -> float:
-    """Return the mean over tasks of the means, weighted as the rates are; 0 without values."""
+def _mean_over_tasks(values: Iterable[tuple[GroundingItem, float | None]]) -> float:
+    """Return the mean over tasks of the known means, weighted as the rates are; 0 without any."""
     by_task: dict[str, list[float]] = defaultdict(list)
     for item, value in values:
-        by_task[item.task].append(value)
+        if value is not None:
+            by_task[item.task].append(value)
     means = [float(np.mean(own)) for own in by_task.values()]
     return float(np.mean(means)) if means else 0.0
 

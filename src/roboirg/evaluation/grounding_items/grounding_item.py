@@ -88,7 +88,7 @@ class GroundingItem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
     choice_answers: list[str]
     points: list[PointTarget]
     points_in_order: bool
-    command_chance: float
+    command_chance: float | None
     hidden_slots: list[str]
     pattern: str | None
     expressions: list[str]

@@ -100,6 +100,7 @@ def _make_item(
     explicit = InstructionOptions(wordings=pool, language=options.language)
     commands = [instruct_with(with_goal(episode, goal), explicit).text for goal in choices]
     goals, answers = task.goals(episode.scene), schema.answers
+    chance = right_share(blind_goals(instruction, episode), episode)
     return GroundingItem(
         id=name,
         task=task.name,
@@ -131,7 +132,7 @@ def _make_item(
         choice_answers=[answers[goal] for goal in choices],
         points=list(media.points),
         points_in_order=is_ordered(episode.goal),
-        command_chance=float(right_share(blind_goals(instruction, episode), episode)),
+        command_chance=None if chance is None else float(chance),
         # A resolved command leaves none to its context.
         hidden_slots=[]
         if options.form == "resolved"

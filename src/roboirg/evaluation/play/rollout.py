@@ -46,7 +46,7 @@ from roboirg.evaluation.records.record import Job, Record
 from roboirg.policies.by_name.finding import make_policy
 from roboirg.policies.by_name.policy_kinds import make_follower
 from roboirg.policies.contract.base import Policy, close_policy
-from roboirg.policies.contract.policy_calls import policy_usage
+from roboirg.policies.contract.policy_calls import GUESSED, policy_usage
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit
 from roboirg.policies.prompt_length.tokenizer_file import prompt_limit
@@ -265,6 +265,7 @@ def _close_policy(policy: Policy, record: Record, guard: CallGuard) -> None:
         with guard.policy("policy's close()", "policy_close"):
             try:
                 record.usage = policy_usage(policy)
+                record.guessed = GUESSED in record.usage
             finally:
                 close_policy(policy)
     except EpisodeError as error:

@@ -145,7 +145,7 @@ class UtteranceRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
         stage: its part in the discourse.
         text: its words.
         step: control step of the policy's turn at which it was heard; 0 is before its first step,
-            and before the video if there is one; None if the episode ended before.
+            and after the video if there is one; None if the episode ended before.
     """
 
     stage: str
@@ -310,6 +310,8 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
         plan: fingerprint of the plan.
         attempt: number of the attempt, from 1.
         prompt_verdict: whether all that was said reached the policy's language model.
+        guessed: whether the policy reports that it chose a goal at random, because the words have
+            no meaning for it.
         robot: the real robot that played it; None in simulation.
         action_log: digest of the executed actions, as in `roboirg.evaluation.records.action_log`;
             None if they were not kept.
@@ -341,6 +343,7 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
     plan: Name | None = None
     attempt: Whole = 1
     prompt_verdict: PromptVerdict = "unknown"
+    guessed: bool = False
     robot: Name | None = None
     action_log: str | None = None
     video: RunPath | None = None

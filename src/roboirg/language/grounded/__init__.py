@@ -5,7 +5,7 @@ from __future__ import annotations
 from roboirg.language.grounded.clue import Clue, draw_clue
 from roboirg.language.grounded.counted import amount_clues, repeat_clues
 from roboirg.language.grounded.placements import placement_clues
-from roboirg.language.grounded.things import thing_clues
+from roboirg.language.grounded.things import spoken_clues, thing_clues
 
 __all__ = [
     "Clue",
@@ -13,5 +13,6 @@ __all__ = [
     "draw_clue",
     "placement_clues",
     "repeat_clues",
+    "spoken_clues",
     "thing_clues",
 ]

@@ -10,13 +10,15 @@ import itertools
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from roboirg.core.episode import Scene, SceneObject
 from roboirg.core.motions import Away, Swap
 from roboirg.core.word_pools import PoolName
 from roboirg.language.grounded import grounded_templates as templates
-from roboirg.language.grounded.clue import Clue
+from roboirg.language.grounded.clue import Clue, ClueKind
 from roboirg.language.landmarks import LandmarkClass, Ranking, candidates_in, nearness, selectors
+from roboirg.language.places import PlaceClass, SpokenPlace, spoken_places
 from roboirg.language.request import GoalValue, InstructionRequest
 
 AXES = ("x", "y")
@@ -24,6 +26,14 @@ FEW = 3
 """Things of which two are set aside."""
 _ANCHORS = (LandmarkClass.EXTREME, LandmarkClass.FIXTURE)
 """Of the two things that are set aside."""
+_SPOKEN: Mapping[PlaceClass, ClueKind] = {
+    PlaceClass.MIDDLE: "betweenness",
+    PlaceClass.BETWEEN: "betweenness",
+    PlaceClass.NEIGHBOR: "bridging",
+}
+"""Places of language 4 that only who sees the other things finds, as clues."""
+_ASIDE = (PlaceClass.EXTREME, PlaceClass.FIXTURE, PlaceClass.CORNER)
+"""Places of language 4 of the two things that are set aside."""
 _LINKS = (
     (0, _ANCHORS),
     (0, (LandmarkClass.CORNER,)),
@@ -132,6 +142,42 @@ def _left_over(
                 clue._replace(said=said.format(**places))
                 for said in templates.LEFT_OVER_SAID.of(pool)
             ]
+    return found
+
+
+class SpokenClue(NamedTuple):
+    """A clue in the words of language 4, and the thing that it leads to."""
+
+    thing: SceneObject
+    clue: Clue
+
+
+def spoken_clues(scene: Scene, kind: str) -> list[SpokenClue]:
+    """Return the clues of language 4 to all things of a kind, from what stands around them."""
+    noun = kind.removeprefix("hidden_")
+    places = [place for place in spoken_places(scene, kind, "robot") if place.attributive]
+    found = _with_others_aside(candidates_in(scene, kind), places)
+    for place in places:
+        clue = Clue(_SPOKEN.get(place.kind, "bridging"), f"the {noun} {place.attributive}")
+        # A neighbor in words that no one says is said where there is nothing else.
+        is_rare = place.kind == PlaceClass.UNUSUAL and "nearest to" in clue.words
+        is_led_to = any(place.thing is known.thing for known in found)
+        if place.kind in _SPOKEN or (is_rare and not is_led_to):
+            found.append(SpokenClue(place.thing, clue))
+    return found
+
+
+def _with_others_aside(
+    things: Sequence[SceneObject], places: Sequence[SpokenPlace]
+) -> list[SpokenClue]:
+    """Return the clues to each of three things by the places of the two others."""
+    found: list[SpokenClue] = []
+    simple = [place for place in places if place.kind in _ASIDE and len(things) == FEW]
+    for first, second in itertools.combinations(simple, 2):
+        left = [thing for thing in things if thing not in (first.thing, second.thing)]
+        if len(left) == 1:
+            aside = (first.said(None), second.said(None))
+            found.append(SpokenClue(left[0], Clue("sets", " ".join(aside), aside=aside)))
     return found
 
 

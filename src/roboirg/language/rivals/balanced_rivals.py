@@ -44,7 +44,7 @@ def balanced_rival(request: InstructionRequest, pairs: list[ValuePair]) -> Value
     episode, slot, meant = request.episode, pairs[0].slot, pairs[0].meant.value
     by_value = {pair.rival.value: pair for pair in pairs}
     split = episode.split if episode.split in SPLITS else REFERENCE_SPLIT
-    entries, partners = _partners(request.task.name, split)
+    entries, partners = _partners(request.task.name, split, request.options.language)
     entry = entries.get(episode.index)
     if episode.split == split and entry is not None and entry.seed == episode.seed:
         likely = [partners[episode.index]] if episode.index in partners else []
@@ -60,14 +60,16 @@ def balanced_rival(request: InstructionRequest, pairs: list[ValuePair]) -> Value
 
 
 @functools.cache
-def _partners(task: str, split: Split) -> tuple[Mapping[int, SplitEntry], Mapping[int, str | int]]:
+def _partners(
+    task: str, split: Split, language: int
+) -> tuple[Mapping[int, SplitEntry], Mapping[int, str | int]]:
     """Return the episodes of a split that can have a rival, and the rivals of those with partners.
 
     Partners are found among the values that are left most often, so that few are left over.
     """
     entries: dict[int, SplitEntry] = {}
     for episode in split_episodes([task], [split]):
-        sampler = sampler_of(episode)
+        sampler = sampler_of(episode, language=language)
         request = InstructionRequest(episode, get_task(task), InstructionOptions(), sampler)
         pairs = rival_pairs(request)
         if pairs:

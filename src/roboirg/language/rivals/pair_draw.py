@@ -10,8 +10,7 @@ from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.rivals import rival_templates as templates
 from roboirg.language.rivals.balanced_rivals import balanced_rival
 from roboirg.language.rivals.value_pair import ValuePair, rival_pairs
-from roboirg.language.template_sampler import TemplateSampler
-from roboirg.language.templates import DRAWS
+from roboirg.language.template_sampler import sampler_for
 
 Fill = Literal["other", "both"]
 
@@ -88,8 +87,8 @@ def draw_order(request: InstructionRequest) -> PairOrder:
     """
     episode = request.episode
     block, place = divmod(episode.index, BLOCK)
-    key = f"{DRAWS}|{episode.task}|{episode.split}|{block}"
-    cycle = TemplateSampler(key).cycle("rival order", _ORDERS)
+    key = f"{episode.task}|{episode.split}|{block}"
+    cycle = sampler_for(key, request.options.language).cycle("rival order", _ORDERS)
     found = next(itertools.islice(cycle, place, None))
     request.sampler.log.append(f"rival order/{_ORDERS.index(found)}")
     return found

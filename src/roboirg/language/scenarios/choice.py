@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 from roboirg.language.grounded import Clue
 from roboirg.language.instruction import REFERENCE
+from roboirg.language.places import USUAL, SpokenPlace, spoken_places
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.rivals.balanced_rivals import balanced_rival
 from roboirg.language.rivals.pair_draw import draw_order
@@ -26,18 +26,13 @@ from roboirg.language.scenarios.introduced import (
     named,
     several,
 )
-from roboirg.language.scenarios.markup import Text, slots_in
+from roboirg.language.scenarios.markup import Slot, Text, slots_said
 from roboirg.language.scenarios.scenario import PERSON, Scenario
 from roboirg.language.settings.grounded import clues_of
 from roboirg.language.settings.reasoning import BLOCK
-from roboirg.language.settings.spatial import draw_landmarks
-from roboirg.language.template_sampler import sampler_of
 
 _DESCRIBED = ("place", "clue", "aside", "rest")
 """Slots for a thing that is described; a scenario fits the things that have those that it names."""
-
-_HEAVY = ("second", "third", "corner")
-"""Words of clues that are hard to follow: *right next to the one second from your left*."""
 
 
 class Chosen(NamedTuple):
@@ -61,33 +56,39 @@ def choose(
 ) -> Chosen | None:
     """Return what is said in a setting that does not refuse; None if no scenario fits."""
     sampler = request.sampler
-    known = [one for one in scenarios if _fits(one, request)]
-    said = [
-        (offer, saying)
-        for offer in _OFFERS[setting](request)
-        if (saying := [one for one in known if _says(one, offer)])
-    ]
-    if not said:
+    known = [scenario for scenario in scenarios if _fits(scenario, request)]
+    possible = _OFFERS[setting](request)
+    offers = [offer for offer in possible if any(_says(scenario, offer) for scenario in known)]
+    if not offers:
         return None
     if setting == "reasoning":
-        # By the turn of its pattern, as in language 3.
-        patterns = list(dict.fromkeys(offer.notes["pattern"] for offer, _ in said))
-        index = request.episode.index
-        pattern = patterns[(index + index // BLOCK) % len(patterns)]
-        of_pattern = [one for one in said if one[0].notes["pattern"] == pattern]
-        said = [sampler.pick(f"{pattern} derivation", of_pattern)]
-    ((offer, saying),) = said
+        offers = [_in_turn(request, offers)]
+    saying = [scenario for scenario in known if any(_says(scenario, offer) for offer in offers)]
     purpose = setting.removeprefix("direct-")
-    kinds = sorted({kind for one in saying for kind in one.classes})
-    kind = sampler.pick(f"{purpose} class", kinds)
-    scenario = sampler.pick(f"{purpose} scenario", [one for one in saying if kind in one.classes])
-    sampler.log.append(f"frame/{scenario.fields.frame}")
+    kinds = {kind: kind for scenario in saying for kind in scenario.classes}
+    kind = sampler.pick_named(f"{purpose} class", kinds)
+    of_kind = {scenario.fields.frame: scenario for scenario in saying if kind in scenario.classes}
+    scenario = sampler.pick_named(f"{purpose} scenario", of_kind)
+    offer = next(offer for offer in offers if _says(scenario, offer))
     words = sampler.pick(f"{purpose} words", scenario.classes[kind])
     values = {**goal_values(request), **offer.values}
     if offer.listed is None and scenario.fields.list:
         values |= several("list", _list(request, scenario))
     values |= _people(request, scenario)
     return Chosen(scenario, Introduced(values, offer.notes), words, offer.remark)
+
+
+def _in_turn(request: InstructionRequest, offers: Sequence[Offer]) -> Offer:
+    """Draw a derivation of the pattern whose turn it is, as in language 3."""
+    patterns = list(dict.fromkeys(str(offer.notes["pattern"]) for offer in offers))
+    index = request.episode.index
+    pattern = patterns[(index + index // BLOCK) % len(patterns)]
+    derivations: dict[str, Offer] = {}
+    for offer in offers:
+        if offer.notes["pattern"] == pattern:
+            name = f"{offer.notes['relation']} {offer.notes['reference']} {offer.listed}"
+            derivations[name] = offer
+    return request.sampler.pick_named(f"{pattern} derivation", derivations)
 
 
 def _people(request: InstructionRequest, scenario: Scenario) -> Values:
@@ -121,12 +122,7 @@ def _says(scenario: Scenario, offer: Offer) -> bool:
     return (
         set(scenario.said) == set(offer.fields)
         and offer.listed in (None, fields.list)
-        and offer.values.keys()
-        >= {
-            name
-            for name in slots_in(scenario.text("introduction"))
-            if name.partition(".")[0] in _DESCRIBED
-        }
+        and all(_has_words(slot, offer) for slot in slots_said(scenario.text("introduction")))
         and (
             derive is None
             or (
@@ -135,6 +131,14 @@ def _says(scenario: Scenario, offer: Offer) -> bool:
             )
         )
     )
+
+
+def _has_words(slot: Slot, offer: Offer) -> bool:
+    """Return whether an offer has words for a slot; those of values are always known."""
+    if slot.name.partition(".")[0] not in _DESCRIBED:
+        return True
+    values = offer.values.get(slot.name, ())
+    return bool(values) and (values[0].kind != "place" or values[0].form == slot.form)
 
 
 def _of_slot(request: InstructionRequest, slot: str) -> list[GoalValue]:
@@ -168,39 +172,65 @@ def _list(request: InstructionRequest, scenario: Scenario) -> Sequence[Introduce
 
 
 def _spatial(request: InstructionRequest) -> Iterator[Offer]:
-    marks = draw_landmarks(request)
-    # Of a single cube "at your far left" may be false; it is the one farthest to the left.
-    phrases = [mark.phrase.replace("at your far", "farthest to your") for mark in marks]
-    at = _plainest(phrases)
-    color = request.color_values[at]
-    place = (IntroducedValue(color.slot, "place", color.value, phrases[at]),)
-    notes: dict[str, object] = {
-        "landmarks": [phrases[at]],
-        "landmark_classes": [marks[at].level],
-        "frame": request.frame,
-    }
-    fields = [one.field for one in request.color_values]
-    yield Offer(fields, {"place": place, f"place.{at}": place}, notes)
+    """Yield a place after a noun, and a spot, if there are such words for a thing of the goal."""
+    colors = request.color_values
+    for form in (None, "spot"):
+        drawn = _drawn_places(request, form)
+        if drawn:
+            # Of two things only that with the shorter words has a place.
+            at, place = min(drawn.items(), key=lambda item: len(item[1].said(form)))
+            words = place.said(form)
+            value = (IntroducedValue(colors[at].slot, "place", colors[at].value, words, form),)
+            notes: dict[str, object] = {
+                "landmarks": [words],
+                "landmark_classes": [int(place.kind)],
+                "frame": request.frame,
+            }
+            fields = [color.field for color in colors]
+            yield Offer(fields, {"place": value, f"place.{at}": value}, notes)
+
+
+def _drawn_places(request: InstructionRequest, form: str | None) -> dict[int, SpokenPlace]:
+    """Draw a place for each color of the goal, by its number, that has one in this form.
+
+    The class is drawn first, or most places would be extremes.
+    """
+    found: dict[int, SpokenPlace] = {}
+    places = spoken_places(request.episode.scene, request.task.commands.pointed, request.frame)
+    for at, color in enumerate(request.color_values):
+        things = request.objects_to_point_at(color)
+        known = [place for place in places if place.thing in things and place.said(form)]
+        possible = [place for place in known if place.kind <= USUAL] or known[:1]
+        if possible:
+            kinds = list(dict.fromkeys(place.kind for place in possible))
+            kind = request.sampler.pick(f"{form} class-{color.field}", kinds)
+            of_kind = [place for place in possible if place.kind == kind]
+            found[at] = request.sampler.pick(f"{form} place-{color.field}", of_kind)
+    return found
 
 
 def _grounded(request: InstructionRequest) -> Iterator[Offer]:
-    clues = clues_of(request, _HEAVY)
-    at = _plainest([clue.words for clue in clues.values()])
-    thing, clue = list(clues.items())[at]
+    clues = clues_of(request, spoken=True)
+    if not clues:
+        return
+    # Of two things only that with the shorter words is described.
+    thing, clue = min(clues.items(), key=lambda item: len(item[1].words))
+    alike = [value for value in request.goal_values if value.slot == thing.slot]
+    fields = {value.field for value in (*clues, *alike)}
     notes: dict[str, object] = {
         "touched": [thing.slot],
         "pattern": clue.kind,
         "patterns": [clue.kind],
     }
-    yield Offer([one.field for one in clues], _seen(thing, clue, at), notes)
+    yield Offer(fields, _seen(thing, clue), notes)
 
 
-def _seen(thing: GoalValue, clue: Clue, at: int) -> Values:
+def _seen(thing: GoalValue, clue: Clue) -> Values:
     """Return the slots for a clue; for one that sets two things aside, those of what is left."""
     if not clue.aside:
-        words = clue.words.replace("that comes ", "").replace("that is ", "")
-        seen = (IntroducedValue(thing.slot, "clue", thing.value, words),)
-        return {"clue": seen, f"clue.{at}": seen}
+        seen = (IntroducedValue(thing.slot, "clue", thing.value, clue.words),)
+        _, _, number = thing.field.partition(".")
+        return {"clue": seen, f"clue.{number}": seen}
     aside = [IntroducedValue("", "place", place, place) for place in clue.aside]
     return {
         "rest": (IntroducedValue(thing.slot, "clue", thing.value, "one"),),
@@ -208,15 +238,10 @@ def _seen(thing: GoalValue, clue: Clue, at: int) -> Values:
     }
 
 
-def _plainest(words: Sequence[str]) -> int:
-    """Return which of several things is described, the shortest way; the others are named."""
-    return min(range(len(words)), key=lambda at: len(words[at]))
-
-
 def _rival(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield a pair as in language 3, whose partners make both values equally likely."""
-    pairs = rival_pairs(replace(request, sampler=sampler_of(request.episode)))
-    pair, order = balanced_rival(request, pairs), draw_order(request)
+    """Yield a pair whose partners make both values equally likely."""
+    pair = balanced_rival(request, rival_pairs(request))
+    order = draw_order(request)
     fields = [one.field for one in pair if pair.ordered or one is pair.meant]
     rival = IntroducedValue(pair.rival.slot, pair.meant.slot_type, pair.rival.value)
     both = (named(pair.meant), rival) if order.meant_first else (rival, named(pair.meant))

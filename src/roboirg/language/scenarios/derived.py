@@ -70,7 +70,7 @@ def _colored(request: InstructionRequest) -> Iterator[Offer]:
     colors = request.values_of("color")
     if len(colors) == 1:
         excluded = [IntroducedValue(REFERENCE, "color", one) for one in excluded_colors(request)]
-        yield _derived("color exclusion", [colors[0].field], {"excluded": tuple(excluded)})
+        yield _derived("color exclusion", [colors[0].field], several("excluded", excluded))
     if len(colors) == PAIR:
         both = [named(one) for one in colors]
         yield _one_of(request, both, both[0], [one.field for one in colors], colors[0].slot)

@@ -25,12 +25,14 @@ class IntroducedValue(NamedTuple):
         kind: type of the value: ``color``, ``number``, ``visit``, ``place`` …
         value: of its mentions.
         words: how it is said; empty for the usual words of its kind.
+        form: the only form in which a place can be said, ``spot`` or None.
     """
 
     slot: str
     kind: str
     value: str | int
     words: str = ""
+    form: str | None = None
 
     def said(self, form: str | None) -> str:
         """Return the words for the value in a form, or as a number of a noun."""

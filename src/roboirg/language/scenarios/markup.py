@@ -1,8 +1,8 @@
 """The marks in the sentences of a scenario: slots, pointers and agreement.
 
 =================================  ================================================================
-``{color}``, ``{repeats:lap}``     a slot; after the colon a form: ``times``, ``ordinal``, ``or`` …,
-                                   or a noun to be counted, *three laps*
+``{color}``, ``{repeats:lap}``     a slot; after the colon a form: ``times``, ``ordinal``, ``or``,
+                                   ``spot`` …, or a noun to be counted, *three laps*
 ``<it color: it>``                 words that point back, after their class and what they stand for
 ``[repeats: lap|laps]``            singular or plural, by the slot that decides
 =================================  ================================================================
@@ -12,9 +12,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import NamedTuple, Union
+from typing import Literal, NamedTuple, Union
 
 from roboirg.language.phrases import TaggedText
+
+Operation = Literal[
+    "same", "rank", "other", "without", "minus", "plus", "double", "half", "earlier", "later",
+    "before", "after", "place", "seen",
+]  # fmt: skip
+"""How a value follows from what a pointer stands for."""
 
 _NAME = r"(?:rival )?[a-z]+(?:\.\d)?"
 _SLOT = re.compile(rf"\{{(?P<name>{_NAME})(?::(?P<form>[a-z -]+))?\}}")
@@ -72,7 +78,7 @@ class Pointer(NamedTuple):
     words: str
     parts: Text
     resolved: Text = ()
-    operation: str = "same"
+    operation: Operation = "same"
 
 
 def parse(text: object) -> Text:
@@ -106,6 +112,11 @@ def _parsed(mark: re.Match[str]) -> Part:
     if mark["name"]:
         return Slot(mark["name"], mark["form"])
     return Agreement(mark["controller"], mark["one"], mark["many"])
+
+
+def slots_said(text: Text) -> Iterator[Slot]:
+    """Yield the slots that a sentence says outside of its pointers."""
+    return (part for part in text if isinstance(part, Slot))
 
 
 def pointers_in(text: Text) -> Iterator[Pointer]:

@@ -11,17 +11,13 @@ from typing import Any, Literal
 import msgspec
 
 from roboirg.core.word_pools import PoolName
-from roboirg.language.scenarios.markup import Text
+from roboirg.language.scenarios.markup import Operation, Text
 
 ScenarioSetting = Literal["direct", "reasoning", "spatial", "direct-rival", "grounded"]
 """The settings that scenarios are written for; contextual takes those of direct."""
 Texts = tuple[str, ...]
-Operation = Literal[
-    "same", "rank", "other", "without", "minus", "plus", "double", "half", "earlier", "later",
-    "before", "after", "two before", "two after", "place", "seen",
-]  # fmt: skip
-PERSON = ("person", "he", "him", "his")
-"""The slots of a person; those of another one end in ``.2``."""
+PERSON = ("person", "he", "him", "his", "hers")
+"""The slots of a person, ``hers`` for *his* or *hers* alone; those of another one end in ``.2``."""
 PEOPLE = frozenset(f"{slot}{number}" for number in ("", ".2") for slot in PERSON)
 """Those of both."""
 REMARKS = ("former", "latter", "not_former", "not_latter")

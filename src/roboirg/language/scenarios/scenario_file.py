@@ -31,11 +31,11 @@ from roboirg.language.scenarios.scenario import (
 
 FOLDER = files("roboirg.language.scenarios")
 Stored = TypeVar("Stored")
-PRONOUNS = {"he": ("he", "him", "his"), "she": ("she", "her", "her")}
+PRONOUNS = {"he": ("he", "him", "his", "his"), "she": ("she", "her", "her", "hers")}
 GIVEN = frozenset(
-    {"list", "list.0", "list.1", "list.2", "rank", "reference", "step", "excluded", "taken"}
+    {"list", "list.0", "list.1", "list.2", "rank", "reference", "step", "taken"}
     | {"place", "place.0", "place.1", "clue", "clue.0", "clue.1", "aside.0", "aside.1", "rest"}
-    | {"total"}
+    | {"total", "excluded", "excluded.0", "excluded.1"}
     | PEOPLE
 )
 """Slots that are no fields of the goal."""

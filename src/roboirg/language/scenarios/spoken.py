@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple, cast
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
-from roboirg.language.instruction import REFERENCE, Expression, UtteranceStage
+from roboirg.language.instruction import REFERENCE, Expression, Meaning, Term, UtteranceStage
 from roboirg.language.phrases import (
     Phrase,
     TaggedText,
@@ -27,8 +27,14 @@ from roboirg.language.request import (
     UtteranceSpec,
 )
 from roboirg.language.scenarios.choice import Chosen, choose, rival_values
+from roboirg.language.scenarios.declared import (
+    ChoosingRemark,
+    SaidValues,
+    chosen_term,
+    pointed_term,
+)
 from roboirg.language.scenarios.introduced import Introduced, goal_values
-from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, slots_in
+from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, pointers_in, slots_in
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.scenario_file import general, task_scenarios
 from roboirg.language.settings import all_settings, contextual
@@ -95,7 +101,8 @@ def say(request: InstructionRequest) -> InstructionSpec:
     words = cast("TaskScenarios", task_scenarios(request.task.name))
     if request.options.setting == _EXPLICIT:
         speech = Speech(request, words, Introduced(goal_values(request)))
-        return InstructionSpec((UtteranceSpec("command", speech.command({}, ())),))
+        command = UtteranceSpec("command", speech.command({}, ()))
+        return InstructionSpec((command,), meaning=speech.meaning())
     choice = _choose(request)
     request.sampler.log.extend(choice.log)
     return say_chosen(request, words, cast("Chosen", choice.chosen))
@@ -123,20 +130,24 @@ def say_chosen(
     said = {scenario.said[0]: chosen.first}
     for name in scenario.said[1:]:
         said[name] = request.sampler.pick(f"{name} words", scenario.texts[f"say.{name}"])
-    fields = {name: speech.field(name, text) for name, text in said.items()}
-    command = speech.command(fields, _lead(request, chosen))
-    return InstructionSpec((*utterances, UtteranceSpec("command", command)), notes)
+    lead, remark = _lead(request, chosen)
+    before = speech.phrase(lead, resolved=request.resolved)
+    fields = {name: speech.field(name, text, remark) for name, text in said.items()}
+    command = speech.command(fields, before)
+    utterances.append(UtteranceSpec("command", command))
+    return InstructionSpec(tuple(utterances), notes, speech.meaning(pointing=fields.keys()))
 
 
-def _lead(request: InstructionRequest, chosen: Chosen) -> Text:
-    """Return the words before the command: the lead, and the remark that chooses."""
+def _lead(request: InstructionRequest, chosen: Chosen) -> tuple[Text, ChoosingRemark | None]:
+    """Return the words before the command, and the remark in them that chooses, if one does."""
     scenario = chosen.scenario
     if request.resolved and "resolved.lead" in scenario.texts:
-        return scenario.text("resolved.lead")
+        return scenario.text("resolved.lead"), None
     if not chosen.remark:
-        return scenario.text("lead")
-    remark = request.sampler.pick("remark", scenario.texts[f"remarks.{chosen.remark}"])
-    return (*scenario.text("lead"), *remark)
+        return scenario.text("lead"), None
+    text = request.sampler.pick("remark", scenario.texts[f"remarks.{chosen.remark}"])
+    remark = ChoosingRemark(next(pointers_in(text)), chosen.remark.startswith("not_"))
+    return (*scenario.text("lead"), *text), remark
 
 
 def _stages(
@@ -172,6 +183,8 @@ class Speech:
     ) -> None:
         self._request, self._words, self._introduced = request, words, introduced
         self._scenario = scenario
+        self._said = SaidValues(request.frame)
+        self._terms: dict[str, Term] = {}
 
     def phrase(
         self, text: Text, introduced: Introduced | None = None, *, resolved: bool = False
@@ -184,9 +197,12 @@ class Speech:
                 pieces.append(part)
             elif isinstance(part, Slot):
                 pieces.extend(values.phrase(part))
+                self._said.add(part.name, values.values[part.name])
             elif isinstance(part, Agreement):
                 words = part.one if values.count(part.controller) == 1 else part.many
                 pieces.append(TaggedText(words))
+                if part.controller == "step":  # *right before*, *two before*
+                    self._said.add("step", values.values["step"])
             else:
                 pieces.extend(self._named(part) if resolved else self._pointing(part))
         return tuple(piece for piece in pieces if piece.text)
@@ -213,18 +229,35 @@ class Speech:
             return (TaggedText("the "), Slot(name), TaggedText(ends[kind]))
         return (Slot(name, "times" if kind == "number" and name != REFERENCE else None),)
 
-    def field(self, name: str, words: Text) -> Phrase:
-        """Return the words for a field of the command, resolved if these are asked for."""
+    def field(self, name: str, words: Text, remark: ChoosingRemark | None = None) -> Phrase:
+        """Return the words for a field of the command, resolved if these are asked for.
+
+        A remark, if there is one, has chosen what they point at.
+        """
         scenario = self._scenario
         if self._request.resolved and scenario:
             states = scenario.fields.setting in _STATING
             usual = self._words.stated[name] if states else words
             words = scenario.texts.get(f"resolved.{name}", (usual,))[0]
-        return self.phrase(words, resolved=self._request.resolved)
+        phrase = self.phrase(words, resolved=self._request.resolved)
+        pointers = list(pointers_in(words))
+        if remark and pointers:
+            self._terms[name] = chosen_term(pointers[-1], remark, self._said)
+        elif pointers:
+            self._terms[name] = pointed_term(pointers[-1], self._said)
+        else:
+            self._terms[name] = Term("same", self._said.operands(name))
+        return phrase
 
-    def command(self, fields: Mapping[str, Phrase], lead: Text) -> Phrase:
+    def meaning(self, pointing: Collection[str] = ()) -> Meaning:
+        """Return what has been said, of which some fields point back at what came before."""
+        settled = set(self._terms)
+        if not self._request.resolved:
+            settled -= set(pointing)
+        return Meaning(dict(self._terms), frozenset(settled))
+
+    def command(self, fields: Mapping[str, Phrase], lead: Phrase) -> Phrase:
         """Return the command with the words for some fields; the others state their values."""
-        before = self.phrase(lead, resolved=self._request.resolved)
         if self._request.wordings is not None:
             skeleton = self._request.command(
                 {name: self._outside(name, words) for name, words in fields.items()}
@@ -232,16 +265,18 @@ class Speech:
         else:
             skeleton = self._skeleton(fields)
         if lead:
-            before = _begun(before, str.upper)
-            ended = before[-1].text.endswith((". ", "! ", "? "))
+            lead = _begun(lead, str.upper)
+            ended = lead[-1].text.endswith((". ", "! ", "? "))
             skeleton = skeleton if ended else _begun(skeleton, str.lower)
-        return (*before, *skeleton)
+        return (*lead, *skeleton)
 
     def _skeleton(self, fields: Mapping[str, Phrase]) -> Phrase:
-        wanted = frozenset(one.field for one in self._request.goal_values)
+        wanted = frozenset(value.field for value in self._request.goal_values)
         possible = self._words.commands[self._request.pool, wanted]
         template = self._request.sampler.pick(f"command-{len(wanted)}", possible)
-        words = {one: fields.get(one) or self.phrase(self._words.stated[one]) for one in wanted}
+        words = {
+            name: fields.get(name) or self.field(name, self._words.stated[name]) for name in wanted
+        }
         return swap_particles(fill(template, words)) if fields else fill(template, words)
 
     def _outside(self, name: str, words: Phrase) -> Phrase:
@@ -264,8 +299,10 @@ class Speech:
         return self._request.around(name, tuple(piece for piece in words if piece.text))
 
     def neutral(self, scenario: Scenario) -> Iterator[Phrase]:
-        """Yield remarks: first the scenario's own, then those about anything, for ever."""
-        yield from map(self.phrase, scenario.texts.get("distractors", ()))
+        """Yield remarks for ever: the scenario's own in any order, then those about anything."""
+        own = scenario.texts.get("distractors", ())
+        in_any_order = self._request.sampler.cycle("own distractor", own)
+        yield from map(self.phrase, itertools.islice(in_any_order, len(own)))
         known = general().distractors[self._request.pool]
         yield from map(plain, self._request.sampler.cycle("distractor", known))
 

@@ -15,6 +15,7 @@ from roboirg.language.grounded import (
     draw_clue,
     placement_clues,
     repeat_clues,
+    spoken_clues,
     thing_clues,
 )
 from roboirg.language.grounded.grounded_templates import (
@@ -76,22 +77,24 @@ def say(request: InstructionRequest) -> InstructionSpec:
     return InstructionSpec(utterances, notes)
 
 
-def clues_of(request: InstructionRequest, avoided: Sequence[str] = ()) -> Clues:
+def clues_of(request: InstructionRequest, *, spoken: bool = False) -> Clues:
     """Return a clue for each value that the words leave to what is seen, in order of speaking.
 
-    Clues with one of the words to be avoided are only drawn where there is no other one.
+    `spoken` takes the clues to things in the words of language 4.
     """
     found: dict[GoalValue, Clue] = {}
     for value in request.goal_values:
         sought = _SOUGHT.get(value.slot) if _is_open(request, value.slot) else None
+        if spoken and sought is _thing_clues:
+            sought = _spoken_clues
         clues = sought(request, value) if sought else []
-        plain = [one for one in clues if not any(word in one.words for word in avoided)]
-        clue = draw_clue(request, f"{value.field} seen", plain or clues)
+        clue = draw_clue(request, f"{value.field} seen", clues)
         if clue is not None:
             found[value] = clue
     colors = request.color_values
-    if len(colors) > MOST_COLORS or any(one not in found for one in colors):
-        # The words describe all colors of the goal, or none.
+    some_lack = not spoken and any(one not in found for one in colors)
+    if len(colors) > MOST_COLORS or some_lack:
+        # The words describe all colors of the goal, or none; those of language 4 only one.
         found = {value: clue for value, clue in found.items() if value not in colors}
     if any(one.slot == "colors" for one in found):
         found = {value: clue for value, clue in found.items() if value.slot != "counts"}
@@ -115,6 +118,14 @@ def _thing_clues(request: InstructionRequest, value: GoalValue) -> list[Clue]:
     single = len(request.color_values) == 1
     # Two sets in one sentence are too long.
     return [one for one in thing_clues(request, value) if single or one.kind != "sets"]
+
+
+def _spoken_clues(request: InstructionRequest, value: GoalValue) -> list[Clue]:
+    targets = request.objects_to_point_at(value)
+    known = spoken_clues(request.episode.scene, request.task.commands.pointed)
+    clues = [found.clue for found in known if found.thing in targets]
+    single = len(request.color_values) == 1
+    return [clue for clue in clues if single or clue.kind != "sets"]
 
 
 _SOUGHT = {

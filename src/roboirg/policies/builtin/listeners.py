@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from roboirg.core.episode import Episode, Goal
+from roboirg.core.observations import Demonstration
 from roboirg.policies.builtin.scripted import READING, ScriptedPolicy
+from roboirg.policies.contract.policy_calls import GUESSED
 from roboirg.shortcuts import draw_goal, guess_goal
-from roboirg.shortcuts.command_chance import fitting_goals
+from roboirg.shortcuts.command_chance import goals_of_command, understood_goals
+from roboirg.tasks import goals_of
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -27,34 +30,53 @@ def choice_generator(seed: int, episode: Episode, instruction: str) -> np.random
 
 
 class ListenerPolicy(ScriptedPolicy):
-    """Language oracle: understands the whole instruction with the interpreter.
+    """Language oracle: understands the whole instruction, by its declared meaning where it has one.
 
     It knows the scene (for hidden cubes what the video shows) but not the goal. If several goals
-    fit the words, it chooses one of them at random; if none does, one of all goals. Of an
-    instruction in turns it remembers every utterance.
+    fit the words, it chooses one of them at random. If the words mean nothing, it guesses among all
+    goals, and `usage` counts that. Of an instruction in turns it remembers every utterance.
     """
 
     metadata: ClassVar[Mapping[str, str]] = READING
 
+    def __init__(self, seed: int = 0) -> None:
+        super().__init__(seed)
+        self._has_guessed = False
+
+    def reset(self, instruction: str, demonstration: Demonstration) -> None:
+        """Begin an episode."""
+        self._has_guessed = False
+        super().reset(instruction, demonstration)
+
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:
         """Return a goal that fits the instruction."""
-        episode = env.episode
-        choices = fitting_goals(instruction, episode)
-        rng = choice_generator(self.seed, episode, instruction)
-        return choices[int(rng.integers(len(choices)))]
+        return self._chosen(understood_goals(env.instruction, env.episode), env, instruction)
+
+    def _chosen(self, goals: Sequence[Goal], env: RoboIRGEnv, words: str) -> Goal:
+        """Return one of some goals at random; of all goals if there is none."""
+        if not goals:
+            self._has_guessed = True
+            goals = goals_of(env.episode)
+        rng = choice_generator(self.seed, env.episode, words)
+        return goals[int(rng.integers(len(goals)))]
+
+    def usage(self) -> dict[str, float]:
+        """Return whether it has guessed because the words mean nothing."""
+        return {GUESSED: 1.0} if self._has_guessed else {}
 
 
 class ForgetfulPolicy(ListenerPolicy):
     """Command-only baseline: hears the last utterance and guesses among the goals that fit it.
 
-    Its success rate is the chance level of a setting: the share that needs no context.
+    Its success rate is the share of a setting that needs no context.
     """
 
     metadata: ClassVar[Mapping[str, str]] = {**READING, "reads_text": "only the last utterance"}
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal:  # noqa: ARG002
         """Return a goal that fits the final command alone."""
-        return super().decide(env, env.instruction.command)
+        command = env.instruction.command
+        return self._chosen(goals_of_command(env.instruction, env.episode), env, command)
 
 
 class ShortcutPolicy(ScriptedPolicy):

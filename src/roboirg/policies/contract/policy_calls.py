@@ -36,6 +36,8 @@ _METADATA = "the policy's metadata"
 
 MAX_COSTS = 64
 """Most entries of a policy's usage."""
+GUESSED = "guessed"
+"""The entry of a policy's usage for an episode whose words mean nothing to it."""
 
 
 def check_rows(rows: Any, space: ActionSpace) -> NDArray[np.float64]:  # noqa: ANN401

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import functools
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.resources import files
 
-from roboirg.apps.language_lab.scenarios.meaning import meant_value
 from roboirg.apps.language_lab.scenarios.sentence_rules import blanked, broken_sentences
-from roboirg.apps.language_lab.validation.episode_checks import leaking, only_candidate, places_of
+from roboirg.apps.language_lab.validation.episode_checks import leaking, places_of
 from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import request_of, spoken_instruction
 from roboirg.language.instruction import Instruction, Mention
+from roboirg.language.meaning import field_values, meant_goals
 from roboirg.language.request import InstructionRequest
 from roboirg.language.scenarios.choice import Chosen, choose
 from roboirg.language.scenarios.markup import slots_in
@@ -23,14 +23,12 @@ from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.spoken import say_chosen
 from roboirg.language.settings import all_settings
 from roboirg.language.token_counts import ADDED_TOKENS, USUAL_LIMIT, count_tokens
-from roboirg.reader import interpret
+from roboirg.shortcuts.command_chance import goals_of_command, is_right
 from roboirg.tasks import goals_of, with_goal
 from roboirg.tasks.splits.splits import get_episode
 
 RANDOM_SCENES = 200
 SHOWN = 3
-READ_EVERY = 8
-"""Of the scenes that fit, the interpreter reads every eighth: it takes most of the time."""
 _RANKED = ("former", "latter", "first", "second", "third", "last", "choice", "other")
 
 
@@ -47,8 +45,6 @@ class ScenarioReport:
         scenes: number of scenes that it fits.
         open: number of these where its command alone leaves several goals.
         longest: the text with most tokens, after their number.
-        readings: texts by what the interpreter did with them: ``read``, ``refused``, or
-            ``misread``, a fault of the interpreter, unless a person gets another goal, too.
     """
 
     scenario: Scenario
@@ -59,7 +55,6 @@ class ScenarioReport:
     scenes: int = 0
     open: int = 0
     longest: tuple[int, str] = (0, "")
-    readings: dict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
 
     def add(self, rule: str, text: str) -> None:
         """Count a broken rule."""
@@ -156,16 +151,12 @@ def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episod
         # What is seen is said again in the resolved form, which nobody has to hear.
         if not (request.resolved and name == "grounded"):
             report.longest = max(report.longest, (tokens_of(text), text))
-        if number % READ_EVERY == 0:
-            goals = interpret(text, episode.scene, episode.task).goals
-            wrong = "misread" if len(goals) == 1 else "refused"
-            report.readings["read" if goals == (episode.goal,) else wrong].append(text)
     implicit, _, *competing = told
     report.competing = report.competing or "".join(one.text for one in competing)
     if len(report.renderings) < SHOWN and number % 3 == 0:
         report.renderings.append(implicit.text)
     report.scenes += 1
-    report.open += not only_candidate(episode, implicit)
+    report.open += not all(is_right(goal, episode) for goal in goals_of_command(implicit, episode))
     others = [goal for goal in goals_of(episode) if goal != episode.goal]
     for goal in others[number % max(1, len(others)) :][:1]:
         said = _said(request_of(with_goal(episode, goal), options), words, report.scenario)
@@ -187,16 +178,21 @@ def _said(
 
 def _broken(request: InstructionRequest, chosen: Chosen, told: Instruction) -> Iterator[str]:
     """Yield the rules that a text breaks."""
-    scenario = chosen.scenario
-    goal = {one.field: one.value for one in request.goal_values}
-    for name in scenario.said:
-        for text in scenario.texts[f"say.{name}"]:
-            found = meant_value(request, chosen, name, text)
-            if found != goal[name]:
-                yield f"say.{name}: means {found}, but the goal is {goal[name]}"
-    for _, words in leaking(told, request.episode):
+    episode, meaning = request.episode, told.meaning
+    if meaning is None:
+        yield "declares no meaning"
+        return
+    for value in request.goal_values:
+        found = field_values(meaning, value.field, episode)
+        if found != {value.value}:
+            words = " or ".join(sorted(map(str, found))) or "nothing"
+            yield f"say.{value.field}: means {words}, but the goal is {value.value}"
+    goals = meant_goals(meaning, episode)
+    if not goals or not all(is_right(goal, episode) for goal in goals):
+        yield "means another goal, or several"
+    for _, words in leaking(told, episode):
         yield f"the command gives away {words}"
-    yield from _broken_pointers(told, scenario)
+    yield from _broken_pointers(told, chosen.scenario)
 
 
 def _broken_pointers(told: Instruction, scenario: Scenario) -> Iterator[str]:

@@ -12,19 +12,11 @@ from roboirg.language.token_counts import USUAL_LIMIT
 def report_lines(report: ScenarioReport) -> Iterator[str]:
     """Yield what an author wants to know: texts, length, scenes, and every broken rule."""
     fields, fits = report.scenario.fields, report.scenes
-    misread, unread = report.readings["misread"], len(report.readings["refused"])
-    texts = sum(map(len, report.readings.values()))
     yield f"{fields.frame} ({fields.setting}, {fields.pool})"
     yield from (f"  {text}" for text in report.renderings)
     if report.competing:
         yield f"  With a competing remark: {report.competing}"
-    yield (
-        f"  {report.longest[0]} of {USUAL_LIMIT} tokens; fits {counted(fits, 'scene')}; "
-        f"the interpreter does not read {unread} of {counted(texts, 'text')}."
-    )
-    if misread:
-        yield f"  It gets another goal from {len(misread)}; if you do not, tell its authors:"
-        yield f"    {misread[0]}"
+    yield f"  {report.longest[0]} of {USUAL_LIMIT} tokens; fits {counted(fits, 'scene')}."
     if report.open < fits:
         yield f"  In {counted(fits - report.open, 'scene')} the command alone gives the goal."
     for rule, number in report.broken.items():

@@ -12,7 +12,7 @@ from roboirg.language.scenarios.scenario import PEOPLE, Scenario
 
 NEVER: Mapping[str, str] = {
     r"you(?:'ve| have)? (?:just )?saw|you(?:'ve| have) (?:just )?seen|as you saw": (
-        "in turns it is heard before the video"
+        "what was seen is not checked"
     ),
     r"look(?:ing)? at": "the thing may be covered or not there yet",
     r"point(?:ing|ed) (?:at|to)": "nobody points",

@@ -24,7 +24,7 @@ _COLOR_WORDS = frozenset(
 _TIME_WORDS = frozenset(
     ("before", "after", "earlier", "later", "previous", "previously", "next", "following")
 )
-_POINTERS = ("first", "second", "third", "one")
+_POINTERS = ("first", "second", "third", "one", "each", "other")
 
 
 def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
@@ -62,7 +62,7 @@ def _spellings(value: SlotValue) -> frozenset[str]:
 
 
 def _without_pointers(instruction: Instruction) -> str:
-    """Return the command without *the first of them* and *the one I mentioned earlier*.
+    """Return the command without *the first of them*, *the one I mentioned* and *once for each*.
 
     Their numbers say nothing about the goal's.
     """

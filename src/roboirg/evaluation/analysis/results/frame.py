@@ -113,6 +113,7 @@ COLUMNS: Mapping[str, FrameColumn] = {
         _field(
             "prompt", "text", "whether the prompt was heard whole, or cut", path="prompt_verdict"
         ),
+        _field("guessed", "flag", "whether the words had no meaning for the policy, so it guessed"),
         _field("steps", "number", "control steps that the policy played"),
         _field("demonstration_steps", "number", "frames of the video before its turn"),
         _field("wordings", "text", "pool or file of other words", "own words", "options.wordings"),

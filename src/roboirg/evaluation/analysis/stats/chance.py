@@ -1,12 +1,13 @@
 """Expected success of the policies that do not understand: the chance level, and shortcuts.
 
 The forgetful listener hears only the final command and chooses uniformly among the goals that fit
-it, or among all goals if none fits. Its expected success is the chance level. It follows without
-playing, assuming flawless execution: the share of these goals that have the stages of the right
-one. Where the words leave two values, as with a rival, it is a guess among these. A shortcut
-listener draws its goal by a surface rule; its expected success is the probability that this goal is
-right. Nothing of this is estimated. Learned floors have the level that was measured for the task
-and setting, on the test split or random scenes, in the version of the language that was played.
+it. Its expected success, ``command``, follows without playing, assuming flawless execution: the
+share of these goals that have the stages of the right one. The chance level is that of a guess
+among the values that the context names, such as a value and its rival, or else the same. Neither is
+known for words without a meaning. A shortcut listener draws its goal by a surface rule; its
+expected success is the probability that this goal is right. Nothing of this is estimated. Learned
+floors have the level that was measured for the task and setting, on the test split or random
+scenes, in the version of the language that was played.
 """
 
 from __future__ import annotations
@@ -26,14 +27,14 @@ from roboirg.evaluation.analysis.stats.measured_floors import (
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record import Job
 from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
-from roboirg.shortcuts.command_chance import blind_goals, right_share
+from roboirg.shortcuts.command_chance import blind_goals, goals_of_command, right_share
 from roboirg.tasks import get_task
 from roboirg.tasks.other_goals import begins_with
 from roboirg.tasks.splits.splits import get_episode
 
-CHANCE = "chance"
-FLOORS = (CHANCE, *SURFACE_RULES, *LEARNED)
-"""The forgetful listener, the shortcut listeners by the names of their rules, and learners."""
+CHANCE, COMMAND = "chance", "command"
+FLOORS = (CHANCE, COMMAND, *SURFACE_RULES, *LEARNED)
+"""A blind guess, the forgetful listener, the shortcut listeners by their rules, and learners."""
 
 
 def floor_level(floor: str, jobs: Iterable[Job], language: str = "") -> Fraction | None:
@@ -90,4 +91,6 @@ def _level(floor: str, language: str, job: Job) -> Fraction | None:
     instruction = instruct_job(job)
     if floor == CHANCE:
         return right_share(blind_goals(instruction, episode), episode)
+    if floor == COMMAND:
+        return right_share(goals_of_command(instruction, episode), episode)
     return goal_share(guess_goal(floor, instruction.text, job.task), episode)

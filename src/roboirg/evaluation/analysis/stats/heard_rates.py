@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
+from roboirg.core.plain_text import counted
 from roboirg.evaluation.analysis.results.frame import MISSING, Frame, RunNames
 from roboirg.evaluation.analysis.stats.cells import Key, rows_of
 from roboirg.evaluation.analysis.stats.rates import percent_range
@@ -28,15 +30,25 @@ def count_heard(frame: Frame, by: Sequence[str]) -> Mapping[Key, HeardCounts]:
 
 
 def heard_notes(frame: Frame, names: RunNames) -> list[str]:
-    """Return a sentence for each policy of which some prompts were cut, or may have been."""
+    """Return a sentence for each policy whose prompts were or may be cut, or that guessed."""
     counts = count_heard(frame, ())
-    found = {run: one for (run,), one in counts.items() if one["cut"] or one["unknown"]}
-    return [
-        f"{name} did not read every instruction to its end (its prompt is limited): "
-        f"{cut_text([found[run]])} % of its prompts were cut; tables --which heard has the rates."
-        for run, name in names.items()
-        if run in found
-    ]
+    episodes = Counter(frame["run"])
+    guesses = Counter(itertools.compress(frame["run"], frame["guessed"]))
+    notes: list[str] = []
+    for run, name in names.items():
+        heard = counts.get((run,), Counter())
+        if heard["cut"] or heard["unknown"]:
+            notes.append(
+                f"{name} did not read every instruction to its end (its prompt is limited): "
+                f"{cut_text([heard])} % of its prompts were cut; "
+                "tables --which heard has the rates."
+            )
+        if guesses[run]:
+            notes.append(
+                f"{name} guessed a goal in {guesses[run]} of {counted(episodes[run], 'episode')}, "
+                "whose words have no meaning for it."
+            )
+    return notes
 
 
 def cut_text(tasks: Sequence[HeardCounts]) -> str:

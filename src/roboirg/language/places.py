@@ -1,0 +1,342 @@
+"""Places as people say them: language 4's words for where a thing stands.
+
+A place has two wordings. *All the way on the right* follows a noun and singles out one of several
+things; *on the far right* says where something is or happens, and needs a truth of its own: the
+thing stands clearly there, and no other one does. Left and right are those of a frame, as in
+`landmarks`, and its margins hold: if one thing moves by less, no phrase goes over to another thing
+(by half of it, if others are named as near to the one that moves).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from enum import IntEnum
+from functools import lru_cache
+from typing import NamedTuple
+
+from roboirg.core.episode import ObjectKind, Scene, SceneObject
+from roboirg.core.motions import Point
+from roboirg.core.object_sizes import BESIDE
+from roboirg.language.landmarks import (
+    MARGIN,
+    ORDINALS,
+    PAIRED,
+    Frame,
+    Ranking,
+    candidates_in,
+    directions,
+    nearness,
+    selectors,
+)
+
+Things = Sequence[SceneObject]
+
+
+class PlaceClass(IntEnum):
+    """What kind of place words name, in the order of preference."""
+
+    EXTREME = 1
+    """The first in a direction, *all the way on the right*, or the only one, *on the right*."""
+    FIXTURE = 2
+    """*nearest to the button*; where it is really near, *next to the button*."""
+    SIDE_OF_FIXTURE = 3
+    """The only one on that side: *to the left of the button*."""
+    BETWEEN = 4
+    """*between the button and the target*"""
+    COLOR = 5
+    """*nearest to the red cube*, *next to the red cube*"""
+    RANK = 6
+    """*second from the left*"""
+    MIDDLE = 7
+    """*in the middle*"""
+    CORNER = 8
+    """The only one in that quarter: *at the back left*, *in the front right corner*."""
+    NEIGHBOR = 9
+    """*nearest to the one all the way on the right*"""
+    UNUSUAL = 10
+    """What no one says: landmarks of language 3, *second nearest to the cube closest to you*."""
+
+
+USUAL = PlaceClass.CORNER
+"""The last class that people say without need; others only where there is none of these."""
+
+
+class SpokenPlace(NamedTuple):
+    """A place, and what stands there.
+
+    Attributes:
+        kind: class.
+        thing: what the words single out, by the margin.
+        attributive: words after a noun: *the cube* **nearest to the button**. None for the only
+            thing of its kind on the table, which needs no telling apart.
+        spot: words for where something happens: *the table wobbles* **right by the button**. None
+            if the thing is not clearly there alone.
+    """
+
+    kind: PlaceClass
+    thing: SceneObject
+    attributive: str | None
+    spot: str | None = None
+
+    def said(self, form: str | None) -> str:
+        """Return the words of the form ``spot``, or those after a noun; empty if there are none."""
+        words = self.spot if form == "spot" else self.attributive
+        return words or ""
+
+
+# Cached: all forms of an episode ask for the same.
+@lru_cache(maxsize=64)
+def spoken_places(scene: Scene, thing: ObjectKind, frame: Frame) -> tuple[SpokenPlace, ...]:
+    """Return all places of the things of a kind, from the best class to the last.
+
+    Things are where the scene has them, at the start; what moves later is named by where it
+    started. Cubes that arrive later are no things yet.
+    """
+    things = candidates_in(scene, thing)
+    places: list[SpokenPlace] = []
+    if things and thing not in PAIRED:
+        places += _usual_places(scene, things, frame)
+    for selector in selectors(scene, thing, frame):
+        places += _said(PlaceClass.UNUSUAL, selector.select(), selector.landmark.phrase)
+    if len(things) == 1:
+        places = [place._replace(attributive=None) for place in places if place.spot]
+    return tuple(sorted(places, key=lambda place: place.kind))
+
+
+def _usual_places(scene: Scene, things: Things, frame: Frame) -> list[SpokenPlace]:
+    """Return the places that people say, and the neighbors of what has one of the simplest."""
+    places = list(_in_directions(things, frame))
+    if frame == "robot":
+        places += _corners(things)
+        places += _on_sides(things, scene)
+    anchors = list(_anchors(things, scene))
+    for place in places:
+        if place.attributive and place.kind in (PlaceClass.EXTREME, PlaceClass.CORNER):
+            name = f"the one {place.attributive}"
+            anchors.append(_Anchor(PlaceClass.NEIGHBOR, name, place.thing))
+    for anchor in anchors:
+        places += _near_anchor(anchor, things)
+    places += _between(things, scene)
+    places += _in_middle(things)
+    return places
+
+
+@lru_cache(maxsize=64)
+def things_at(
+    scene: Scene, thing: ObjectKind, frame: Frame
+) -> Mapping[str | None, SceneObject | None]:
+    """Return what each phrase for a place singles out, in either language; None if unclear."""
+    found: dict[str | None, SceneObject | None] = {}
+    for selector in selectors(scene, thing, frame):
+        found[selector.landmark.phrase] = selector.select()
+    for place in spoken_places(scene, thing, frame):
+        found |= {place.attributive: place.thing, place.spot: place.thing}
+    return found
+
+
+def _said(
+    kind: PlaceClass, thing: SceneObject | None, attributive: str | None, spot: str | None = None
+) -> Iterator[SpokenPlace]:
+    """Yield a place if something stands there, and if there are words for it."""
+    if thing is not None and (attributive or spot):
+        yield SpokenPlace(kind, thing, attributive, spot)
+
+
+def _beyond(ranking: Ranking, start: float) -> Ranking:
+    """Return how far things are inside the region that begins at a value."""
+    return ranking._replace(quantity=lambda thing: ranking.quantity(thing) - start)
+
+
+def _past(ranking: Ranking, start: SceneObject) -> Ranking:
+    """Return how far things are past an object."""
+    return _beyond(ranking, ranking.quantity(start))
+
+
+def _both(first: Ranking, second: Ranking) -> Ranking:
+    """Return how far things are inside of both regions."""
+    return first._replace(quantity=lambda thing: min(first.quantity(thing), second.quantity(thing)))
+
+
+def _only(things: Things, region: Ranking) -> SceneObject | None:
+    """Return the only thing inside a region; None unless all others are outside by the margin."""
+    inside = region._replace(quantity=lambda thing: min(region.quantity(thing), 0.0))
+    thing = inside.select(things, 0)
+    return thing if thing and region.quantity(thing) >= 0 else None
+
+
+_CENTER = SceneObject("center", "site", Point(-0.05, 0.0, 0.0))
+"""Of the work area."""
+_CLEARLY = 2
+"""Margins from the center from which a thing is clearly in a direction."""
+_AROUND = 0.09
+"""Meters from the center up to which a thing is in the middle."""
+_DETOUR = 0.03
+"""Meters that the way from one thing to another is longer over a third one between them."""
+
+
+def _center_of(things: Things) -> SceneObject:
+    """Return the center in front of the robot: of the work area, or as deep as the things are."""
+    if len(things) == 1:
+        return _CENTER
+    depths = [thing.position.x for thing in things]
+    return replace(_CENTER, position=Point((min(depths) + max(depths)) / 2, 0.0, 0.0))
+
+
+class _Words(NamedTuple):
+    """Words of a direction; None where no one says any.
+
+    Attributes:
+        most: for the first in that direction.
+        far: where that one is ahead of all others.
+        alone: for the only one clearly in that direction.
+        spot: where that one is.
+        row: after *second*.
+    """
+
+    most: str
+    far: str | None = None
+    alone: str | None = None
+    spot: str | None = None
+    row: str | None = None
+
+
+def _sided(side: str) -> _Words:
+    """Return the words for left or right."""
+    there = f"on the {side}"
+    return _Words(f"all the way {there}", f"on the far {side}", there, there, f"from the {side}")
+
+
+_FRONT, _BACK = "all the way in the front", "all the way in the back"
+_WORDS: Mapping[Frame, tuple[_Words, ...]] = {
+    "robot": (
+        _sided("left"),
+        _sided("right"),
+        _Words("closest to you", _FRONT, "in the front", "close to you", "closest to you"),
+        _Words(_BACK, _BACK, "in the back", "in the back"),
+    ),
+    "camera": (
+        _sided("left of the picture"),
+        _sided("right of the picture"),
+        _Words("closest to the robot", None, None, "close to the robot", "closest to the robot"),
+        _Words("farthest from the robot", spot="far from the robot"),
+    ),
+}
+"""By frame, in the order of `directions`."""
+
+
+def _in_directions(things: Things, frame: Frame) -> Iterator[SpokenPlace]:
+    center = _center_of(things)
+    for words, direction in zip(_WORDS[frame], directions(frame), strict=True):
+        ranking = direction.ranking
+        clear = _CLEARLY * ranking.margin
+        region = _beyond(_past(ranking, center), clear)
+        ahead = ranking._replace(margin=clear).select(things, 0)
+        far = words.far
+        if ahead is None or region.quantity(ahead) < ranking.margin:
+            far = None
+        yield from _said(PlaceClass.EXTREME, ranking.select(things, 0), words.most, far)
+        yield from _said(PlaceClass.EXTREME, _only(things, region), words.alone, words.spot)
+        for rank, ordinal in ORDINALS.items():
+            # The last one in a row is the first from the other end.
+            if words.row and rank < len(things) - 1:
+                phrase = f"{ordinal} {words.row}"
+                yield from _said(PlaceClass.RANK, ranking.select(things, rank), phrase)
+
+
+class _Anchor(NamedTuple):
+    """What is near something: a fixture, the only cube of a color, a thing with a place."""
+
+    kind: PlaceClass
+    name: str
+    thing: SceneObject
+
+
+def _anchors(things: Things, scene: Scene) -> Iterator[_Anchor]:
+    for fixture in _fixtures_of(scene):
+        yield _Anchor(PlaceClass.FIXTURE, f"the {fixture.kind}", fixture)
+    colors = [thing.color for thing in things]
+    for thing in things:
+        if thing.color and colors.count(thing.color) == 1:
+            yield _Anchor(PlaceClass.COLOR, f"the {thing.color} cube", thing)
+
+
+def _fixtures_of(scene: Scene) -> list[SceneObject]:
+    """Return the button, the target and the bin, if there is only one of it."""
+    of_kinds = [scene.of_kind(kind) for kind in ("button", "target", "bin")]
+    return [of_kind[0] for of_kind in of_kinds if len(of_kind) == 1]
+
+
+def _near_anchor(anchor: _Anchor, things: Things) -> Iterator[SpokenPlace]:
+    kind, name = anchor.kind, anchor.name
+    others = [thing for thing in things if thing is not anchor.thing]
+    if kind > PlaceClass.FIXTURE and len(others) <= 1:
+        return  # only one thing could be meant
+    near = nearness(anchor.thing.position)
+    yield from _said(kind, near.select(others, 0), f"nearest to {name}")
+    reach = anchor.thing.half_width + things[0].half_width + BESIDE
+    beside = _only(others, _beyond(near, -reach))
+    if kind == PlaceClass.FIXTURE:
+        yield from _said(kind, beside, f"next to {name}", f"right by {name}")
+        away = near._replace(quantity=lambda thing: -near.quantity(thing))
+        yield from _said(kind, away.select(others, 0), f"farthest from {name}")
+    if kind == PlaceClass.COLOR:
+        yield from _said(kind, beside, f"next to {name}")
+
+
+def _between(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
+    for first, second in itertools.combinations(_fixtures_of(scene), 2):
+        words = f"between the {first.kind} and the {second.kind}"
+        thing = _only(things, _way_between(first, second))
+        yield from _said(PlaceClass.BETWEEN, thing, words, words)
+
+
+def _way_between(first: SceneObject, second: SceneObject) -> Ranking:
+    """Return the region of things over which the way from one to the other is hardly longer."""
+    near, far = nearness(first.position), nearness(second.position)
+    # A thing that moves comes nearer to both, or goes away from both, by as much.
+    way = Ranking(lambda thing: near.quantity(thing) + far.quantity(thing), 2 * MARGIN)
+    return _beyond(way, near.quantity(second) - _DETOUR)
+
+
+def _in_middle(things: Things) -> Iterator[SpokenPlace]:
+    """Yield the thing in the middle of an odd row, or the only one around the center."""
+    words = "in the middle"
+    near = nearness(_center_of(things).position)
+    yield from _said(PlaceClass.MIDDLE, _only(things, _beyond(near, -_AROUND)), words, words)
+    row = directions("robot")[0].ranking
+    middle = row.select(things, len(things) // 2)
+    if len(things) % 2 and middle is near.select(things, 0):
+        yield from _said(PlaceClass.MIDDLE, middle, words)
+
+
+def _corners(things: Things) -> Iterator[SpokenPlace]:
+    left, right, near, far = (direction.ranking for direction in directions("robot"))
+    center = _center_of(things)
+    for depth, along in (("front", near), ("back", far)):
+        for side, across in (("left", left), ("right", right)):
+            quarter = _both(_past(along, center), _past(across, center))
+            thing = _only(things, _beyond(quarter, MARGIN))
+            words = f"at the {depth} {side}"
+            yield from _said(PlaceClass.CORNER, thing, words, words)
+            thing = _only(things, _beyond(quarter, _CLEARLY * MARGIN))
+            words = f"in the {depth} {side} corner"
+            # Of the area where things stand: one alone is in none.
+            spot = words if len(things) > 1 else None
+            yield from _said(PlaceClass.CORNER, thing, words, spot)
+
+
+def _on_sides(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
+    """Yield the only thing left or right of a fixture, unless it is rather behind or before it."""
+    for fixture in _fixtures_of(scene):
+        for side, direction in zip(("left", "right"), directions("robot"), strict=False):
+            thing = _only(things, _past(direction.ranking, fixture))
+            words = f"to the {side} of the {fixture.kind}"
+            if thing and _is_sideways(thing, fixture):
+                yield from _said(PlaceClass.SIDE_OF_FIXTURE, thing, words)
+
+
+def _is_sideways(thing: SceneObject, fixture: SceneObject) -> bool:
+    sideways = abs(thing.position.y - fixture.position.y)
+    return sideways >= abs(thing.position.x - fixture.position.x)

@@ -1,0 +1,134 @@
+"""The meaning that a scenario declares, built from the words as they are said.
+
+No term looks at the goal: what has not been said has no operands, and then no goal fits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from roboirg.language.instruction import Described, Term
+from roboirg.language.landmarks import Frame
+from roboirg.language.scenarios.introduced import IntroducedValue
+from roboirg.language.scenarios.markup import Operation, Pointer
+
+Operand = str | int | Described
+
+_RANKS: Mapping[str, int] = {"former": 1, "latter": 2, "first": 1, "second": 2, "third": 3}
+"""Positions that classes of expressions name."""
+_DIRECTIONS: Mapping[Operation, int] = {"minus": -1, "earlier": -1, "plus": 1, "later": 1}
+"""Of a step that is said."""
+_STEPS: Mapping[Operation, int] = {"before": -1, "after": 1}
+"""Steps that the operation itself names."""
+
+
+class ChoosingRemark(NamedTuple):
+    """Words before the command that choose from a list of two, such as *Let's skip the former*.
+
+    Attributes:
+        pointer: the words that point at one of the two.
+        sets_aside: whether it is the other one that is chosen.
+    """
+
+    pointer: Pointer
+    sets_aside: bool
+
+
+@dataclass(slots=True)
+class SaidValues:
+    """The values that the words have named so far.
+
+    Attributes:
+        frame: whose left and right places mean.
+        by_slot: the values of each slot that was said, in the order of speaking.
+    """
+
+    frame: Frame
+    by_slot: dict[str, tuple[IntroducedValue, ...]] = field(default_factory=dict)
+
+    def add(self, slot: str, values: tuple[IntroducedValue, ...]) -> None:
+        """Remember the values that a slot names."""
+        self.by_slot[slot] = values
+
+    def operands(self, slot: str) -> tuple[Operand, ...]:
+        """Return what a slot named; ``colors.1`` is the second of ``colors``. Empty if nothing."""
+        base, _, number = slot.partition(".")
+        values = self.by_slot.get(slot, ())
+        if not values and number:
+            values = self.by_slot.get(base, ())[int(number) : int(number) + 1]
+        return tuple(self._operand(value) for value in values)
+
+    def listed(self, base: str) -> tuple[Operand, ...]:
+        """Return the members of a list, named together or one by one, as they were said."""
+        if base in self.by_slot:
+            return self.operands(base)
+        members: list[Operand] = []
+        for slot in self.by_slot:
+            if slot.startswith(f"{base}."):
+                members += self.operands(slot)
+        return tuple(members)
+
+    def _operand(self, value: IntroducedValue) -> Operand:
+        if value.kind == "place":
+            return Described(value.words, "place", self.frame)
+        if value.kind == "clue":
+            return Described(value.words, "clue", self.frame)
+        return value.value
+
+
+def pointed_term(pointer: Pointer, said: SaidValues) -> Term:
+    """Return the term of words that point back at what was said."""
+    operation, slot = pointer.operation, pointer.of
+    if operation == "rank":
+        members = said.listed("list") or said.listed(slot.partition(".")[0])
+        return Term("rank", members, _rank_of(pointer, said))
+    if operation == "other":
+        members = said.listed("list")
+        return Term("other", members, _taken_rank(members, said))
+    if operation == "without" or slot == "rest":
+        return Term("without", said.listed("excluded") or said.listed("aside"))
+    if operation == "double" or operation == "half":  # noqa: PLR1714 - the type checker narrows it
+        return Term(operation, said.operands(slot))
+    operands = said.operands(slot)
+    if not operands and "rank" in said.by_slot:
+        # "It's the second one's turn, so pick it up": a list was named, then a position in it.
+        return Term("rank", said.listed("list"), _rank_of(pointer, said))
+    step = _step_of(operation, said)
+    return Term("step" if step else "same", operands, step=step)
+
+
+def _rank_of(pointer: Pointer, said: SaidValues) -> int:
+    """Return the position that words name, by their class or as the number in them."""
+    if pointer.expression in _RANKS:
+        return _RANKS[pointer.expression]
+    (rank,) = said.by_slot["rank"]
+    return int(rank.value)
+
+
+def _taken_rank(members: tuple[Operand, ...], said: SaidValues) -> int:
+    """Return the position in a list of what is said to be taken; 0 if it is not in it."""
+    taken = said.operands("taken")
+    if not taken or taken[0] not in members:
+        return 0
+    return members.index(taken[0]) + 1
+
+
+def _step_of(operation: Operation, said: SaidValues) -> int:
+    """Return by how much an operation differs from the number that was said; 0 for most."""
+    if operation in _DIRECTIONS:
+        (step,) = said.by_slot["step"]
+        return _DIRECTIONS[operation] * int(step.value)
+    return _STEPS.get(operation, 0)
+
+
+def chosen_term(pointer: Pointer, remark: ChoosingRemark, said: SaidValues) -> Term:
+    """Return the term of words for a value that a remark has chosen from a list of two.
+
+    *The other one* is the one that was not chosen.
+    """
+    members, rank = said.listed("list"), _RANKS[remark.pointer.expression]
+    if remark.sets_aside:
+        rank = 3 - rank  # of two
+    return Term("other" if pointer.operation == "other" else "rank", members, rank)

@@ -1,0 +1,297 @@
+"""Places as people say them: one thing each, by the margin, and spots that are true."""
+
+import itertools
+import math
+import re
+from collections import defaultdict
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from language_variants import random_episodes, split_episodes
+from selection import slow_but
+
+from roboirg.core.episode import COLORS, Point, Scene, SceneObject
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.motions import Away
+from roboirg.core.object_sizes import BESIDE
+from roboirg.language.generator import find_refusal, request_of
+from roboirg.language.grounded import spoken_clues
+from roboirg.language.landmarks import FRAMES, MARGIN, candidates_in, selectors
+from roboirg.language.places import USUAL, PlaceClass, spoken_places, things_at
+from roboirg.language.scenarios.choice import choose
+from roboirg.language.scenarios.scenario_file import read_task_scenarios
+from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks.splits.splits import get_episode
+
+WRITTEN = ("PickXtimes", "StopCube", "VideoUnmask")
+SPATIAL = ("PickXtimes", "VideoUnmask")
+GRID = st.integers(-17, 17).map(lambda step: step / 100)
+PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=7, unique=True)
+"""Centimeter grid: ties, exact margins and collinear rows are common."""
+MOST_WORDS = 12
+WOBBLY = """
+task = "PickXtimes"
+[[scenario]]
+frame = "wobbly"
+pool = "train"
+setting = "spatial"
+introduction = "The table wobbles {place:spot}."
+say.color = ["the cube <there place: there>"]
+"""
+
+
+def table(places, *fixtures):
+    """Return a scene with containers, and fixtures by kind and place."""
+    found = [SceneObject(kind, kind, Point(*at, 0.0)) for kind, at in fixtures]
+    for number, (x, y) in enumerate(places):
+        found.append(SceneObject(f"container_{number}", "container", Point(x, y, 0.05)))
+    return Scene(tuple(found))
+
+
+def cubes(*places):
+    colored = zip(COLORS, places, strict=False)
+    things = [
+        SceneObject(f"cube_{color}", "cube", Point(x, y, 0.02), color=color)
+        for color, (x, y) in colored
+    ]
+    return Scene(tuple(things))
+
+
+def words_of(places):
+    """Yield every wording with its thing."""
+    for place in places:
+        for words in (place.attributive, place.spot):
+            if words:
+                yield words, place.thing
+
+
+def things_by_phrase(scene, kind="container", frame="robot"):
+    """Return the name of the thing of each phrase; a phrase of two things fails."""
+    found = {}
+    for words, thing in words_of(spoken_places(scene, kind, frame)):
+        assert found.setdefault(words, thing.name) == thing.name, words
+    return found
+
+
+def usual(scene, name, kind="container", frame="robot"):
+    """Return the usual words after a noun for a thing."""
+    places = spoken_places(scene, kind, frame)
+    return {
+        place.attributive
+        for place in places
+        if place.thing.name == name and place.attributive and place.kind <= USUAL
+    }
+
+
+def spots(scene, kind="container", frame="robot"):
+    return {place.spot: place.thing for place in spoken_places(scene, kind, frame) if place.spot}
+
+
+def scenes_of(task):
+    episodes = list(split_episodes(task))
+    if task in WRITTEN:
+        episodes += random_episodes(task, 200)
+    return [episode.scene for episode in episodes]
+
+
+@pytest.mark.parametrize("task", slow_but(WRITTEN, all_tasks()))
+def test_each_phrase_of_a_scene_belongs_to_one_thing_in_both_languages_and_frames(task):
+    kind = get_task(task).commands.pointed
+    for scene in scenes_of(task):
+        robot, camera = (things_by_phrase(scene, kind, frame) for frame in FRAMES)
+        shared = robot.keys() & camera.keys()
+        assert {words: robot[words] for words in shared} == {
+            words: camera[words] for words in shared
+        }
+        assert not any(re.search(r"\b(left|right)\b(?! by)", words) for words in shared)
+        for frame, found in zip(FRAMES, (robot, camera), strict=True):
+            known = things_at(scene, kind, frame)
+            assert {words: known[words].name for words in found} == found
+            for selector in selectors(scene, kind, frame):
+                assert known[selector.landmark.phrase] is selector.select()
+            said = [place for place in spoken_places(scene, kind, frame) if place.kind <= USUAL]
+            assert all(len(words.split()) <= MOST_WORDS for words, _ in words_of(said))
+
+
+@settings(max_examples=100)
+@given(PLACES, st.sampled_from(FRAMES), st.integers(0, 6), GRID, st.floats(0, 2 * math.pi))
+def test_no_phrase_goes_over_to_another_thing_when_one_moves_by_less_than_the_margin(
+    places, frame, mover, button, turn
+):
+    fixtures = (("button", (-0.2, button)), ("target", (0.0, -button)))
+    mover %= len(places)
+    x, y = places[mover]
+    # Both distances change if the one that moves is what others are near.
+    for step, last in ((0.49 * MARGIN, PlaceClass.NEIGHBOR), (0.98 * MARGIN, USUAL)):
+        moved = list(places)
+        moved[mover] = (x + step * math.cos(turn), y + step * math.sin(turn))
+        after = things_by_phrase(table(moved, *fixtures), frame=frame)
+        before = spoken_places(table(places, *fixtures), "container", frame)
+        for words, thing in words_of(place for place in before if place.kind <= last):
+            assert after.get(words, thing.name) == thing.name, words
+
+
+def gap(thing, fixture):
+    """Return the distance of two outlines."""
+    distance = math.dist(thing.position[:2], fixture.position[:2])
+    return distance - thing.half_width - fixture.half_width
+
+
+def is_there(spot, thing, scene, middle):
+    """Return whether a thing is at a spot, by what its words mean; `middle` is the depth of it."""
+    x, y, _ = thing.position
+    by = re.fullmatch(r"right by the (\w+)", spot)
+    if by:
+        return gap(thing, *scene.of_kind(by[1])) <= BESIDE
+    between = re.fullmatch(r"between the (\w+) and the (\w+)", spot)
+    if between:
+        ends = [scene.of_kind(kind)[0].position[:2] for kind in between.groups()]
+        return sum(math.dist((x, y), end) for end in ends) <= math.dist(*ends) + 0.04
+    truths = {
+        "left": y >= 0.03,
+        "right": y <= -0.03,
+        "back": x >= middle + 0.03,
+        "front": x <= middle - 0.03,
+        "close": x <= middle - 0.06,
+        "middle": math.dist((x, y), (middle, 0.0)) <= 0.09,
+    }
+    named = [word for word in truths if word in spot.split()]
+    assert named, spot
+    return all(truths[word] for word in named)
+
+
+@pytest.mark.parametrize("task", SPATIAL)
+def test_a_spot_is_true_of_its_thing_and_of_no_other_one(task):
+    kind = get_task(task).commands.pointed
+    for scene in scenes_of(task):
+        things = candidates_in(scene, kind)
+        depths = [thing.position.x for thing in things]
+        middle = (min(depths) + max(depths)) / 2 if len(things) > 1 else -0.05
+        for spot, thing in spots(scene, kind).items():
+            assert is_there(spot, thing, scene, middle), spot
+            for other in things:
+                ahead = math.dist(thing.position[:2], other.position[:2])
+                is_far = "far" in spot or "all the way" in spot
+                assert (
+                    other is thing
+                    or not is_there(spot, other, scene, middle)
+                    or (is_far and ahead >= 2 * MARGIN)
+                ), spot
+
+
+@pytest.mark.parametrize("task", SPATIAL)
+def test_nine_of_ten_published_scenes_have_a_spot_and_all_have_usual_words(task):
+    kind = get_task(task).commands.pointed
+    with_spot, total, unusual = 0, 0, 0
+    for episode in split_episodes(task):
+        if find_refusal(episode, InstructionOptions("spatial")):
+            continue
+        request = request_of(episode, InstructionOptions("spatial", language=4))
+        meant = [request.objects_to_point_at(color) for color in request.color_values]
+        places = [
+            place
+            for place in spoken_places(episode.scene, kind, "robot")
+            if place.thing in itertools.chain(*meant)
+        ]
+        total += 1
+        with_spot += any(place.spot for place in places)
+        unusual += all(place.kind > USUAL for place in places)
+    assert with_spot >= 0.9 * total
+    assert unusual <= 0.02 * total
+
+
+ROW = [(0.0, y) for y in (-0.16, -0.08, 0.0, 0.08, 0.16)]
+SQUARE = [(-0.15, 0.15), (-0.15, -0.15), (0.15, 0.15), (0.15, -0.15)]
+
+
+def test_what_people_say_of_a_row_and_of_a_square():
+    row = table(ROW)
+    assert usual(row, "container_4") == {"all the way on the left"}
+    assert usual(row, "container_3") == {"second from the left"}
+    assert "in the middle" in usual(row, "container_2")
+    assert spots(row)["on the far right"].name == "container_0"
+    assert "in the back left corner" in usual(table(SQUARE), "container_2")
+    assert "at the front right" in usual(table(SQUARE), "container_1")
+    camera = usual(row, "container_4", frame="camera")
+    assert camera == {"all the way on the right of the picture"}
+
+
+def test_what_people_say_of_things_at_a_button_and_a_target():
+    fixtures = (("button", (-0.2, 0.0)), ("target", (0.1, 0.0)))
+    scene = table([(-0.05, -0.03), (-0.19, 0.09), (0.1, -0.2)], *fixtures)
+    assert "between the button and the target" in usual(scene, "container_0")
+    assert "right by the button" in spots(scene)
+    assert {"next to the button", "to the left of the button"} <= usual(scene, "container_1")
+    assert "farthest from the button" in usual(scene, "container_2")
+    behind = table([(-0.05, 0.04), (0.1, -0.2)], fixtures[0])
+    assert "to the left of the button" not in usual(behind, "container_0")
+
+
+def test_the_place_of_a_thing_alone_on_the_table_is_no_choice_among_others():
+    for scene in (cubes((0.1, 0.1)), cubes((-0.08, 0.0)), cubes((-0.2, 0.04))):
+        places = spoken_places(scene, "cube", "robot")
+        assert places
+        assert not any(place.attributive for place in places)
+        assert not any("corner" in place.spot for place in places)
+    assert usual(cubes((0.0, 0.1), (0.0, 0.0)), "cube_green", "cube").isdisjoint(
+        {"nearest to the red cube", "next to the red cube"}
+    )
+
+
+def test_places_do_not_depend_on_cubes_that_arrive_later():
+    scene = cubes((0.0, 0.15), (0.0, 0.0), (0.0, -0.15))
+    late = replace(scene, motions=(Away("cube_blue", 0, 100),))
+    early = replace(scene, objects=tuple(one for one in scene.objects if one.name != "cube_blue"))
+    assert things_by_phrase(late, "cube") == things_by_phrase(early, "cube")
+
+
+@pytest.mark.parametrize("task", SPATIAL)
+def test_a_clue_leads_to_one_thing(task):
+    kind = get_task(task).commands.pointed
+    for scene in scenes_of(task):
+        found = {}
+        for thing, clue in spoken_clues(scene, kind):
+            assert found.setdefault(clue.words, thing.name) == thing.name
+            assert thing.name not in {
+                things_at(scene, kind, "robot")[aside].name for aside in clue.aside
+            }
+
+
+def test_a_scenario_with_a_spot_fits_only_what_has_one():
+    (scenario,) = read_task_scenarios(WOBBLY, "mine.toml").scenarios
+    options = InstructionOptions("spatial", language=4, wordings="train")
+    fitting = 0
+    for index in range(40):
+        request = request_of(get_episode("PickXtimes", "train", index), options)
+        chosen = choose(request, "spatial", [scenario])
+        (color,) = request.color_values
+        things = request.objects_to_point_at(color)
+        known = {
+            spot for spot, thing in spots(request.episode.scene, "cube").items() if thing in things
+        }
+        assert bool(chosen) == bool(known)
+        if chosen:
+            (landmark,) = chosen.introduced.notes["landmarks"]
+            assert landmark in known
+            fitting += 1
+    assert fitting
+
+
+def test_the_phrases_of_places_by_class(snapshot):
+    """The table of all places, by class: a change of words is read in the diff."""
+    found = defaultdict(set)
+    for task in all_tasks():
+        kind = get_task(task).commands.pointed
+        some = itertools.islice(split_episodes(task), 0, None, 5)
+        for episode, frame in itertools.product(some, FRAMES):
+            for place in spoken_places(episode.scene, kind, frame):
+                if place.kind < PlaceClass.UNUSUAL:
+                    found[place.kind.name, frame, "after a noun"].add(place.attributive)
+                    found[place.kind.name, frame, "spot"].add(place.spot)
+    lines = []
+    for (kind, frame, form), words in sorted(found.items()):
+        if words - {None}:
+            lines.append(f"{kind}, {frame}, {form}: {'; '.join(sorted(words - {None}))}")
+    assert "\n".join(lines) == snapshot
