@@ -17,13 +17,13 @@ import roboirg
 CHANGES = {
     "core/instruction_options.py": [
         (
-            "    delivery: Name = field(",
+            "    delivery: Label = field(",
             (
-                "    greeting: Name = field(\n"
-                '        default="none",\n'
-                '        metadata=described("hello: the robot is greeted; or none."),\n'
+                "    greeting: Label = field(\n"
+                '        default="plain",\n'
+                '        metadata=described("hello: the robot is greeted; or plain."),\n'
                 "    )\n"
-                "    delivery: Name = field("
+                "    delivery: Label = field("
             ),
         ),
         ("    delivery: str\n", "    delivery: str\n    greeting: str\n"),
@@ -98,10 +98,10 @@ def test_an_added_option_reaches_words_commands_plans_records_and_tables(
     assert done.returncode == 0, done.stderr
     shown, planned, _, tables, _, made = json.loads(done.stdout)
     assert shown.count("Hello, robot.") == 1
-    assert "# hello: the robot is greeted; or none.\ngreeting: hello" in planned
+    assert "# hello: the robot is greeted; or plain.\ngreeting: hello" in planned
     records = [json.loads(line) for line in (run / "records.jsonl").read_text().splitlines()]
     said = {one["options"]["setting"]: one["options"]["greeting"] for one in records}
-    assert said == {"direct": "hello", "explicit": "none"}
+    assert said == {"direct": "hello", "explicit": "plain"}
     assert records[0]["instruction"][0]["text"].startswith("Hello, robot.")
     assert "direct (greeting hello)" in tables
     assert "Hello, robot." in rows.read_text()
