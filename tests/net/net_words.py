@@ -65,7 +65,9 @@ def _arms() -> Iterator[tuple[tuple[str, ...], str]]:
                     said = say_arm(episode, options, arm)
                 except InvalidValueError:
                     said = None
-                yield (episode.task, options.setting, arm), repr(said)
+                # Language 3 declares no meaning.
+                words = repr(said).replace(", meaning=None", "")
+                yield (episode.task, options.setting, arm), words
 
 
 def _read() -> Iterator[tuple[tuple[str, ...], str]]:

@@ -7,8 +7,10 @@ import io
 import re
 from collections.abc import Iterable, Mapping
 
-_FORMULA = re.compile(r"[=@\t\r]|[+-](?![\d.,]*%?\Z)")
-"""How a text begins that spreadsheets compute; a signed number is none."""
+_NUMBER = r"[+-]?[\d.,]+%?"
+_FIGURE = rf"{_NUMBER}(?: to {_NUMBER}| \({_NUMBER} to {_NUMBER}\))?"
+_FORMULA = re.compile(rf"(?!{_FIGURE}\Z)[=@\t\r+-]")
+"""How a text begins that spreadsheets compute; a signed number or interval is none."""
 
 
 def csv_text(rows: Iterable[Mapping[str, object]]) -> str:
