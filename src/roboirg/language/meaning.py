@@ -1,7 +1,7 @@
 """The goals that the declared meaning of an instruction leaves open in a scene.
 
-Whoever asks what an instruction means asks here: the listener, the chance level, the checker of
-scenarios, the floors and the exports. Places and what there is to see are looked up in the scene,
+The listener, the chance level, the checker of scenarios, the floors and the exports ask here what
+an instruction means. Places and what there is to see are looked up in the scene,
 with their margins; the goal of the episode is never read.
 """
 

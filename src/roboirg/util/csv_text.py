@@ -7,9 +7,10 @@ import io
 import re
 from collections.abc import Iterable, Mapping
 
-_NUMBER = r"[+-]?[\d.,]+%?"
-_FIGURE = rf"{_NUMBER}(?: to {_NUMBER}| \({_NUMBER} to {_NUMBER}\))?"
-_FORMULA = re.compile(rf"(?!{_FIGURE}\Z)[=@\t\r+-]")
+_FORMULA = re.compile(
+    r"(?![+-]?[\d.,]+%?(?: to [+-]?[\d.,]+%?| \([+-]?[\d.,]+%? to [+-]?[\d.,]+%?\))?\Z)"
+    r"[=@\t\r+-]"
+)
 """How a text begins that spreadsheets compute; a signed number or interval is none."""
 
 
