@@ -82,7 +82,8 @@ def _field_values(goal: Goal) -> dict[str, Value]:
 
 def _values_of(term: Term, name: str, episode: Episode) -> Values:
     """Return the values that a term gives a field: one if it is clear, none without operands."""
-    operands, rank = term.operands, term.rank
+    operands = term.operands
+    rank = term.rank
     if term.operation == "without":
         return _values_without(operands, name, episode)
     if term.operation == "rank":
@@ -94,9 +95,7 @@ def _values_of(term: Term, name: str, episode: Episode) -> Values:
         return frozenset()
     (operand,) = operands
     if term.operation in ("double", "half", "step"):
-        return (
-            frozenset([_reckoned(term, int(operand))]) if isinstance(operand, int) else frozenset()
-        )
+        return frozenset([_reckoned(term, operand)]) if isinstance(operand, int) else frozenset()
     return _operand_values(operand, name, episode)
 
 
@@ -113,7 +112,7 @@ def _values_without(operands: tuple[Value | Described, ...], name: str, episode:
     """Return what is left of a field's values, or of the things, when some are set aside."""
     described = [operand for operand in operands if isinstance(operand, Described)]
     if not described:
-        return frozenset(_possible_values(name, episode).difference(operands))
+        return _possible_values(name, episode).difference(operands)
     aside = [_thing_at(operand, episode) for operand in described]
     things = candidates_in(episode.scene, get_task(episode.task).commands.pointed)
     left = [thing for thing in things if thing not in aside]
@@ -127,7 +126,7 @@ def _possible_values(name: str, episode: Episode) -> Values:
     slot = name.partition(".")[0]
     found: set[Value] = set()
     for goal in goals_of(episode):
-        found.update(value for _, value in fields_of(goal, slot))
+        found.update(dict(fields_of(goal, slot)).values())
     return frozenset(found)
 
 

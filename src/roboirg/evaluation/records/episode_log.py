@@ -101,8 +101,10 @@ class EpisodeLog:
         with contextlib.suppress(OSError):
             self.trim()
             content = os.pread(self.descriptor, self._limit, 0)
-            os.ftruncate(self.descriptor, 0)
-            os.write(self.descriptor, bytes_without_keys(content))
+            cleaned = bytes_without_keys(content)
+            if cleaned != content:
+                os.ftruncate(self.descriptor, 0)
+                os.write(self.descriptor, cleaned)
             if not content:
                 self.path.unlink(missing_ok=True)
             os.close(self.descriptor)
