@@ -7,7 +7,9 @@ from typing import Literal, NamedTuple
 
 from roboirg.language.request import InstructionRequest
 
-ClueKind = Literal["counts", "events", "from the end", "bridging", "betweenness", "sets"]
+ClueKind = Literal[
+    "counts", "events", "from the end", "bridging", "betweenness", "sets", "place"
+]
 
 
 class Clue(NamedTuple):

@@ -18,7 +18,7 @@ from roboirg.core.word_pools import PoolName
 from roboirg.language.grounded import grounded_templates as templates
 from roboirg.language.grounded.clue import Clue, ClueKind
 from roboirg.language.landmarks import LandmarkClass, Ranking, candidates_in, nearness, selectors
-from roboirg.language.places import PlaceClass, SpokenPlace, spoken_places
+from roboirg.language.places import USUAL, PlaceClass, SpokenPlace, spoken_places
 from roboirg.language.request import GoalValue, InstructionRequest
 
 AXES = ("x", "y")
@@ -27,11 +27,15 @@ FEW = 3
 _ANCHORS = (LandmarkClass.EXTREME, LandmarkClass.FIXTURE)
 """Of the two things that are set aside."""
 _SPOKEN: Mapping[PlaceClass, ClueKind] = {
+    PlaceClass.EXTREME: "place",
+    PlaceClass.FIXTURE: "place",
+    PlaceClass.SIDE_OF_FIXTURE: "place",
+    PlaceClass.CORNER: "place",
+    PlaceClass.RANK: "place",
     PlaceClass.MIDDLE: "betweenness",
     PlaceClass.BETWEEN: "betweenness",
-    PlaceClass.NEIGHBOR: "bridging",
 }
-"""Places of language 4 that only who sees the other things finds, as clues."""
+"""Places of language 4 that name no color, as clues."""
 _ASIDE = (PlaceClass.EXTREME, PlaceClass.FIXTURE, PlaceClass.CORNER)
 """Places of language 4 of the two things that are set aside."""
 _LINKS = (
@@ -159,8 +163,8 @@ def spoken_clues(scene: Scene, kind: str) -> list[SpokenClue]:
     found = _with_others_aside(candidates_in(scene, kind), places)
     for place in places:
         clue = Clue(_SPOKEN.get(place.kind, "bridging"), f"the {noun} {place.attributive}")
-        # A neighbor in words that no one says is said where there is nothing else.
-        is_rare = place.kind == PlaceClass.UNUSUAL and "nearest to" in clue.words
+        # A neighbor is named where there is nothing else: *nearest to the one in the middle*.
+        is_rare = place.kind > USUAL and "nearest to" in clue.words
         is_led_to = any(place.thing is known.thing for known in found)
         if place.kind in _SPOKEN or (is_rare and not is_led_to):
             found.append(SpokenClue(place.thing, clue))

@@ -171,6 +171,14 @@ def _list(request: InstructionRequest, scenario: Scenario) -> Sequence[Introduce
     return request.sampler.pick("list order", list(itertools.permutations(values)))
 
 
+def _direct(request: InstructionRequest) -> Iterator[Offer]:
+    """Yield every choice of fields that can point back; the command states the others."""
+    fields = [value.field for value in request.goal_values]
+    for size in range(1, len(fields) + 1):
+        for pointing in itertools.combinations(fields, size):
+            yield Offer(pointing, {}, {}, None)
+
+
 def _spatial(request: InstructionRequest) -> Iterator[Offer]:
     """Yield a place after a noun, and a spot, if there are such words for a thing of the goal."""
     colors = request.color_values
@@ -258,7 +266,7 @@ def _rival(request: InstructionRequest) -> Iterator[Offer]:
 
 
 _OFFERS: Mapping[str, Callable[[InstructionRequest], Iterable[Offer]]] = {
-    "direct": lambda request: [Offer([one.field for one in request.goal_values], {}, {}, None)],
+    "direct": _direct,
     "reasoning": derivations_of,
     "spatial": _spatial,
     "grounded": _grounded,
