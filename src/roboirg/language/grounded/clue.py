@@ -7,9 +7,7 @@ from typing import Literal, NamedTuple
 
 from roboirg.language.request import InstructionRequest
 
-ClueKind = Literal[
-    "counts", "events", "from the end", "bridging", "betweenness", "sets", "place"
-]
+ClueKind = Literal["counts", "events", "from the end", "bridging", "betweenness", "sets", "place"]
 
 
 class Clue(NamedTuple):

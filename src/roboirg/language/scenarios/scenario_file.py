@@ -218,8 +218,7 @@ def _sentence(
         for name in slots_in(parts)
         if name.removeprefix("rival ") not in known
     ]
-    # As the table has it: without class and slot, and with any noun for a step.
-    said = re.sub(r"\{step:[^}]+\}", "{step:*}", re.sub(r"<[^:<>]+: ", "<", str(text)))
+    said = re.sub(r"<[^:<>]+: ", "<", str(text))  # as the table has it: without class and slot
     return tuple(
         _pointing(one, said, type_of(one.of, listed), where, mistakes)
         if isinstance(one, Pointer)
@@ -228,14 +227,21 @@ def _sentence(
     )
 
 
+def has_words(row: PointerRow, text: str, *, whole: bool = False) -> bool:
+    """Return whether a text has the words of a row, with any noun for ``*``, or is just them."""
+    pattern = re.escape(row.words).replace(r"\*", "[a-z]+")
+    found = re.fullmatch(pattern, text) if whole else re.search(pattern, text)
+    return found is not None
+
+
 def _pointing(pointer: Pointer, said: str, kind: str, where: str, mistakes: list[str]) -> Pointer:
     """Return a pointer with what its row says."""
     words = pointer.words
     of_kind = [row for row in pointer_table() if kind in row.of]
     # First those that are said with the words around them.
-    rows = [one for one in of_kind if f"<{words}>" in one.words and one.words in said]
-    rows += [one for one in of_kind if words == one.words]
-    row = next((one for one in rows if one.kind == pointer.expression), None)
+    rows = [row for row in of_kind if f"<{words}>" in row.words and has_words(row, said)]
+    rows += [row for row in of_kind if "<" not in row.words and has_words(row, words, whole=True)]
+    row = next((row for row in rows if row.kind == pointer.expression), None)
     if row is None:
         found = f"{where} has the pointer <{pointer.expression} {pointer.of}: {words}>"
         classes = " or ".join(dict.fromkeys(repr(one.kind) for one in rows))
