@@ -19,7 +19,15 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName, Pools, pool_of
 from roboirg.language.instruction import Expression, Meaning, UtteranceStage
 from roboirg.language.landmarks import Frame
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, swap_particles
+from roboirg.language.phrases import (
+    Mentionable,
+    Phrase,
+    anaphor,
+    antecedent,
+    fill,
+    plain,
+    swap_particles,
+)
 from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.worded_command import (
     StatedPhrase,
@@ -106,12 +114,12 @@ class InstructionRequest:
         return self.options.form == "resolved"
 
     def refer(
-        self, words: str, expression: Expression, slot: str, value: str | int, *, resolved: str
+        self, words: str, expression: Expression, referent: Mentionable, *, resolved: str
     ) -> Phrase:
-        """Return words that point back at a slot value; resolved, those that name it."""
+        """Return words that point back at a value; resolved, those that name it."""
         if self.resolved:
-            return antecedent(resolved, slot, value)
-        return anaphor(words, expression, slot, value)
+            return antecedent(resolved, referent)
+        return anaphor(words, expression, referent)
 
     @property
     def pool(self) -> PoolName:
@@ -290,12 +298,12 @@ class InstructionRequest:
         values = {one.field: one for one in self.goal_values}
         if base != AMOUNT_FIELD:
             value = values[field]
-            core = antecedent(phrase.core, value.slot, value.value)
+            core = antecedent(phrase.core, value)
             return (*plain(phrase.before), *core, *plain(phrase.after))
         count, color = values[f"counts.{index}"], values[f"colors.{index}"]
         return (
             *tagged_words(phrase.before, count),
-            *antecedent(phrase.core, color.slot, color.value),
+            *antecedent(phrase.core, color),
             *plain(phrase.after),
         )
 
@@ -306,7 +314,7 @@ def tagged_words(text: str, value: GoalValue) -> Phrase:
     if not words:
         return plain(text)
     before, _, after = text.partition(words)
-    return (*plain(before), *antecedent(words, value.slot, value.value), *plain(after))
+    return (*plain(before), *antecedent(words, value), *plain(after))
 
 
 class UtteranceSpec(NamedTuple):

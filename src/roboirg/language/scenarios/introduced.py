@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from roboirg.language.instruction import REFERENCE, Expression
 from roboirg.language.number_words import cardinal, ordinal, plural, times
-from roboirg.language.phrases import Phrase, antecedent, listed, plain
+from roboirg.language.phrases import Mentionable, MentionedValue, Phrase, antecedent, listed, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.scenarios.markup import Slot
 from roboirg.language.templates.derivations import MOMENTS
@@ -73,20 +73,17 @@ class Introduced:
         found = self.values[slot.name]
         joint, form = (slot.form, None) if slot.form in ("or", "nor") else ("and", slot.form)
         said = [(one.said(form), one) for one in found]
-        phrases = [
-            antecedent(words, one.slot, one.value) if one.slot else plain(words)
-            for words, one in said
-        ]
+        phrases = [antecedent(words, one) if one.slot else plain(words) for words, one in said]
         return listed(phrases, joint)
 
-    def referent(self, name: str) -> tuple[str, str | int]:
-        """Return the slot and the value of mentions that point back at a slot."""
+    def referent(self, name: str) -> Mentionable:
+        """Return what mentions that point back at a slot stand for."""
         found = self.values[name]
-        slots = {one.slot for one in found}
         if len(found) == 1:
-            return found[0].slot, found[0].value
+            return found[0]
+        slots = {value.slot for value in found}
         slot = slots.pop() if len(slots) == 1 else REFERENCE
-        return slot, " and ".join(str(one.value) for one in found)
+        return MentionedValue(" and ".join(str(value.value) for value in found), slot)
 
     def ranked(self, name: str, *, ordinals: bool) -> tuple[Introduced, Expression]:
         """Return the same with the rank of a slot's value in the list, and the rank's class."""

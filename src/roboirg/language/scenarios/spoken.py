@@ -213,12 +213,12 @@ class Speech:
         if pointer.expression == "rank":
             values, kind = values.ranked(pointer.of, ordinals="ordinal" in pointer.words)
         words = self._joined(self.phrase(pointer.parts, values))
-        return anaphor(words, kind, *values.referent(pointer.of))
+        return anaphor(words, kind, values.referent(pointer.of))
 
     def _named(self, pointer: Pointer) -> Phrase:
         """Return words that name what a pointer stands for."""
         words = self._joined(self.phrase(pointer.resolved or self._referent(pointer.of)))
-        return antecedent(words, *self._introduced.referent(pointer.of))
+        return antecedent(words, self._introduced.referent(pointer.of))
 
     def _referent(self, name: str) -> Text:
         """Return the words for what a slot stands for."""

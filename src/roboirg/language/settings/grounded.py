@@ -143,8 +143,8 @@ def _introduced(request: InstructionRequest, colors: Clues) -> Phrase:
     """Return a sentence that describes the things, or two about the only one."""
     (value, clue), *others = colors.items()
     if clue.said and not others:
-        return fill(clue.said, {"which": antecedent(clue.short, value.slot, value.value)})
-    things = [antecedent(clue.words, value.slot, value.value) for value, clue in colors.items()]
+        return fill(clue.said, {"which": antecedent(clue.short, value)})
+    things = [antecedent(clue.words, value) for value, clue in colors.items()]
     template = request.pick("place introduction", introductions.PLACE_INTRODUCTIONS)
     return fill(template, {"things": listed(things)}, plural=len(things) > 1)
 
@@ -160,7 +160,7 @@ def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
         pointers = (request.sampler.pick("color anaphor", single),)
     things: list[Phrase] = []
     for (value, clue), pointer in zip(colors.items(), pointers, strict=True):
-        place = request.refer(*pointer, value.slot, value.value, resolved=clue.words)
+        place = request.refer(*pointer, value, resolved=clue.words)
         template = commands.by_rank or commands.by_color.replace("{cube}", "{place}")
         if clue.of_handled or (commands.pointed == commands.thing and commands.by_rank is None):
             template = "{place}"
@@ -172,27 +172,27 @@ def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
 def _repeats(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
     template = request.pick("number introduction", COUNTED)
     words = request.pick("same number", number.SAME_NUMBER)
-    said = fill(template, {"times": antecedent(clue.short, value.slot, value.value)})
-    times = request.refer(words, "that", value.slot, value.value, resolved=clue.words)
+    said = fill(template, {"times": antecedent(clue.short, value)})
+    times = request.refer(words, "that", value, resolved=clue.words)
     return said, {value.field: times}
 
 
 def _counts(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
     (shade,) = request.color_values
     cubes = (*plain(" of the "), *amount.cubes(shade, MOST_COLORS))
-    said = (*antecedent(clue.words, value.slot, value.value), *cubes)
+    said = (*antecedent(clue.words, value), *cubes)
     if clue.after:
-        said = (*said, *plain(" "), *antecedent(clue.after, value.slot, value.value))
+        said = (*said, *plain(" "), *antecedent(clue.after, value))
     template = request.pick("amount introduction", introductions.AMOUNT_INTRODUCTIONS)
-    pointing = (*anaphor("that many", "that", value.slot, value.value), *cubes)
+    pointing = (*anaphor("that many", "that", value), *cubes)
     command = amount.amounts([said if request.resolved else pointing])
     return fill(template, {"things": said}), command
 
 
 def _placed(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
-    said = antecedent(clue.words, value.slot, value.value)
+    said = antecedent(clue.words, value)
     template = request.pick("seen placement", PLACEMENT_INTRODUCTIONS)
-    pointing = anaphor("that placement", "that", value.slot, value.value)
+    pointing = anaphor("that placement", "that", value)
     target = (*plain("the target of "), *(said if request.resolved else pointing))
     return fill(template, {"which": said}), {value.field: target}
 

@@ -46,9 +46,7 @@ class SlotType:
 
 def pointing_at(noun: str) -> Callable[[InstructionRequest, GoalValues], Phrase]:
     """Return what points at the first value of a type: *that number* for the noun ``number``."""
-    return lambda _request, goal_values: anaphor(
-        f"that {noun}", "that", goal_values[0].slot, goal_values[0].value
-    )
+    return lambda _request, goal_values: anaphor(f"that {noun}", "that", goal_values[0])
 
 
 def competing_with(
