@@ -187,9 +187,7 @@ def candidates_in(scene: Scene, thing: ObjectKind) -> tuple[SceneObject, ...]:
     """Return the visible candidates: all objects of a kind, without cubes that arrive later."""
     if thing != "cube":
         return scene.of_kind(thing)
-    late = {
-        motion.subject for motion in scene.motions if isinstance(motion, Away) and motion.start == 0
-    }
+    late = {motion.subject for motion in scene.motions_of(Away) if motion.start == 0}
     return tuple(cube for cube in scene.of_kind("cube") if cube.name not in late)
 
 

@@ -346,8 +346,7 @@ def present(scene: Scene, kind: str) -> list[SceneObject]:
     """Return the things of a kind, open or hidden, without cubes that appear later."""
     late: set[str] = set()
     if kind == "cube":
-        motions = [motion for motion in scene.motions if isinstance(motion, Away)]
-        late = {motion.subject for motion in motions if motion.start == 0}
+        late = {motion.subject for motion in scene.motions_of(Away) if motion.start == 0}
     kinds = ("cube", "hidden_cube") if kind == "cube" else (kind,)
     return [item for item in scene.objects if item.kind in kinds and item.name not in late]
 

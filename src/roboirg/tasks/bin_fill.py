@@ -38,6 +38,7 @@ from roboirg.tasks.shared.fixtures import (
 )
 from roboirg.tasks.shared.stages import PRESSED, press_stage
 from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.util.random_draws import shuffled
 
 COLORS_PRESENT: dict[Difficulty, int] = {"easy": 1, "medium": 2, "hard": 3}
 CUBES: dict[Difficulty, tuple[int, int]] = {"easy": (4, 6), "medium": (8, 10), "hard": (10, 12)}
@@ -67,15 +68,14 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     button = draw_button(rng, BUTTON_REGION)
     # RoboMME places the bin without looking at the button; here its walls stay off the base.
     bin_ = draw_bin(rng, BIN_REGION, [footprint(button)])
-    present = [COLORS[index] for index in rng.permutation(len(COLORS))]
-    present = present[: COLORS_PRESENT[difficulty]]
+    present = shuffled(rng, COLORS)[: COLORS_PRESENT[difficulty]]
     wanted = _draw_wanted(rng, difficulty, present)
     spawned = _draw_spawned(rng, difficulty, present, wanted)
     obstacles: list[Obstacle] = [button_keep_out(button), bin_keep_out(bin_)]
     cubes = draw_cubes(rng, _numbered(spawned), CUBE_GAP, obstacles)
     named = tuple(color for color in GOAL_ORDER if wanted.get(color))
     goal = Goal.of(colors=named, counts=tuple(wanted[color] for color in named))
-    order = tuple(named[index] for index in rng.permutation(len(named)))
+    order = tuple(shuffled(rng, named))
     return Scene((button, bin_, *cubes), plan_motions(cubes, late=late), color_order=order), goal
 
 
@@ -101,7 +101,7 @@ def _draw_spawned(
     spawned = [color for color in present for _ in range(max(wanted[color], 1))]
     left = draw_number(rng, CUBES[difficulty]) - len(spawned)
     spawned += [present[index] for index in rng.integers(len(present), size=left)]
-    return [spawned[index] for index in rng.permutation(len(spawned))]
+    return shuffled(rng, spawned)
 
 
 def _numbered(spawned: list[Color]) -> Iterator[tuple[str, Color, Region]]:
@@ -175,7 +175,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 def _wanted(scene: Scene, goal: Goal) -> Iterator[tuple[str, str, str]]:
     """Yield color, ordinal and name of the cubes that the oracle takes, color by color."""
-    counts = dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
+    counts = dict(goal.amounts)
     for color in dict.fromkeys((*scene.color_order, *counts)):
         cubes = _of_color(scene, color)[: counts.get(color, 0)]
         for ordinal, cube in zip(ORDINALS, cubes, strict=False):
@@ -184,7 +184,7 @@ def _wanted(scene: Scene, goal: Goal) -> Iterator[tuple[str, str, str]]:
 
 def _wrong_counts(scene: Scene, goal: Goal) -> Iterator[Rule]:
     """Yield rules against more cubes in the bin than the goal's, and fewer, for each color."""
-    wanted = dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
+    wanted = dict(goal.amounts)
     for color in GOAL_ORDER:
         binned, count = _binned(_of_color(scene, color)), wanted.get(color, 0)
         if not binned:

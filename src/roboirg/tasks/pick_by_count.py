@@ -17,6 +17,7 @@ from roboirg.tasks.shared.fixtures import counted_goals, draw_number, draw_targe
 from roboirg.tasks.shared.real_table import draw_sides, draw_tape, on_side
 from roboirg.tasks.shared.stages import placing_stages
 from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.util.random_draws import draw
 
 TAPES: tuple[Color, ...] = ("yellow", "gray")
 REPEATS = (1, 2)
@@ -47,7 +48,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
         )
         for color in TAPES
     )
-    chosen = TAPES[int(rng.integers(len(TAPES)))]
+    chosen = draw(rng, TAPES)
     goal = Goal.of(color=str(chosen), repeats=draw_number(rng, REPEATS))
     return Scene((*tapes, target)), goal
 

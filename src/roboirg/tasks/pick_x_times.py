@@ -21,6 +21,7 @@ from roboirg.tasks.shared.fixtures import (
 )
 from roboirg.tasks.shared.stages import PRESSED, placing_stages, press_stage
 from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.util.random_draws import draw
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
 REPEATS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 3), "medium": (1, 3), "hard": (4, 5)}
@@ -40,7 +41,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
         rng, BUTTON_REGION, CUBES[difficulty], WORK_REGION, CUBE_GAP
     )
     target = draw_target(rng, "target", TARGET_RADIUS, WORK_REGION, TARGET_GAP, obstacles)
-    chosen = cubes[int(rng.integers(len(cubes)))]
+    chosen = draw(rng, cubes)
     goal = Goal.of(color=str(chosen.color), repeats=repeats)
     return Scene((button, *cubes, target)), goal
 

@@ -21,6 +21,7 @@ from roboirg.tasks.shared.real_table import (
 )
 from roboirg.tasks.shared.stages import pick_stage
 from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.util.random_draws import draw
 
 BOXES: tuple[Color, ...] = ("green", "purple")
 TAPE: Color = "yellow"
@@ -40,7 +41,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     )
     obstacles: list[Footprint] = [footprint(box) for box in boxes]
     tape = draw_tape(rng, "tape", TAPE, TAPE_REGION, TAPE_GAP, obstacles)
-    goal = Goal.of(color=str(BOXES[int(rng.integers(len(BOXES)))]))
+    goal = Goal.of(color=str(draw(rng, BOXES)))
     return Scene((*boxes, tape)), goal
 
 

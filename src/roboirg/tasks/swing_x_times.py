@@ -25,6 +25,7 @@ from roboirg.tasks.shared.fixtures import (
 )
 from roboirg.tasks.shared.stages import PRESSED, pick_stage, press_stage
 from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.util.random_draws import draw
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
 REPEATS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 3), "medium": (1, 2), "hard": (3, 3)}
@@ -57,7 +58,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
         target = draw_target(rng, name, TARGET_RADIUS, region, TARGET_GAP, obstacles, TARGET_RGB)
         targets.append(target)
         obstacles.append(Circle(target.position.x, target.position.y, TARGET_RADIUS))
-    chosen = cubes[int(rng.integers(len(cubes)))]
+    chosen = draw(rng, cubes)
     goal = Goal.of(color=str(chosen.color), repeats=repeats)
     return make_scene(button, cubes, targets, chosen.name), goal
 

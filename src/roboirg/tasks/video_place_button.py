@@ -13,6 +13,7 @@ from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.tasks.shared import video_place
 from roboirg.tasks.shared.stages import PRESSED
 from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.util.random_draws import draw
 
 DISCS: dict[Difficulty, int] = {"easy": 3, "medium": 4, "hard": 4}
 SITE_RADIUS = 0.06
@@ -27,7 +28,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     before, after = (Fact("placed", cube.name, disc.name) for disc in discs[:2])
     past = (before, PRESSED, after)
     swaps = (video_place.draw_swap(rng, discs, past),) if difficulty == "hard" else ()
-    relation = RELATIONS[int(rng.integers(len(RELATIONS)))]
+    relation = draw(rng, RELATIONS)
     return Scene(table.objects, swaps, past), Goal.of(color=str(cube.color), relation=relation)
 
 

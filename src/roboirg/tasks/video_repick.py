@@ -33,6 +33,7 @@ from roboirg.tasks.shared.stages import (
 )
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS, plan_swaps
 from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.util.random_draws import draw, shuffled
 
 REPEATS = (1, 3)
 SWAPS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 2), "medium": (2, 3), "hard": (0, 0)}
@@ -64,7 +65,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     button = draw_button(rng, BUTTON_REGION)
     cubes = _draw_clutter(rng, button) if difficulty == "hard" else _draw_layout(rng, button)
     # The cube of the video starts the first swap, the others follow in any order.
-    target, *others = (cubes[index].name for index in rng.permutation(len(cubes)))
+    target, *others = (cube.name for cube in shuffled(rng, cubes))
     scene = make_scene(button, cubes, target, (target, *others)[:swaps])
     return scene, Goal.of(repeats=repeats)
 
@@ -95,7 +96,7 @@ def make_scene(
 
 def _draw_layout(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
     """Draw three cubes of one color, each near its point of a layout."""
-    color = COLORS[int(rng.integers(len(COLORS)))]
+    color = draw(rng, COLORS)
     cubes = (
         (f"cube_{color}_{number}", color, Region(*point, LAYOUT_HALF, LAYOUT_HALF))
         for number, point in enumerate(layout_points(rng, LAYOUT_CUBES))
@@ -107,9 +108,9 @@ def _draw_clutter(rng: np.random.Generator, button: SceneObject) -> list[SceneOb
     """Draw five cubes of each color; in each round one of each, in any order."""
     # The colors of a round are drawn after the cubes of the one before.
     cubes = (
-        (f"cube_{COLORS[index]}_{number}", COLORS[index], CLUTTER_REGION)
+        (f"cube_{color}_{number}", color, CLUTTER_REGION)
         for number in range(CLUTTER_ROUNDS)
-        for index in rng.permutation(len(COLORS))
+        for color in shuffled(rng, COLORS)
     )
     return draw_cubes(rng, cubes, GAP, [button_keep_out(button)])
 
@@ -123,7 +124,7 @@ def demonstration(scene: Scene) -> tuple[Stage, ...]:
         primitive=Primitive("put_down", target, height=SHOWN_RELEASE),
         subgoal="drop the cube on the table",
     )
-    swaps = [motion for motion in scene.motions if isinstance(motion, Swap)]
+    swaps = scene.motions_of(Swap)
     waiting = [retreat()] if swaps else []
     waiting += [hold_still(SWAP_STEPS) for _ in swaps]
     return (pick_stage(target), put_down, *waiting, go_home())

@@ -35,7 +35,7 @@ def series_length(request: InstructionRequest, goal_value: GoalValue) -> int:
     """Return the length of the episode's series: visits to come, or placements shown."""
     scene = request.episode.scene
     if goal_value.slot_type == "visit":
-        return sum(motion.passes for motion in scene.motions if isinstance(motion, Shuttle))
+        return sum(shuttle.passes for shuttle in scene.motions_of(Shuttle))
     targets = {target.name for target in scene.of_kind("target")}
     return sum(fact.kind == "placed" and fact.place in targets for fact in scene.past)
 

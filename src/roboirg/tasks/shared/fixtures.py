@@ -15,6 +15,7 @@ from roboirg.core.episode import COLORS, Color, Goal, ObjectKind, Scene, SceneOb
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.footprints import Circle, Footprint, Line, Obstacle, Rectangle, Region, place
 from roboirg.core.motions import Point
+from roboirg.util.random_draws import shuffled
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
@@ -115,7 +116,7 @@ def draw_colored_cubes(
     obstacles: Sequence[Obstacle],
 ) -> tuple[SceneObject, ...]:
     """Draw `count` cubes of different colors, ``cube_red`` and so on, in random order."""
-    colors = [COLORS[index] for index in rng.permutation(len(COLORS))[:count]]
+    colors = shuffled(rng, COLORS)[:count]
     cubes = ((f"cube_{color}", color, region) for color in colors)
     return tuple(draw_cubes(rng, cubes, gap, obstacles))
 

@@ -12,6 +12,7 @@ from roboirg.core.motions import Away, Motion
 from roboirg.tasks.shared.fixtures import draw_number
 from roboirg.tasks.shared.swapping import last_step, plan_swaps
 from roboirg.tasks.shared.unmask import appearing, draw_containers_in, hide_cubes
+from roboirg.util.random_draws import draw
 
 CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 4, "hard": 4}
 SWAPS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 2), "medium": (1, 2), "hard": (2, 3)}
@@ -75,5 +76,5 @@ def _initiators(
     names = [container.name for container in containers]
     first, second = (names[index] for index in rng.permutation(len(COLORS))[:2])
     others = [name for name in names if name not in (first, second)]
-    third = others[int(rng.integers(len(others)))]
+    third = draw(rng, others)
     return (first, second, third)[:number]
