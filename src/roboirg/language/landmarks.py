@@ -194,6 +194,15 @@ def candidates_in(scene: Scene, thing: ObjectKind) -> tuple[SceneObject, ...]:
     return tuple(cube for cube in scene.of_kind("cube") if cube.name not in late)
 
 
+def things_of_color(scene: Scene, kind: ObjectKind, color: str) -> tuple[SceneObject, ...]:
+    """Return the cubes of a color, or the containers over them if `kind` is that of containers."""
+    return tuple(
+        item if item.inside is None or item.kind == kind else scene[item.inside]
+        for item in scene.objects
+        if item.color == color
+    )
+
+
 class Direction(NamedTuple):
     """Words and a ranking along one of four directions.
 

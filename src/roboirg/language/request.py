@@ -18,7 +18,7 @@ from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES, SlotTypeName
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName, Pools, pool_of
 from roboirg.language.instruction import Expression, Meaning, UtteranceStage
-from roboirg.language.landmarks import Frame
+from roboirg.language.landmarks import Frame, things_of_color
 from roboirg.language.phrases import (
     Mentionable,
     Phrase,
@@ -138,7 +138,7 @@ class InstructionRequest:
     @property
     def goal_values(self) -> GoalValues:
         """The values of the goal, in the order of its slots."""
-        return _goal_values(self.episode.goal)
+        return values_of_goal(self.episode.goal)
 
     def values_of(self, slot_type: SlotTypeName) -> GoalValues:
         """Return the goal values of one slot type."""
@@ -244,13 +244,7 @@ class InstructionRequest:
 
     def objects_to_point_at(self, color: GoalValue) -> tuple[SceneObject, ...]:
         """Return the cubes of a color, or the containers over them."""
-        scene = self.episode.scene
-        cubes = [item for item in scene.objects if item.color == color.value]
-        kind = self.task.commands.pointed
-        return tuple(
-            cube if cube.inside is None or cube.kind == kind else scene[cube.inside]
-            for cube in cubes
-        )
+        return things_of_color(self.episode.scene, self.task.commands.pointed, color.color)
 
     def command(self, fields: Mapping[str, Phrase]) -> Phrase:
         """Fill the task's command, which has the same wording in all settings.
@@ -341,7 +335,8 @@ class InstructionSpec:
 
 # Cached: all settings and forms of an episode ask for the same.
 @functools.lru_cache(maxsize=256)
-def _goal_values(goal: Goal) -> GoalValues:
+def values_of_goal(goal: Goal) -> GoalValues:
+    """Return the values of a goal, in the order of its slots."""
     found: list[GoalValue] = []
     counted = "counts" in dict(goal.slots)
     for slot, _ in goal.slots:
