@@ -142,12 +142,16 @@ class InstructionRequest:
 
     def values_of(self, slot_type: SlotTypeName) -> GoalValues:
         """Return the goal values of one slot type."""
-        return tuple(one for one in self.goal_values if one.slot_type == slot_type)
+        return tuple(value for value in self.goal_values if value.slot_type == slot_type)
+
+    def values_in(self, slot: str) -> GoalValues:
+        """Return the goal values of one slot."""
+        return tuple(value for value in self.goal_values if value.slot == slot)
 
     @property
     def color_values(self) -> GoalValues:
         """The goal values that are colors, counted or not."""
-        return tuple(one for one in self.goal_values if one.slot in COLOR_SLOTS)
+        return tuple(value for value in self.goal_values if value.slot in COLOR_SLOTS)
 
     def count_of(self, color: GoalValue) -> int:
         """Return how many things of a color the goal wants; 1 unless it counts them."""

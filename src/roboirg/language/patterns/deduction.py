@@ -60,7 +60,7 @@ def _open(relation: derivations.Relation, choices: Sequence[Sequence[int]]) -> b
 
 def _deductions(request: InstructionRequest) -> list[Deduction]:
     slot = "counts" if request.values_of("amount") else "repeats"
-    results = [goal_value.number for goal_value in request.goal_values if goal_value.slot == slot]
+    results = [value.number for value in request.values_in(slot)]
     return deductions(results, request.alternative_numbers(slot))
 
 

@@ -72,8 +72,10 @@ class Introduced:
         """Return the words for a slot, each value a mention."""
         found = self.values[slot.name]
         joint, form = (slot.form, None) if slot.form in ("or", "nor") else ("and", slot.form)
-        said = [(one.said(form), one) for one in found]
-        phrases = [antecedent(words, one) if one.slot else plain(words) for words, one in said]
+        phrases: list[Phrase] = []
+        for value in found:
+            words = value.said(form)
+            phrases.append(antecedent(words, value) if value.slot else plain(words))
         return listed(phrases, joint)
 
     def referent(self, name: str) -> Mentionable:
@@ -124,13 +126,14 @@ def named(value: GoalValue) -> IntroducedValue:
 
 def goal_values(request: InstructionRequest) -> Values:
     """Return the values of the goal by field, and all of a slot with several by its name."""
-    together = {
-        slot: tuple(named(one) for one in request.goal_values if one.slot == slot)
-        for slot in {one.slot for one in request.goal_values}
-    }
-    return {**together, **{one.field: (named(one),) for one in request.goal_values}}
+    values: dict[str, tuple[IntroducedValue, ...]] = {}
+    for value in request.goal_values:
+        values[value.slot] = tuple(map(named, request.values_in(value.slot)))
+        values[value.field] = (named(value),)
+    return values
 
 
 def several(name: str, values: Sequence[IntroducedValue]) -> Values:
     """Return the slots of several values: one by one, and all together."""
-    return {name: tuple(values), **{f"{name}.{at}": (one,) for at, one in enumerate(values)}}
+    one_by_one = {f"{name}.{at}": (value,) for at, value in enumerate(values)}
+    return {name: tuple(values), **one_by_one}
