@@ -6,13 +6,15 @@ import math
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from types import NoneType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roboirg.core.errors import InvalidActionError, check_names
 
+Actions = NDArray[np.floating[Any]]
+"""One action, or a chunk of several, one a row."""
 ARM_JOINTS = 7
 POSE_SIZE = 6
 """x, y, z, roll, pitch, yaw."""

@@ -11,6 +11,7 @@ import sapien
 import sapien.physx
 from numpy.typing import NDArray
 
+from roboirg.core.actions import Actions
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
 from roboirg.core.errors import InvalidValueError, RoboIRGError, check_names
@@ -67,7 +68,7 @@ class World:
         self.elapsed = 0
         self.facts: frozenset[Fact] = self._detector.detect([], self._motions.absent())
 
-    def step(self, action: NDArray[np.floating[Any]]) -> frozenset[Fact]:
+    def step(self, action: Actions) -> frozenset[Fact]:
         """Execute one action (8) for one control step.
 
         Args:
@@ -85,7 +86,7 @@ class World:
         self._motions.after_step(self.facts)
         return self.facts
 
-    def advance(self, action: NDArray[np.floating[Any]]) -> None:
+    def advance(self, action: Actions) -> None:
         """Run only the physics of one control step: no motions, no facts, no time."""
         with PHYSICS:
             self.robot.set_targets(action)

@@ -28,6 +28,7 @@ from roboirg.core.motions import Away, Motion, Vanish
 from roboirg.core.plain_text import counted
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
+    Bounds,
     bin_keep_out,
     button_keep_out,
     draw_bin,
@@ -37,19 +38,19 @@ from roboirg.tasks.shared.fixtures import (
     footprint,
 )
 from roboirg.tasks.shared.stages import PRESSED, press_stage
-from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
 from roboirg.util.random_draws import shuffled
 
 COLORS_PRESENT: dict[Difficulty, int] = {"easy": 1, "medium": 2, "hard": 3}
-CUBES: dict[Difficulty, tuple[int, int]] = {"easy": (4, 6), "medium": (8, 10), "hard": (10, 12)}
+CUBES: dict[Difficulty, Bounds] = {"easy": (4, 6), "medium": (8, 10), "hard": (10, 12)}
 """Fewest and most cubes on the table."""
-GOAL_COLORS: dict[Difficulty, tuple[int, int]] = {
+GOAL_COLORS: dict[Difficulty, Bounds] = {
     "easy": (1, 1),
     "medium": (1, 2),
     "hard": (2, 3),
 }
 """Number of colors among which the goal's cubes are drawn; one may get none."""
-GOAL_CUBES: dict[Difficulty, tuple[int, int]] = {"easy": (1, 3), "medium": (2, 4), "hard": (3, 5)}
+GOAL_CUBES: dict[Difficulty, Bounds] = {"easy": (1, 3), "medium": (2, 4), "hard": (3, 5)}
 """Fewest and most cubes that the goal puts into the bin."""
 MAX_GOAL_CUBES = 5
 GOAL_ORDER: tuple[Color, ...] = ("red", "blue", "green")
@@ -62,7 +63,7 @@ APPEAR_STEPS = 50
 """Control steps between the late cubes of a color."""
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, bin and cubes of one to three colors, and a count for one or more of them."""
     late = bool(rng.integers(2))
     button = draw_button(rng, BUTTON_REGION)

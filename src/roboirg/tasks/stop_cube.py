@@ -16,7 +16,7 @@ from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject
 from roboirg.core.footprints import Region
 from roboirg.core.motions import Point, Shuttle
 from roboirg.tasks.shared.fixtures import ORDINALS, draw_button
-from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
 from roboirg.util.random_draws import draw
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
@@ -40,7 +40,7 @@ CHECKPOINT = 100
 """Waiting is split into stages that end at multiples of this number of control steps."""
 
 
-def sample(rng: np.random.Generator, _difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, _difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, target and cube; speed, goal visit and direction of the path are uniform."""
     button = draw_button(rng, BUTTON_REGION)
     x, y = TARGET_REGION.draw(rng)

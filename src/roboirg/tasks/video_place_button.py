@@ -12,7 +12,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.tasks.shared import video_place
 from roboirg.tasks.shared.stages import PRESSED
-from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
 from roboirg.util.random_draws import draw
 
 DISCS: dict[Difficulty, int] = {"easy": 3, "medium": 4, "hard": 4}
@@ -20,7 +20,7 @@ SITE_RADIUS = 0.06
 RELATIONS = ("before", "after")
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw a scene in which the cube goes to ``target_0``, then to ``target_1`` after the press."""
     cubes = video_place.CUBES[difficulty]
     table, cube = video_place.draw_table(rng, cubes, DISCS[difficulty], SITE_RADIUS)

@@ -17,6 +17,7 @@ from roboirg.core.footprints import Region
 from roboirg.core.motions import Swap
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
+    Bounds,
     button_keep_out,
     draw_button,
     draw_cubes,
@@ -32,11 +33,11 @@ from roboirg.tasks.shared.stages import (
     retreat,
 )
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS, plan_swaps
-from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
 from roboirg.util.random_draws import draw, shuffled
 
 REPEATS = (1, 3)
-SWAPS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 2), "medium": (2, 3), "hard": (0, 0)}
+SWAPS: dict[Difficulty, Bounds] = {"easy": (1, 2), "medium": (2, 3), "hard": (0, 0)}
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.05)
 GAP = 0.02
@@ -58,7 +59,7 @@ EARLY_PRESS = (50, 500)
 """A premature press fails only within these control steps of its timer."""
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button and cubes; the cube of the video and the number of repeats are uniform."""
     repeats = draw_number(rng, REPEATS)
     swaps = draw_number(rng, SWAPS[difficulty])

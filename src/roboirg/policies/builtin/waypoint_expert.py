@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE, POSE_SIZE, WAYPOINT
+from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE, POSE_SIZE, WAYPOINT, Actions
 from roboirg.core.episode import HANDLES_HELD, Goal
 from roboirg.core.observations import Observation
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
@@ -107,7 +107,7 @@ class WaypointExpert(OraclePolicy):
         self._rng = np.random.default_rng((env.episode.seed, self.seed))
         return super().decide(env, instruction)
 
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
+    def act(self, observation: Observation) -> Actions:  # noqa: ARG002
         """Return the next waypoint (1, 7), perhaps disturbed; `last` is the undisturbed one."""
         decided = self._stalled or self._next()
         self._stalled = None
@@ -213,7 +213,7 @@ class JointWaypointExpert(WaypointExpert):
         self._way: JointTrajectory | None = None
         return super().decide(env, instruction)
 
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def act(self, observation: Observation) -> Actions:
         """Return the targets (n, 8) of the next move, perhaps disturbed, or of the gripper."""
         executed = next(self._moves, None)
         if executed is None:

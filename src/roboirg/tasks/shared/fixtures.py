@@ -28,7 +28,11 @@ YAW_DIGITS = 1e6
 """Digits of a yaw (rad) behind this one are as good as random."""
 
 
-def draw_number(rng: np.random.Generator, bounds: tuple[int, int]) -> int:
+Bounds = tuple[int, int]
+"""Fewest and most, both included."""
+
+
+def draw_number(rng: np.random.Generator, bounds: Bounds) -> int:
     """Draw a whole number between two bounds, both included, uniformly."""
     low, high = bounds
     return int(rng.integers(low, high + 1))
