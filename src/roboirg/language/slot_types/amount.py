@@ -77,9 +77,8 @@ def _counts_said(request: InstructionRequest, goal_values: GoalValues) -> bool:
     return request.sampler.pick("said in the command", ("color", "count")) == "count"
 
 
-def _color_reference(request: InstructionRequest, goal_values: GoalValues) -> color.ColorReference:
-    shades = tuple(shade for shade, _ in pairs(goal_values))
-    return color.draw_reference(request, shades, THEM)
+def _color_reference(request: InstructionRequest) -> color.ColorReference:
+    return color.draw_reference(request, request.values_in("colors"), THEM)
 
 
 def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
@@ -89,7 +88,7 @@ def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """
     matched = pairs(goal_values)
     if _counts_said(request, goal_values):
-        ((words, expression),) = _color_reference(request, goal_values).pointers
+        ((words, expression),) = _color_reference(request).pointers
         ((shade, _),) = matched
         thing = anaphor(f"of {words.replace(' one', ' color')}", expression, shade)
         return _described(request, goal_values, [thing])
@@ -121,8 +120,8 @@ def _after(request: InstructionRequest, index: int) -> Phrase:
 
 def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
     if _counts_said(request, goal_values):
-        shades = tuple(shade for shade, _ in pairs(goal_values))
-        reference = _color_reference(request, goal_values)
+        reference = _color_reference(request)
+        shades = request.values_in("colors")
         return color.introduce_colors(request, shades, reference, many=True)
     template = request.pick("amount introduction", introductions.AMOUNT_INTRODUCTIONS)
     # "One of the red cubes": "them" then also fits a count of one.
@@ -161,10 +160,10 @@ def references(goal_values: GoalValues, slot: str, quantities: Sequence[int]) ->
 
 
 def _pointing(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
-    shades = tuple(shade for shade, _ in pairs(goal_values))
+    shades = request.values_in("colors")
     introduced = tuple(shade.color for shade in shades)
     if _counts_said(request, goal_values):
-        introduced = _color_reference(request, goal_values).introduced
+        introduced = _color_reference(request).introduced
     return color.them(shades, introduced)
 
 
