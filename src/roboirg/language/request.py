@@ -155,9 +155,11 @@ class InstructionRequest:
 
     def count_of(self, color: GoalValue) -> int:
         """Return how many things of a color the goal wants; 1 unless it counts them."""
-        _, _, index = color.field.partition(".")
-        counts = {one.field: one for one in self.goal_values if one.slot == "counts"}
-        return counts[f"counts.{index}"].number if counts else 1
+        wanted = color.field.replace("colors", "counts")
+        for count in self.values_in("counts"):
+            if count.field == wanted:
+                return count.number
+        return 1
 
     def alternatives(self, slot: str) -> tuple[tuple[str | int, ...], ...]:
         """Return all that a slot can hold in this scene if the other slots keep their values."""
@@ -295,9 +297,7 @@ class InstructionRequest:
         base, _, index = field.partition(".")
         values = {one.field: one for one in self.goal_values}
         if base != AMOUNT_FIELD:
-            value = values[field]
-            core = antecedent(phrase.core, value)
-            return (*plain(phrase.before), *core, *plain(phrase.after))
+            return self.around(field, antecedent(phrase.core, values[field]))
         count, color = values[f"counts.{index}"], values[f"colors.{index}"]
         return (
             *tagged_words(phrase.before, count),

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from roboirg.core.episode import Goal, values_in
+from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.language.grounded import (
     Clue,
     amount_clues,
@@ -55,12 +56,14 @@ def say(request: InstructionRequest) -> InstructionSpec:
     clues = clues_of(request)
     remarks: list[Phrase] = []
     fields = stated(request)
+    colors: dict[GoalValue, Clue] = {}
     for value, clue in clues.items():
-        if value.slot not in ("color", "colors"):
+        if value.slot in COLOR_SLOTS:
+            colors[value] = clue
+        else:
             remark, field = _WORDS[value.slot](request, value, clue)
             remarks.append(remark)
             fields |= field
-    colors = {value: clue for value, clue in clues.items() if value.slot in ("color", "colors")}
     if colors:
         remarks.append(_introduced(request, colors))
         fields |= described(request, _pointed(request, colors))
@@ -84,10 +87,7 @@ def clues_of(request: InstructionRequest, *, spoken: bool = False) -> Clues:
     """
     found: dict[GoalValue, Clue] = {}
     for value in request.goal_values:
-        sought = _SOUGHT.get(value.slot) if _is_open(request, value.slot) else None
-        if spoken and sought is _thing_clues:
-            sought = _spoken_clues
-        clues = sought(request, value) if sought else []
+        clues = _clues_to(request, value, spoken=spoken)
         clue = draw_clue(request, f"{value.field} seen", clues)
         if clue is not None:
             found[value] = clue
@@ -114,29 +114,36 @@ def _others(goal: Goal, slot: str) -> list[str]:
     )
 
 
-def _thing_clues(request: InstructionRequest, value: GoalValue) -> list[Clue]:
-    single = len(request.color_values) == 1
-    # Two sets in one sentence are too long.
-    return [one for one in thing_clues(request, value) if single or one.kind != "sets"]
+def _clues_to(request: InstructionRequest, value: GoalValue, *, spoken: bool) -> list[Clue]:
+    """Return the clues to a value that the scene leaves open, in the words of a language."""
+    if not _is_open(request, value.slot):
+        return []
+    if value.slot not in COLOR_SLOTS:
+        clues_to = _SOUGHT.get(value.slot)
+        return clues_to(request, value) if clues_to else []
+    clues = _spoken_clues(request, value) if spoken else thing_clues(request, value)
+    if len(request.color_values) == 1:
+        return clues
+    return [clue for clue in clues if clue.kind != "sets"]  # two in one sentence are too long
 
 
-def _spoken_clues(request: InstructionRequest, value: GoalValue) -> list[Clue]:
-    targets = request.objects_to_point_at(value)
+def _spoken_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
+    """Return the clues of language 4 to the things of a color."""
+    targets = request.objects_to_point_at(color)
     known = spoken_clues(request.episode.scene, request.task.commands.pointed)
-    clues = [found.clue for found in known if found.thing in targets]
-    single = len(request.color_values) == 1
-    return [clue for clue in clues if single or clue.kind != "sets"]
+    return [found.clue for found in known if found.thing in targets]
 
 
 _SOUGHT = {
     "repeats": repeat_clues,
     "placement": placement_clues,
     "relation": placement_clues,
-    "color": _thing_clues,
-    "colors": _thing_clues,
     "counts": amount_clues,
 }
-"""The clues to a value, by slot; those to a visit are missing, because nothing can be counted."""
+"""The clues to a value that is no color, by slot.
+
+Those to a visit are missing, because nothing can be counted.
+"""
 
 
 def _introduced(request: InstructionRequest, colors: Clues) -> Phrase:
