@@ -16,7 +16,7 @@ from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.observations import CAMERAS
+from roboirg.core.observations import CAMERAS, Pixels
 from roboirg.core.subgoal_text import Point
 from roboirg.envs.env_settings import RENDER_MODES, EnvOptions, EnvSettings, choose_index
 from roboirg.envs.episode_state import EpisodeState
@@ -267,7 +267,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
         reward = float(status == Status.SUCCESS)
         return self._observe(), reward, terminated, status == "timeout", self._info()
 
-    def render(self) -> NDArray[np.uint8] | None:
+    def render(self) -> Pixels | None:
         """Return the front and wrist pictures side by side, uint8 (256, 512, 3).
 
         Returns None without a render mode.
@@ -276,7 +276,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
             return None
         return np.hstack([self.picture(camera) for camera in CAMERAS])
 
-    def picture(self, camera: str) -> NDArray[np.uint8]:
+    def picture(self, camera: str) -> Pixels:
         """Return the current picture of a camera, uint8 (256, 256, 3).
 
         Raises:

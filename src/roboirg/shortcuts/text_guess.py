@@ -28,7 +28,6 @@ from roboirg.shortcuts.named_values import (
 )
 from roboirg.shortcuts.surface_rules import SURFACE_RULES, Candidates, SlotWords
 from roboirg.tasks import get_task, goals_of
-from roboirg.util.random_draws import draw
 
 TextGuess = Mapping[str, tuple[Candidates, ...]]
 """Candidates for each place of each slot; within a place they are equally likely."""
@@ -81,7 +80,7 @@ def goal_share(guess: TextGuess, episode: Episode) -> Fraction:
 def draw_goal(guess: TextGuess, episode: Episode, rng: np.random.Generator) -> Goal | None:
     """Draw a goal from a guess; None if the scene does not have it."""
     drawn = {
-        slot: tuple(draw(rng, candidates) for candidates in places)
+        slot: tuple(candidates[int(rng.integers(len(candidates)))] for candidates in places)
         for slot, places in guess.items()
     }
     for goal in goals_of(episode):

@@ -6,16 +6,14 @@ import os
 from collections.abc import Set as AbstractSet
 from typing import Any
 
-import numpy as np
 import sapien
 import sapien.physx
-from numpy.typing import NDArray
 
 from roboirg.core.actions import Actions
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
 from roboirg.core.errors import InvalidValueError, RoboIRGError, check_names
-from roboirg.core.observations import CAMERAS
+from roboirg.core.observations import CAMERAS, Pixels
 from roboirg.core.waiting import PHYSICS
 from roboirg.simulation import bodies, physics_settings
 from roboirg.simulation.cameras import Cameras
@@ -107,7 +105,7 @@ class World:
         """Record the step at which a stage became due, for the motions that wait for it."""
         self._stages.setdefault(index, self.elapsed)
 
-    def picture(self, camera: str) -> NDArray[np.uint8]:
+    def picture(self, camera: str) -> Pixels:
         """Return the current picture of a camera, RGB, shape (256, 256, 3)."""
         check_names("camera", [camera], CAMERAS)
         return self.cameras.picture(camera)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from roboirg.apps.demonstrations.picture_coding import PictureCoding
 from roboirg.core.actions import JOINT_ANGLE, CheckedActions
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import CAMERAS
+from roboirg.core.observations import CAMERAS, Pixels
 from roboirg.util.atomic_write import replacing
 from roboirg.util.media import decode_png
 
@@ -219,7 +219,7 @@ def video_name(camera: str) -> str:
     return f"{camera}.mp4"
 
 
-def read_picture(archive: zipfile.ZipFile, camera: str, row: int) -> NDArray[np.uint8]:
+def read_picture(archive: zipfile.ZipFile, camera: str, row: int) -> Pixels:
     """Return a row's picture from a trajectory's open file, RGB, (size, size, 3)."""
     return decode_png(archive.read(picture_name(camera, row)))
 

@@ -15,7 +15,7 @@ from roboirg.core.actions import Actions
 from roboirg.core.environment_options import MAX_STEPS
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.field_types import check_whole
-from roboirg.core.observations import CAMERAS, proprioception
+from roboirg.core.observations import CAMERAS, Pixels, proprioception
 from roboirg.envs.env_settings import EnvOptions
 from roboirg.envs.environment import StepResult
 from roboirg.envs.factory import make
@@ -89,7 +89,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
         self._shown: Mapping[str, NDArray[Any]] = {}
         self._next_frame = self._length = 0
         self._seen: dict[str, Any] = {}
-        self._picture: NDArray[np.uint8] | None = None
+        self._picture: Pixels | None = None
         self._last: StepResult | None = None
 
     @property
@@ -135,7 +135,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
             self._last = observation, 0.0, terminated, truncated, after
         return observation, reward, terminated, truncated, after
 
-    def render(self) -> NDArray[np.uint8] | None:
+    def render(self) -> Pixels | None:
         """Return the first camera's picture in the last observation."""
         return self._picture
 
