@@ -129,6 +129,11 @@ def sentences(phrases: Iterable[Phrase]) -> Phrase:
     return tuple(pieces)
 
 
+def words_of(phrase: Phrase) -> str:
+    """Return the words of a phrase, without its mentions."""
+    return "".join(piece.text for piece in phrase)
+
+
 def speak(
     index: int, stage: UtteranceStage, phrase: Phrase, *, capitalize: bool = True
 ) -> tuple[Utterance, tuple[Mention, ...]]:
@@ -140,7 +145,7 @@ def speak(
         if piece.tag is not None:
             mentions.append(Mention(index, start, end, *piece.tag))
         start = end
-    text = "".join(piece.text for piece in phrase)
+    text = words_of(phrase)
     return Utterance(stage, _capitalized(text) if capitalize else text), tuple(mentions)
 
 

@@ -9,7 +9,7 @@ from roboirg.core.goal_slots import SlotTypeName
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import cardinal
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import MentionedValue, Phrase, anaphor, antecedent, fill
+from roboirg.language.phrases import MentionedValue, Phrase, anaphor, antecedent, fill, words_of
 from roboirg.language.request import AMOUNT_FIELD, GoalValues, InstructionRequest
 from roboirg.language.slot_types import amount
 from roboirg.language.slot_types.number import introduce_quantity
@@ -119,8 +119,7 @@ def _of_each(request: InstructionRequest, goal_values: GoalValues, deduction: De
     if not request.resolved:
         return fill(relation.each, {"number": anaphor("of each", "each", colors)})
     quantities = amount.references(goal_values, REFERENCE, deduction.references)
-    named = "".join(piece.text for piece in quantities)
-    words = f"of each {relation.than} {named}"
+    words = f"of each {relation.than} {words_of(quantities)}"
     return fill(relation.each, {"number": antecedent(words, colors)})
 
 
