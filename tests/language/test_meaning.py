@@ -14,6 +14,7 @@ from roboirg.language.arms import say_arm
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction import Described, Meaning, Term
 from roboirg.language.landmarks import candidates_in
+from roboirg.language.request import values_of_goal
 from roboirg.language.scenarios import declared, spoken
 from roboirg.language.scenarios.scenario_file import task_scenarios
 from roboirg.language.settings import settings_of
@@ -72,12 +73,16 @@ def test_an_implicit_command_alone_leaves_more_than_the_goal_unless_the_scene_ha
             assert all(len(values_left(name, episode)) == 1 for name in open_fields), said.text
 
 
+def fields_of(goal):
+    return {value.field: value.value for value in values_of_goal(goal)}
+
+
 def values_left(name, episode):
     """Return the values of a field among the goals that agree with the right one in the others."""
-    own = meaning._field_values(episode.goal)
+    own = fields_of(episode.goal)
     found = set()
     for goal in goals_of(episode):
-        values = meaning._field_values(goal)
+        values = fields_of(goal)
         if values.keys() == own.keys() and all(
             values[other] == own[other] for other in own if other != name
         ):
@@ -182,19 +187,19 @@ FAULTS = {
         declared.SaidValues, "listed", lambda listed, *given: listed(*given)[::-1]
     ),
     "a place is that of another thing": change(
-        meaning, "_thing_at", lambda thing, place, episode: another(thing(place, episode), episode)
+        meaning, "_described_thing", lambda *given: another_if("place", *given)
     ),
     "a clue is to another thing": change(
-        meaning,
-        "_values_seen",
-        lambda seen, clue, name, episode: (
-            meaning._possible_values(name, episode) - seen(clue, name, episode)
-        ),
+        meaning, "_described_thing", lambda *given: another_if("clue", *given)
     ),
 }
 
 
-def another(thing, episode):
+def another_if(kind, described_thing, described, episode):
+    """Return another thing than the one that is described, for one kind of description."""
+    thing = described_thing(described, episode)
+    if described.kind != kind:
+        return thing
     things = candidates_in(episode.scene, get_task(episode.task).commands.pointed)
     return next((other for other in things if other != thing), None)
 

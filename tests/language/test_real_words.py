@@ -10,7 +10,7 @@ from language_variants import random_episodes
 from roboirg.core.episode import ALL_COLORS, Goal, Point, Scene, SceneObject
 from roboirg.language import instruct
 from roboirg.language.landmarks import MARGIN, landmarks
-from roboirg.language.phrases import anaphor, plain, swap_particles
+from roboirg.language.phrases import MentionedValue, anaphor, plain, swap_particles
 from roboirg.reader import interpret
 from roboirg.reader.places import DirectionalPlace, NamedPlace, read_places
 from roboirg.reader.tokens import split_sentences
@@ -104,5 +104,7 @@ def test_competing_remarks_name_colors_of_the_table_only(task):
 
 
 def test_a_pronoun_stands_between_a_verb_and_its_particle() -> None:
-    said = swap_particles((*plain("Pick up "), *anaphor("it", "it", "color", "green")))
+    said = swap_particles(
+        (*plain("Pick up "), *anaphor("it", "it", MentionedValue("green", "color")))
+    )
     assert "".join(piece.text for piece in said) == "Pick it up"

@@ -331,9 +331,7 @@ def test_a_relation_leaves_the_number_open():
 
 def test_amounts_keep_count_and_color_together():
     for episode in itertools.islice(split_episodes("BinFill"), 0, None, 3):
-        amounts = list(
-            zip(episode.goal.texts("colors"), episode.goal.numbers("counts"), strict=True)
-        )
+        amounts = episode.goal.amounts
         said = instruct(episode)
         values = [mention.value for mention in said.mentions]
         assert values == [value for color, count in amounts for value in (count, color)]

@@ -153,7 +153,7 @@ def test_bin_fill_goals_are_all_that_can_be_put_in():
 def test_bin_fill_stages_take_the_cubes_color_by_color_as_they_appear(difficulty):
     for scene, goal in scenes("BinFill", difficulty):
         stages = bin_fill.stages(scene, goal)
-        counts = dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
+        counts = dict(goal.amounts)
         assert len(stages) == 2 * sum(counts.values()) + 1
         picks, drops = stages[:-1:2], stages[1:-1:2]
         assert sorted(scene.color_order) == sorted(counts)

@@ -44,7 +44,7 @@ def containers(episode):
 
 
 def swaps(episode):
-    return [one for one in episode.scene.motions if isinstance(one, Swap)]
+    return episode.scene.motions_of(Swap)
 
 
 def apart(first, second):

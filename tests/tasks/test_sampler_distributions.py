@@ -132,9 +132,8 @@ def labels(scene, goal):
     found |= {"first color": colors[:1], "last color": colors[-1:]}
     found["cubes per color"] = sorted(Counter(colors).values())
     found["over cubes"] = sorted(str(cube.inside) for cube in cubes)
-    motions = scene.motions
-    found["late"] = sum(isinstance(one, Away) and one.start == 0 for one in motions)
-    swaps = [one for one in motions if isinstance(one, Swap)]
+    found["late"] = sum(motion.start == 0 for motion in scene.motions_of(Away))
+    swaps = scene.motions_of(Swap)
     found["number of swaps"] = len(swaps)
     found["undone"] = len({frozenset({one.first, one.second}) for one in swaps}) - len(swaps)
     hiding = {cube.inside for cube in cubes}
@@ -146,7 +145,7 @@ def labels(scene, goal):
         )
         found[f"swap {place} starts at a cube"] = swap.first in hiding
         found[f"swap {place} moves discs in use"] = len(moved & {one.place for one in scene.past})
-    found["interval"] = [one.interval for one in motions if isinstance(one, Shuttle)]
+    found["interval"] = [run.interval for run in scene.motions_of(Shuttle)]
     found["length of the past"] = len(scene.past)
     if scene.past:
         found["past"] = [fact.kind for fact in scene.past]

@@ -6,13 +6,17 @@ import math
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from types import NoneType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from roboirg.core.errors import InvalidActionError, check_names
 
+Actions = NDArray[np.floating[Any]]
+"""One action, or a chunk of several, one a row."""
+CheckedActions = NDArray[np.float64]
+"""The same, as the world executes them: finite, float64."""
 ARM_JOINTS = 7
 POSE_SIZE = 6
 """x, y, z, roll, pitch, yaw."""
@@ -90,7 +94,7 @@ ACTION_SPACES: Mapping[str, ActionSpace] = {
 }
 
 
-def choice_action(label: str, point: tuple[float, float] | None = None) -> NDArray[np.float64]:
+def choice_action(label: str, point: tuple[float, float] | None = None) -> CheckedActions:
     """Return the action of a choice: its letter, and row and column of the point if it has one."""
     if len(label) != 1 or not label.isascii() or not label.isalpha():
         raise InvalidActionError(f"Choice {label!r} is not a letter.")
@@ -103,7 +107,7 @@ def find_action_space(name: object) -> ActionSpace:
     return ACTION_SPACES[str(name)]
 
 
-def check_action(action: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray[np.float64]:
+def check_action(action: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> CheckedActions:
     """Return the action as finite numbers of the space's size."""
     numbers = _numbers(action, space)
     if numbers.shape != (space.size,):
@@ -114,7 +118,7 @@ def check_action(action: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray
     return _finite(numbers)
 
 
-def check_chunk(actions: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray[np.float64]:
+def check_chunk(actions: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> CheckedActions:
     """Return a policy's answer as a chunk (n, size), n >= 1; one action is a chunk of one."""
     numbers = _numbers(actions, space)
     chunk = numbers[None] if numbers.ndim == 1 else numbers
@@ -126,7 +130,7 @@ def check_chunk(actions: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> NDArray
     return _finite(chunk)
 
 
-def _numbers(action: ArrayLike, space: ActionSpace) -> NDArray[np.float64]:
+def _numbers(action: ArrayLike, space: ActionSpace) -> CheckedActions:
     got = type(action).__name__
     if hasattr(action, "detach"):
         # NumPy takes no tensor of PyTorch in bfloat16, with a gradient, or on a GPU.
@@ -153,7 +157,7 @@ def _check_values(values: NDArray[np.object_]) -> None:
             raise _bad_value(place, repr(value))
 
 
-def _finite(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+def _finite(numbers: CheckedActions) -> CheckedActions:
     bad = np.argwhere(~np.isfinite(numbers))
     if len(bad):
         raise _bad_value(bad[0], str(numbers[tuple(bad[0])]))

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from roboirg.core.actions import CHOICE
+from roboirg.core.actions import CHOICE, CheckedActions
 from roboirg.core.episode import Primitive
 from roboirg.core.errors import InvalidActionError
 
@@ -38,7 +35,7 @@ class Choice(NamedTuple):
         }
 
 
-def check_choices(actions: NDArray[np.float64], choices: Sequence[Choice]) -> None:
+def check_choices(actions: CheckedActions, choices: Sequence[Choice]) -> None:
     """Check that actions (n, 3) choose one of a task's choices, with a point where it needs one.
 
     Raises:

@@ -134,6 +134,10 @@ class Scene:
         """Return all objects of one kind, in scene order."""
         return tuple(item for item in self.objects if item.kind == kind)
 
+    def motions_of(self, kind: type[Value]) -> tuple[Value, ...]:
+        """Return all movements of one kind, in scene order."""
+        return tuple(motion for motion in self.motions if isinstance(motion, kind))
+
     def hidden_in(self, container: str) -> SceneObject | None:
         """Return the cube under the named container, or None if that container is empty."""
         return next((item for item in self.objects if item.inside == container), None)
@@ -177,6 +181,11 @@ class Goal:
     def numbers(self, slot: str) -> tuple[int, ...]:
         """Return the value of a slot that holds several counts in order."""
         return tuple(map(int, self._value(slot, tuple)))
+
+    @property
+    def amounts(self) -> tuple[tuple[str, int], ...]:
+        """Each color with its count, of a goal that counts cubes."""
+        return tuple(zip(self.texts("colors"), self.numbers("counts"), strict=True))
 
     def _value(self, slot: str, kind: type[Value]) -> Value:
         value = self[slot]

@@ -39,6 +39,10 @@ def check_cameras(cameras: object) -> tuple[str, ...]:
     return tuple(cameras)
 
 
+Pixels = NDArray[np.uint8]
+"""A picture, (H, W, 3), RGB."""
+
+
 class Observation(TypedDict):
     """Camera images, robot state and instruction of one step.
 
@@ -47,8 +51,8 @@ class Observation(TypedDict):
     ``calibration=True``.
     """
 
-    front_rgb: NDArray[np.uint8]
-    wrist_rgb: NDArray[np.uint8]
+    front_rgb: Pixels
+    wrist_rgb: Pixels
     joint_positions: NDArray[np.float32]
     """(7,) arm joint angles, rad."""
     gripper: NDArray[np.float32]

@@ -12,9 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from roboirg.core.actions import find_action_space
 from roboirg.core.errors import InvalidActionError
 from roboirg.core.field_types import check_whole
-from roboirg.envs.environment import RoboIRGEnv
-
-StepResult = tuple[dict[str, Any], float, bool, bool, dict[str, Any]]
+from roboirg.envs.environment import RoboIRGEnv, StepResult
 
 
 class ActionChunks(gymnasium.Wrapper[dict[str, Any], NDArray[Any], dict[str, Any], NDArray[Any]]):

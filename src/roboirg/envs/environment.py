@@ -10,13 +10,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
-from roboirg.core.actions import CHOICE, check_action, check_chunk, find_action_space
+from roboirg.core.actions import CHOICE, Actions, check_action, check_chunk, find_action_space
 from roboirg.core.choices import check_choices
 from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.observations import CAMERAS
+from roboirg.core.observations import CAMERAS, Pixels
 from roboirg.core.subgoal_text import Point
 from roboirg.envs.env_settings import RENDER_MODES, EnvOptions, EnvSettings, choose_index
 from roboirg.envs.episode_state import EpisodeState
@@ -42,7 +42,11 @@ FrameHook = Callable[["RoboIRGEnv", bool], None]
 """Called with the environment, and with whether the step belongs to the demonstration."""
 
 
-class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
+StepResult = tuple[dict[str, Any], float, bool, bool, dict[str, Any]]
+"""Observation, reward, whether it has ended, whether it was cut off, and the info."""
+
+
+class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
     """Episodes of one task, with an instruction in one setting.
 
     Observation: `front_rgb` and `wrist_rgb` uint8 (256, 256, 3) for the requested cameras;
@@ -228,7 +232,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             shown["available_multi_choices"] = [one.as_dict() for one in self.choices]
         return self._observe(), {**self._info(), **shown}
 
-    def step(self, action: ArrayLike) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+    def step(self, action: ArrayLike) -> StepResult:
         """Execute one action: one control step, or many in the waypoint space.
 
         Raises:
@@ -237,9 +241,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         """
         return self.step_chunk(check_action(action, self._space)[None])
 
-    def step_chunk(
-        self, actions: ArrayLike
-    ) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
+    def step_chunk(self, actions: ArrayLike) -> StepResult:
         """Execute several actions, stopping if the episode ends, and observe once at the end.
 
         Equivalent to one call of `step` per action, but renders only the last observation.
@@ -265,7 +267,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
         reward = float(status == Status.SUCCESS)
         return self._observe(), reward, terminated, status == "timeout", self._info()
 
-    def render(self) -> NDArray[np.uint8] | None:
+    def render(self) -> Pixels | None:
         """Return the front and wrist pictures side by side, uint8 (256, 512, 3).
 
         Returns None without a render mode.
@@ -274,7 +276,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
             return None
         return np.hstack([self.picture(camera) for camera in CAMERAS])
 
-    def picture(self, camera: str) -> NDArray[np.uint8]:
+    def picture(self, camera: str) -> Pixels:
         """Return the current picture of a camera, uint8 (256, 256, 3).
 
         Raises:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from roboirg.core.episode import ROBOT_BASE, Episode, SceneObject
 from roboirg.core.errors import MotionPlanningError
-from roboirg.core.observations import FRONT, Demonstration
+from roboirg.core.observations import FRONT, Demonstration, Pixels
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.factory import make
 from roboirg.policies.builtin.waypoint_expert import Disturbance, ExpertWaypoint, WaypointExpert
@@ -26,7 +26,7 @@ from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.simulation.proprioception import Proprioception, ProprioceptiveState, euler_angles
 from roboirg.simulation.rendering.viewpoint import FOCAL_LENGTH, SIZE, front_camera_matrix
 from roboirg.simulation.world import World
-from roboirg.util.media import Picture, Pixels, decode_png, encode_png
+from roboirg.util.media import Picture, decode_png, encode_png
 
 __all__ = [
     "LOOK_EVERY",

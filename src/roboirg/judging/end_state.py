@@ -167,10 +167,10 @@ def judge_moment(replay: EpisodeReplay, step: int) -> FailureName | None:
 
     The moment is that of the oracle's press, the middle of a pass of the object that moves.
     """
-    press, motions = replay.stages[-1].primitive, replay.episode.scene.motions
-    run = next((one for one in motions if isinstance(one, Shuttle)), None)
-    if run is None or press.kind != "press_below":
+    press, runs = replay.stages[-1].primitive, replay.episode.scene.motions_of(Shuttle)
+    if not runs or press.kind != "press_below":
         return None
+    (run,) = runs
     if abs(step - press.steps) <= run.interval / 2:
         return "mistimed"
     coming = replay.facts[step : step + SETTLED_STEPS // 4]

@@ -28,6 +28,7 @@ from roboirg.language.settings import EXPLICIT
 from roboirg.language.worded_command import goal_name
 from roboirg.tasks import get_task, with_goal
 from roboirg.tasks.other_goals import draw_other_goal
+from roboirg.util.random_draws import shuffled
 
 FUNCTION_WORDS = (
     "a an and are as at be been but by can could for from had has have i if in into is it its let "
@@ -154,7 +155,7 @@ def _scramble(episode: Episode, told: Instruction) -> Instruction:
     rng = np.random.default_rng([episode.seed, zlib.crc32(told.text.encode())])
     order = every
     while order == every:
-        order = [every[index] for index in rng.permutation(len(every))]
+        order = shuffled(rng, every)
     rest = iter(order)
     return _with_texts(told, tuple(" ".join(next(rest) for _ in each) for each in words))
 

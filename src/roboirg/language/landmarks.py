@@ -70,6 +70,8 @@ ORDINALS = {1: "second", 2: "third"}
 FOURTH = {3: "fourth"}
 SIZES = {2: "two", 3: "three", 4: "four"}
 """Of groups of which a landmark singles out one object."""
+FIXTURES: tuple[ObjectKind, ...] = ("button", "target", "bin")
+"""Kinds of objects near which others are named, if there is only one."""
 PAIRED: tuple[ObjectKind, ...] = ("box", "tape")
 """Kinds of objects that always come in pairs."""
 
@@ -98,6 +100,11 @@ class Ranking(NamedTuple):
 
     quantity: Callable[[SceneObject], float]
     margin: float = MARGIN
+
+    @property
+    def opposite(self) -> Ranking:
+        """The order from the other end."""
+        return self._replace(quantity=lambda item: -self.quantity(item))
 
     def select(self, candidates: Sequence[SceneObject], rank: int) -> SceneObject | None:
         """Return the candidate of a rank (from 0); None unless it is clear by the margin."""
@@ -161,25 +168,21 @@ def selectors(scene: Scene, thing: ObjectKind, frame: Frame) -> Iterator[Selecto
     if thing in PAIRED:
         yield from _sides(candidates, frame)
         return
-    named = (*_extremes(candidates, frame), *_corners(candidates, frame))
+    extremes = tuple(_extremes(candidates, frame))
+    named = (*extremes, *_corners(candidates, frame))
     ranked = tuple(_ranks(candidates, frame))
-    yield from (*named, *_far_sides(candidates, frame), *ranked)
     fixtures = tuple(_fixtures(scene, candidates))
-    yield from fixtures
+    yield from (*named, *_far_sides(candidates, frame), *ranked, *fixtures)
     yield from _other_colors(candidates)
-    yield from _chains(thing, candidates, named, kind=LandmarkClass.NEXT_TO_NAMED)
-    yield from _chains(thing, candidates, ranked, kind=LandmarkClass.NEXT_TO_RANKED)
-    yield from _chains(thing, candidates, named, kind=LandmarkClass.SECOND_FROM_NAMED, rank=1)
-    yield from _chains(thing, candidates, named, kind=LandmarkClass.THIRD_FROM_NAMED, rank=2)
-    yield from _ranks(candidates, frame, FOURTH, kind=LandmarkClass.FOURTH_RANK)
-    extremes, ranks = partial(_extremes, frame=frame), partial(_ranks, frame=frame)
-    yield from _members(
-        candidates, extremes(candidates), extremes, kind=LandmarkClass.EXTREME_OF_EXTREMES
-    )
-    yield from _members(candidates, fixtures, extremes, kind=LandmarkClass.EXTREME_OF_FIXTURE)
-    yield from _members(
-        candidates, extremes(candidates), ranks, kind=LandmarkClass.RANK_OF_EXTREMES
-    )
+    yield from _chains(thing, candidates, named, LandmarkClass.NEXT_TO_NAMED)
+    yield from _chains(thing, candidates, ranked, LandmarkClass.NEXT_TO_RANKED)
+    yield from _chains(thing, candidates, named, LandmarkClass.SECOND_FROM_NAMED, rank=1)
+    yield from _chains(thing, candidates, named, LandmarkClass.THIRD_FROM_NAMED, rank=2)
+    yield from _ranks(candidates, frame, FOURTH, LandmarkClass.FOURTH_RANK)
+    extreme_in, ranks_in = partial(_extremes, frame=frame), partial(_ranks, frame=frame)
+    yield from _members(candidates, extremes, extreme_in, LandmarkClass.EXTREME_OF_EXTREMES)
+    yield from _members(candidates, fixtures, extreme_in, LandmarkClass.EXTREME_OF_FIXTURE)
+    yield from _members(candidates, extremes, ranks_in, LandmarkClass.RANK_OF_EXTREMES)
     yield from _fixture_ranks(candidates, fixtures)
 
 
@@ -187,10 +190,17 @@ def candidates_in(scene: Scene, thing: ObjectKind) -> tuple[SceneObject, ...]:
     """Return the visible candidates: all objects of a kind, without cubes that arrive later."""
     if thing != "cube":
         return scene.of_kind(thing)
-    late = {
-        motion.subject for motion in scene.motions if isinstance(motion, Away) and motion.start == 0
-    }
+    late = {motion.subject for motion in scene.motions_of(Away) if motion.start == 0}
     return tuple(cube for cube in scene.of_kind("cube") if cube.name not in late)
+
+
+def things_of_color(scene: Scene, kind: ObjectKind, color: str) -> tuple[SceneObject, ...]:
+    """Return the cubes of a color, or the containers over them if `kind` is that of containers."""
+    return tuple(
+        item if item.inside is None or item.kind == kind else scene[item.inside]
+        for item in scene.objects
+        if item.color == color
+    )
 
 
 class Direction(NamedTuple):
@@ -200,13 +210,13 @@ class Direction(NamedTuple):
         extreme: the first in that direction.
         rank: after *second* and *third*.
         ranking: the first one first.
-        sided: whether it is left or right, so that the frame matters.
+        side: ``left`` or ``right``, for which the frame matters; else empty.
     """
 
     extreme: str
     rank: str
     ranking: Ranking
-    sided: bool = False
+    side: str = ""
 
 
 def directions(frame: Frame) -> tuple[Direction, ...]:
@@ -217,14 +227,19 @@ def directions(frame: Frame) -> tuple[Direction, ...]:
     else:
         robot, owner = "the robot", "the camera's"
         left = Ranking(lambda item: -_column(item), COLUMN_MARGIN)
-    right = Ranking(_negated(left.quantity), left.margin)
-    near, far = f"closest to {robot}", f"farthest from {robot}"
+    far = Ranking(lambda item: item.position.x)
+    closest, farthest = f"closest to {robot}", f"farthest from {robot}"
     return (
-        Direction(f"farthest to {owner} left", f"from {owner} left", left, sided=True),
-        Direction(f"farthest to {owner} right", f"from {owner} right", right, sided=True),
-        Direction(near, near, Ranking(lambda item: -item.position.x)),
-        Direction(far, far, Ranking(lambda item: item.position.x)),
+        Direction(f"farthest to {owner} left", f"from {owner} left", left, "left"),
+        Direction(f"farthest to {owner} right", f"from {owner} right", left.opposite, "right"),
+        Direction(closest, closest, far.opposite),
+        Direction(farthest, farthest, far),
     )
+
+
+def sideways(frame: Frame) -> tuple[Direction, ...]:
+    """Return left and right of a frame."""
+    return directions(frame)[:2]
 
 
 def _column(item: SceneObject) -> float:
@@ -239,29 +254,24 @@ def _column(item: SceneObject) -> float:
 
 def _extremes(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
     for direction in directions(frame):
-        yield Selector(
-            Landmark(direction.extreme, LandmarkClass.EXTREME, direction.sided),
-            (direction.ranking,),
-            candidates,
-        )
+        landmark = Landmark(direction.extreme, LandmarkClass.EXTREME, bool(direction.side))
+        yield Selector(landmark, (direction.ranking,), candidates)
 
 
 def _sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
     owner = "your" if frame == "robot" else "the camera's"
-    for side, direction in zip(("left", "right"), directions(frame), strict=False):
-        yield Selector(
-            Landmark(f"on {owner} {side}", LandmarkClass.EXTREME, sided=True),
-            (direction.ranking,),
-            candidates,
-        )
+    for direction in sideways(frame):
+        landmark = Landmark(f"on {owner} {direction.side}", LandmarkClass.EXTREME, sided=True)
+        yield Selector(landmark, (direction.ranking,), candidates)
 
 
 def _far_sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
     """Yield *at your far right*, where the side and the far corner mean the same object."""
     if frame != "robot":
         return
-    for side, direction in zip(("left", "right"), directions(frame), strict=False):
-        corners = tuple(nearness((area["far"], area[side])) for area in (WORK_AREA, TABLE))
+    for direction in sideways(frame):
+        side = direction.side
+        corners = [nearness((area["far"], area[side])) for area in (WORK_AREA, TABLE)]
         landmark = Landmark(f"at your far {side}", LandmarkClass.EXTREME, sided=True)
         yield Selector(landmark, (direction.ranking, *corners), candidates)
 
@@ -275,8 +285,7 @@ def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sele
             else:
                 phrase = f"closest to the camera's {side} corner {reach} the robot"
                 y = mirrored
-            corners = [(area[depth], area[y]) for area in (WORK_AREA, TABLE)]
-            rankings = tuple(nearness(corner) for corner in corners)
+            rankings = tuple(nearness((area[depth], area[y])) for area in (WORK_AREA, TABLE))
             yield Selector(Landmark(phrase, LandmarkClass.CORNER, sided=True), rankings, candidates)
 
 
@@ -291,21 +300,21 @@ def _ranks(
         if rank > len(candidates) - 2:
             continue
         for direction in directions(frame):
-            landmark = Landmark(f"{ordinal} {direction.rank}", kind, direction.sided)
+            landmark = Landmark(f"{ordinal} {direction.rank}", kind, bool(direction.side))
             yield Selector(landmark, (direction.ranking,), candidates, rank)
 
 
+def fixtures_in(scene: Scene) -> list[SceneObject]:
+    """Return the button, the target and the bin, if there is only one of it."""
+    of_kinds = [scene.of_kind(kind) for kind in FIXTURES]
+    return [of_kind[0] for of_kind in of_kinds if len(of_kind) == 1]
+
+
 def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Selector]:
-    for kind in ("button", "target", "bin"):
-        fixtures = [item for item in scene.objects if item.kind == kind]
-        if len(fixtures) != 1:
-            continue
-        away = _distance(fixtures[0].position)
-        for words, ranking in (
-            ("closest to", Ranking(_negated(away))),
-            ("farthest from", Ranking(away)),
-        ):
-            landmark = Landmark(f"{words} the {kind}", LandmarkClass.FIXTURE)
+    for fixture in fixtures_in(scene):
+        near = nearness(fixture.position)
+        for words, ranking in (("closest to", near), ("farthest from", near.opposite)):
+            landmark = Landmark(f"{words} the {fixture.kind}", LandmarkClass.FIXTURE)
             yield Selector(landmark, (ranking,), candidates)
 
 
@@ -321,11 +330,14 @@ def _fixture_ranks(
             yield selector._replace(landmark=landmark, rank=rank)
 
 
+def alone_in_color(things: Sequence[SceneObject]) -> list[SceneObject]:
+    """Return the things that are the only ones of their color."""
+    colors = [thing.color for thing in things]
+    return [thing for thing in things if thing.color and colors.count(thing.color) == 1]
+
+
 def _other_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
-    for anchor in candidates:
-        like = [item for item in candidates if item.color == anchor.color]
-        if anchor.color is None or len(like) != 1:
-            continue
+    for anchor in alone_in_color(candidates):
         landmark = Landmark(f"closest to the {anchor.color} cube", LandmarkClass.OTHER_COLOR)
         yield Selector(landmark, (nearness(anchor.position),), _without(candidates, anchor))
 
@@ -382,13 +394,5 @@ def _without(candidates: Sequence[SceneObject], anchor: SceneObject) -> tuple[Sc
 
 def nearness(place: Sequence[float]) -> Ranking:
     """Return the order by the distance from a place, the nearest first."""
-    return Ranking(_negated(_distance(place)))
-
-
-def _distance(place: Sequence[float]) -> Callable[[SceneObject], float]:
     x, y = place[:2]
-    return lambda item: math.hypot(item.position.x - x, item.position.y - y)
-
-
-def _negated(quantity: Callable[[SceneObject], float]) -> Callable[[SceneObject], float]:
-    return lambda item: -quantity(item)
+    return Ranking(lambda item: -math.hypot(item.position.x - x, item.position.y - y))

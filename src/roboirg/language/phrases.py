@@ -8,9 +8,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
-from roboirg.language.instruction import Expression, Mention, Role, Utterance, UtteranceStage
+from roboirg.language.instruction import (
+    REFERENCE,
+    Expression,
+    Mention,
+    Role,
+    Utterance,
+    UtteranceStage,
+)
 
 _MARK = re.compile(r"\{(?P<field>[a-z_.0-9]+)\}|\[(?P<one>[^\[\]|]*)\|(?P<many>[^\[\]|]*)\]")
 
@@ -44,14 +51,33 @@ def plain(text: str) -> Phrase:
     return (TaggedText(text),)
 
 
-def antecedent(text: str, slot: str, value: str | int) -> Phrase:
-    """Return words that introduce a slot value."""
-    return (TaggedText(text, Tag("antecedent", None, slot, value)),)
+class Mentionable(Protocol):
+    """What a mention stands for: a value of a slot."""
+
+    @property
+    def slot(self) -> str:
+        """The name of the slot."""
+
+    @property
+    def value(self) -> str | int:
+        """The value."""
 
 
-def anaphor(text: str, expression: Expression, slot: str, value: str | int) -> Phrase:
-    """Return words that point back at a slot value."""
-    return (TaggedText(text, Tag("anaphor", expression, slot, value)),)
+class MentionedValue(NamedTuple):
+    """A value that only leads to the goal, such as a number to count from, or several of a slot."""
+
+    value: str | int
+    slot: str = REFERENCE
+
+
+def antecedent(text: str, referent: Mentionable) -> Phrase:
+    """Return words that introduce a value."""
+    return (TaggedText(text, Tag("antecedent", None, referent.slot, referent.value)),)
+
+
+def anaphor(text: str, expression: Expression, referent: Mentionable) -> Phrase:
+    """Return words that point back at a value."""
+    return (TaggedText(text, Tag("anaphor", expression, referent.slot, referent.value)),)
 
 
 def fill(template: str, fields: Mapping[str, Phrase], *, plural: bool = False) -> Phrase:
@@ -103,6 +129,11 @@ def sentences(phrases: Iterable[Phrase]) -> Phrase:
     return tuple(pieces)
 
 
+def words_of(phrase: Phrase) -> str:
+    """Return the words of a phrase, without its mentions."""
+    return "".join(piece.text for piece in phrase)
+
+
 def speak(
     index: int, stage: UtteranceStage, phrase: Phrase, *, capitalize: bool = True
 ) -> tuple[Utterance, tuple[Mention, ...]]:
@@ -114,7 +145,7 @@ def speak(
         if piece.tag is not None:
             mentions.append(Mention(index, start, end, *piece.tag))
         start = end
-    text = "".join(piece.text for piece in phrase)
+    text = words_of(phrase)
     return Utterance(stage, _capitalized(text) if capitalize else text), tuple(mentions)
 
 

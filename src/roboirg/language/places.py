@@ -25,10 +25,13 @@ from roboirg.language.landmarks import (
     PAIRED,
     Frame,
     Ranking,
+    alone_in_color,
     candidates_in,
     directions,
+    fixtures_in,
     nearness,
     selectors,
+    sideways,
 )
 
 Things = Sequence[SceneObject]
@@ -144,26 +147,14 @@ def _said(
         yield SpokenPlace(kind, thing, attributive, spot)
 
 
-def _beyond(ranking: Ranking, start: float) -> Ranking:
-    """Return how far things are inside the region that begins at a value."""
-    return ranking._replace(quantity=lambda thing: ranking.quantity(thing) - start)
+def _only(things: Things, ranking: Ranking, start: float) -> SceneObject | None:
+    """Return the only thing whose quantity is at least `start`.
 
-
-def _past(ranking: Ranking, start: SceneObject) -> Ranking:
-    """Return how far things are past an object."""
-    return _beyond(ranking, ranking.quantity(start))
-
-
-def _both(first: Ranking, second: Ranking) -> Ranking:
-    """Return how far things are inside of both regions."""
-    return first._replace(quantity=lambda thing: min(first.quantity(thing), second.quantity(thing)))
-
-
-def _only(things: Things, region: Ranking) -> SceneObject | None:
-    """Return the only thing inside a region; None unless all others are outside by the margin."""
-    inside = region._replace(quantity=lambda thing: min(region.quantity(thing), 0.0))
-    thing = inside.select(things, 0)
-    return thing if thing and region.quantity(thing) >= 0 else None
+    None unless those of all others are less by the margin.
+    """
+    region = ranking._replace(quantity=lambda thing: min(ranking.quantity(thing), start))
+    thing = region.select(things, 0)
+    return thing if thing and ranking.quantity(thing) >= start else None
 
 
 _CENTER = SceneObject("center", "site", Point(-0.05, 0.0, 0.0))
@@ -227,22 +218,23 @@ _WORDS: Mapping[Frame, tuple[_Words, ...]] = {
 
 
 def _in_directions(things: Things, frame: Frame) -> Iterator[SpokenPlace]:
+    """Yield the first in each direction, the only one there, and those in a row."""
     center = _center_of(things)
     for words, direction in zip(_WORDS[frame], directions(frame), strict=True):
         ranking = direction.ranking
-        clear = _CLEARLY * ranking.margin
-        region = _beyond(_past(ranking, center), clear)
-        ahead = ranking._replace(margin=clear).select(things, 0)
-        far = words.far
-        if ahead is None or region.quantity(ahead) < ranking.margin:
-            far = None
+        clearly = _CLEARLY * ranking.margin
+        start = ranking.quantity(center) + clearly
+        ahead = ranking._replace(margin=clearly).select(things, 0)
+        is_far = ahead is not None and ranking.quantity(ahead) - start >= ranking.margin
+        far = words.far if is_far else None
         yield from _said(PlaceClass.EXTREME, ranking.select(things, 0), words.most, far)
-        yield from _said(PlaceClass.EXTREME, _only(things, region), words.alone, words.spot)
+        alone = _only(things, ranking, start)
+        yield from _said(PlaceClass.EXTREME, alone, words.alone, words.spot)
         for rank, ordinal in ORDINALS.items():
             # The last one in a row is the first from the other end.
             if words.row and rank < len(things) - 1:
-                phrase = f"{ordinal} {words.row}"
-                yield from _said(PlaceClass.RANK, ranking.select(things, rank), phrase)
+                thing = ranking.select(things, rank)
+                yield from _said(PlaceClass.RANK, thing, f"{ordinal} {words.row}")
 
 
 class _Anchor(NamedTuple):
@@ -254,21 +246,14 @@ class _Anchor(NamedTuple):
 
 
 def _anchors(things: Things, scene: Scene) -> Iterator[_Anchor]:
-    for fixture in _fixtures_of(scene):
+    for fixture in fixtures_in(scene):
         yield _Anchor(PlaceClass.FIXTURE, f"the {fixture.kind}", fixture)
-    colors = [thing.color for thing in things]
-    for thing in things:
-        if thing.color and colors.count(thing.color) == 1:
-            yield _Anchor(PlaceClass.COLOR, f"the {thing.color} cube", thing)
-
-
-def _fixtures_of(scene: Scene) -> list[SceneObject]:
-    """Return the button, the target and the bin, if there is only one of it."""
-    of_kinds = [scene.of_kind(kind) for kind in ("button", "target", "bin")]
-    return [of_kind[0] for of_kind in of_kinds if len(of_kind) == 1]
+    for thing in alone_in_color(things):
+        yield _Anchor(PlaceClass.COLOR, f"the {thing.color} cube", thing)
 
 
 def _near_anchor(anchor: _Anchor, things: Things) -> Iterator[SpokenPlace]:
+    """Yield what is nearest to an anchor, right next to it, or farthest from it."""
     kind, name = anchor.kind, anchor.name
     others = [thing for thing in things if thing is not anchor.thing]
     if kind > PlaceClass.FIXTURE and len(others) <= 1:
@@ -276,35 +261,35 @@ def _near_anchor(anchor: _Anchor, things: Things) -> Iterator[SpokenPlace]:
     near = nearness(anchor.thing.position)
     yield from _said(kind, near.select(others, 0), f"nearest to {name}")
     reach = anchor.thing.half_width + things[0].half_width + BESIDE
-    beside = _only(others, _beyond(near, -reach))
+    beside = _only(others, near, -reach)
     if kind == PlaceClass.FIXTURE:
         yield from _said(kind, beside, f"next to {name}", f"right by {name}")
-        away = near._replace(quantity=lambda thing: -near.quantity(thing))
-        yield from _said(kind, away.select(others, 0), f"farthest from {name}")
+        yield from _said(kind, near.opposite.select(others, 0), f"farthest from {name}")
     if kind == PlaceClass.COLOR:
         yield from _said(kind, beside, f"next to {name}")
 
 
 def _between(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
-    for first, second in itertools.combinations(_fixtures_of(scene), 2):
+    """Yield the only thing over which the way between two fixtures is hardly longer."""
+    for first, second in itertools.combinations(fixtures_in(scene), 2):
         words = f"between the {first.kind} and the {second.kind}"
-        thing = _only(things, _way_between(first, second))
+        shortest = nearness(first.position).quantity(second)
+        thing = _only(things, _way_between(first, second), shortest - _DETOUR)
         yield from _said(PlaceClass.BETWEEN, thing, words, words)
 
 
 def _way_between(first: SceneObject, second: SceneObject) -> Ranking:
-    """Return the region of things over which the way from one to the other is hardly longer."""
+    """Return the order of things by the way from one to the other over them, the shortest first."""
     near, far = nearness(first.position), nearness(second.position)
     # A thing that moves comes nearer to both, or goes away from both, by as much.
-    way = Ranking(lambda thing: near.quantity(thing) + far.quantity(thing), 2 * MARGIN)
-    return _beyond(way, near.quantity(second) - _DETOUR)
+    return Ranking(lambda thing: near.quantity(thing) + far.quantity(thing), 2 * MARGIN)
 
 
 def _in_middle(things: Things) -> Iterator[SpokenPlace]:
     """Yield the thing in the middle of an odd row, or the only one around the center."""
     words = "in the middle"
     near = nearness(_center_of(things).position)
-    yield from _said(PlaceClass.MIDDLE, _only(things, _beyond(near, -_AROUND)), words, words)
+    yield from _said(PlaceClass.MIDDLE, _only(things, near, -_AROUND), words, words)
     row = directions("robot")[0].ranking
     middle = row.select(things, len(things) // 2)
     if len(things) % 2 and middle is near.select(things, 0):
@@ -312,31 +297,42 @@ def _in_middle(things: Things) -> Iterator[SpokenPlace]:
 
 
 def _corners(things: Things) -> Iterator[SpokenPlace]:
+    """Yield the only thing in each quarter around the center, and in its corner."""
     left, right, near, far = (direction.ranking for direction in directions("robot"))
     center = _center_of(things)
     for depth, along in (("front", near), ("back", far)):
         for side, across in (("left", left), ("right", right)):
-            quarter = _both(_past(along, center), _past(across, center))
-            thing = _only(things, _beyond(quarter, MARGIN))
-            words = f"at the {depth} {side}"
-            yield from _said(PlaceClass.CORNER, thing, words, words)
-            thing = _only(things, _beyond(quarter, _CLEARLY * MARGIN))
-            words = f"in the {depth} {side} corner"
+            quarter = _both_past(center, along, across)
+            there, corner = f"at the {depth} {side}", f"in the {depth} {side} corner"
+            yield from _said(PlaceClass.CORNER, _only(things, quarter, MARGIN), there, there)
             # Of the area where things stand: one alone is in none.
-            spot = words if len(things) > 1 else None
-            yield from _said(PlaceClass.CORNER, thing, words, spot)
+            spot = corner if len(things) > 1 else None
+            thing = _only(things, quarter, _CLEARLY * MARGIN)
+            yield from _said(PlaceClass.CORNER, thing, corner, spot)
+
+
+def _both_past(start: SceneObject, along: Ranking, across: Ranking) -> Ranking:
+    """Return the order of things by how far they are past another one in both directions."""
+
+    def depth(thing: SceneObject) -> float:
+        return min(
+            along.quantity(thing) - along.quantity(start),
+            across.quantity(thing) - across.quantity(start),
+        )
+
+    return Ranking(depth)
 
 
 def _on_sides(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
     """Yield the only thing left or right of a fixture, unless it is rather behind or before it."""
-    for fixture in _fixtures_of(scene):
-        for side, direction in zip(("left", "right"), directions("robot"), strict=False):
-            thing = _only(things, _past(direction.ranking, fixture))
-            words = f"to the {side} of the {fixture.kind}"
+    for fixture in fixtures_in(scene):
+        for direction in sideways("robot"):
+            thing = _only(things, direction.ranking, direction.ranking.quantity(fixture))
             if thing and _is_sideways(thing, fixture):
+                words = f"to the {direction.side} of the {fixture.kind}"
                 yield from _said(PlaceClass.SIDE_OF_FIXTURE, thing, words)
 
 
 def _is_sideways(thing: SceneObject, fixture: SceneObject) -> bool:
-    sideways = abs(thing.position.y - fixture.position.y)
-    return sideways >= abs(thing.position.x - fixture.position.x)
+    sideward = abs(thing.position.y - fixture.position.y)
+    return sideward >= abs(thing.position.x - fixture.position.x)

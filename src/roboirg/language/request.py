@@ -18,8 +18,16 @@ from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES, SlotTypeName
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName, Pools, pool_of
 from roboirg.language.instruction import Expression, Meaning, UtteranceStage
-from roboirg.language.landmarks import Frame
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, swap_particles
+from roboirg.language.landmarks import Frame, things_of_color
+from roboirg.language.phrases import (
+    Mentionable,
+    Phrase,
+    anaphor,
+    antecedent,
+    fill,
+    plain,
+    swap_particles,
+)
 from roboirg.language.template_sampler import TemplateSampler
 from roboirg.language.worded_command import (
     StatedPhrase,
@@ -106,12 +114,12 @@ class InstructionRequest:
         return self.options.form == "resolved"
 
     def refer(
-        self, words: str, expression: Expression, slot: str, value: str | int, *, resolved: str
+        self, words: str, expression: Expression, referent: Mentionable, *, resolved: str
     ) -> Phrase:
-        """Return words that point back at a slot value; resolved, those that name it."""
+        """Return words that point back at a value; resolved, those that name it."""
         if self.resolved:
-            return antecedent(resolved, slot, value)
-        return anaphor(words, expression, slot, value)
+            return antecedent(resolved, referent)
+        return anaphor(words, expression, referent)
 
     @property
     def pool(self) -> PoolName:
@@ -130,22 +138,28 @@ class InstructionRequest:
     @property
     def goal_values(self) -> GoalValues:
         """The values of the goal, in the order of its slots."""
-        return _goal_values(self.episode.goal)
+        return values_of_goal(self.episode.goal)
 
     def values_of(self, slot_type: SlotTypeName) -> GoalValues:
         """Return the goal values of one slot type."""
-        return tuple(one for one in self.goal_values if one.slot_type == slot_type)
+        return tuple(value for value in self.goal_values if value.slot_type == slot_type)
+
+    def values_in(self, slot: str) -> GoalValues:
+        """Return the goal values of one slot."""
+        return tuple(value for value in self.goal_values if value.slot == slot)
 
     @property
     def color_values(self) -> GoalValues:
         """The goal values that are colors, counted or not."""
-        return tuple(one for one in self.goal_values if one.slot in COLOR_SLOTS)
+        return tuple(value for value in self.goal_values if value.slot in COLOR_SLOTS)
 
     def count_of(self, color: GoalValue) -> int:
         """Return how many things of a color the goal wants; 1 unless it counts them."""
-        _, _, index = color.field.partition(".")
-        counts = {one.field: one for one in self.goal_values if one.slot == "counts"}
-        return counts[f"counts.{index}"].number if counts else 1
+        wanted = color.field.replace("colors", "counts")
+        for count in self.values_in("counts"):
+            if count.field == wanted:
+                return count.number
+        return 1
 
     def alternatives(self, slot: str) -> tuple[tuple[str | int, ...], ...]:
         """Return all that a slot can hold in this scene if the other slots keep their values."""
@@ -236,13 +250,7 @@ class InstructionRequest:
 
     def objects_to_point_at(self, color: GoalValue) -> tuple[SceneObject, ...]:
         """Return the cubes of a color, or the containers over them."""
-        scene = self.episode.scene
-        cubes = [item for item in scene.objects if item.color == color.value]
-        kind = self.task.commands.pointed
-        return tuple(
-            cube if cube.inside is None or cube.kind == kind else scene[cube.inside]
-            for cube in cubes
-        )
+        return things_of_color(self.episode.scene, self.task.commands.pointed, color.color)
 
     def command(self, fields: Mapping[str, Phrase]) -> Phrase:
         """Fill the task's command, which has the same wording in all settings.
@@ -289,13 +297,11 @@ class InstructionRequest:
         base, _, index = field.partition(".")
         values = {one.field: one for one in self.goal_values}
         if base != AMOUNT_FIELD:
-            value = values[field]
-            core = antecedent(phrase.core, value.slot, value.value)
-            return (*plain(phrase.before), *core, *plain(phrase.after))
+            return self.around(field, antecedent(phrase.core, values[field]))
         count, color = values[f"counts.{index}"], values[f"colors.{index}"]
         return (
             *tagged_words(phrase.before, count),
-            *antecedent(phrase.core, color.slot, color.value),
+            *antecedent(phrase.core, color),
             *plain(phrase.after),
         )
 
@@ -306,7 +312,7 @@ def tagged_words(text: str, value: GoalValue) -> Phrase:
     if not words:
         return plain(text)
     before, _, after = text.partition(words)
-    return (*plain(before), *antecedent(words, value.slot, value.value), *plain(after))
+    return (*plain(before), *antecedent(words, value), *plain(after))
 
 
 class UtteranceSpec(NamedTuple):
@@ -333,7 +339,8 @@ class InstructionSpec:
 
 # Cached: all settings and forms of an episode ask for the same.
 @functools.lru_cache(maxsize=256)
-def _goal_values(goal: Goal) -> GoalValues:
+def values_of_goal(goal: Goal) -> GoalValues:
+    """Return the values of a goal, in the order of its slots."""
     found: list[GoalValue] = []
     counted = "counts" in dict(goal.slots)
     for slot, _ in goal.slots:

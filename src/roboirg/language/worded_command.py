@@ -201,8 +201,7 @@ def goal_fields(goal: Goal) -> dict[str, str]:
     """
     slots = goal.as_mapping()
     if "counts" in slots:
-        pairs = zip(goal.texts("colors"), goal.numbers("counts"), strict=True)
-        return {f"cubes.{at}": f"{count} {color}" for at, (color, count) in enumerate(pairs)}
+        return {f"cubes.{at}": f"{count} {color}" for at, (color, count) in enumerate(goal.amounts)}
     return {name: str(value) for slot in slots for name, value in fields_of(goal, slot)}
 
 

@@ -106,7 +106,7 @@ def _amounts(command: Command, resolver: ReferenceResolver) -> GoalTest:
         items = resolver.several_amounts(several)
 
     def fits(goal: Goal) -> bool:
-        amounts = list(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
+        amounts = goal.amounts
         if not items:
             return several is None or several.leaves_open([number for _, number in amounts])
         return len(items) == len(amounts) and any(

@@ -51,7 +51,7 @@ _AMOUNT = Phrases({
 
 def observed_times(text: str, scene: Scene) -> Iterator[Span]:
     """Yield the words for a number of repetitions, each with the number that is seen."""
-    swaps = sum(isinstance(motion, Swap) for motion in scene.motions)
+    swaps = len(scene.motions_of(Swap))
     for found in _SWAPS.finditer(text):
         yield (*found.span(), _number(swaps, "times"))
     shown = {fact.subject for fact in scene.past}

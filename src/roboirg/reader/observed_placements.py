@@ -63,8 +63,7 @@ def _placements(
     for found in _AT.finditer(text):
         away = [_along(found["place"], item, scene) for item in shown]
         yield (*found.span(), [at for at, one in enumerate(away) if one >= max(away) - TIE])
-    swaps = [motion for motion in scene.motions if isinstance(motion, Swap)]
-    moved = {name for motion in swaps for name in (motion.first, motion.second)}
+    moved = {name for swap in scene.motions_of(Swap) for name in (swap.first, swap.second)}
     for found in _MOVED.finditer(text) if moved else ():
         wanted = found["moved"] is not None
         yield (*found.span(), [at for at, one in enumerate(shown) if (one.name in moved) is wanted])

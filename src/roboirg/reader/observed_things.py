@@ -163,9 +163,8 @@ def _left_over(text: str, scene: Scene, start: Phrases, joint: Phrases) -> Itera
 
 def _moving(text: str, scene: Scene) -> Iterator[Span]:
     moves = Counter({item.name: 0 for item in scene.of_kind("container")})
-    for motion in scene.motions:
-        if isinstance(motion, Swap):
-            moves.update((motion.first, motion.second))
+    for swap in scene.motions_of(Swap):
+        moves.update((swap.first, swap.second))
     for found in _MOVES.finditer(text) if moves else ():
         wanted = 0 if found["still"] else max(moves.values())
         things = [scene[name] for name, number in moves.items() if number == wanted]

@@ -112,6 +112,13 @@ class NamedPlace(NamedTuple):
     of_cube: bool = False
 
 
+class ReadPlace(NamedTuple):
+    """A place, and the index after its last word."""
+
+    place: Place
+    end: int
+
+
 class PlaceMention(NamedTuple):
     """A place, and from which word to which it goes."""
 
@@ -128,8 +135,8 @@ def place_mentions(words: Sentence) -> Iterator[PlaceMention]:
         if read is None:
             at += 1
         else:
-            yield PlaceMention(read[0], at, read[1])
-            at = read[1]
+            yield PlaceMention(read.place, at, read.end)
+            at = read.end
 
 
 def read_places(words: Sentence) -> tuple[NamedPlace, ...]:
@@ -145,13 +152,13 @@ def _is_of_cube(before: Sentence) -> bool:
     return next((noun for noun in nouns if noun in _THINGS), None) == "cube"
 
 
-def _read(words: Sentence, at: int, depth: int = 0) -> tuple[Place, int] | None:
-    """Return the place whose words begin at this word, and the index after its last word."""
+def _read(words: Sentence, at: int, depth: int = 0) -> ReadPlace | None:
+    """Return the place whose words begin at this word; None if none does."""
     read = _read_one(words, at, depth)
     return None if read is None else _read_group(words, *read, depth) or read
 
 
-def _read_group(words: Sentence, member: Place, at: int, depth: int) -> tuple[Place, int] | None:
+def _read_group(words: Sentence, member: Place, at: int, depth: int) -> ReadPlace | None:
     """Read ``among the two at the far left``, after the place of one of them."""
     number = _skip(words, at + 1)
     size = number_of(_word(words, number))
@@ -161,17 +168,19 @@ def _read_group(words: Sentence, member: Place, at: int, depth: int) -> tuple[Pl
     if _word(words, start).removesuffix("s") in _THINGS:
         start = _skip(words, start + 1)
     group = _read(words, start, depth + 1)
-    return None if group is None else (MemberPlace(member, group[0], size), group[1])
+    if group is None:
+        return None
+    return ReadPlace(MemberPlace(member, group.place, size), group.end)
 
 
-def _read_one(words: Sentence, at: int, depth: int) -> tuple[Place, int] | None:
+def _read_one(words: Sentence, at: int, depth: int) -> ReadPlace | None:
     """Read a place that is not one among others."""
     word = _word(words, at)
     rank = ordinal_of(word)
     if rank is not None:
         return _read_from(words, at + 1, rank) or _read_relative(words, at + 1, rank, depth)
     if word in _OUTERMOST:
-        return DirectionalPlace(_OUTERMOST[word], 0), at + 1
+        return ReadPlace(DirectionalPlace(_OUTERMOST[word], 0), at + 1)
     return (
         _read_side(words, at)
         or _read_corner(words, at)
@@ -180,11 +189,11 @@ def _read_one(words: Sentence, at: int, depth: int) -> tuple[Place, int] | None:
     )
 
 
-def _read_side(words: Sentence, at: int) -> tuple[Place, int] | None:
+def _read_side(words: Sentence, at: int) -> ReadPlace | None:
     """Read ``left box``, ``box on your left and the one on your right``, ``boxes on the left``."""
     word, following = _word(words, at), _word(words, at + 1)
     if word in _SIDES and following in _PAIRED:
-        return DirectionalPlace(_SIDES[word], 0), at + 2
+        return ReadPlace(DirectionalPlace(_SIDES[word], 0), at + 2)
     second = (word == "and" and not _BOTH.isdisjoint(words[:at])) or (
         word == "one" and not _PAIRED.isdisjoint(words[:at])
     )
@@ -196,19 +205,19 @@ def _read_side(words: Sentence, at: int) -> tuple[Place, int] | None:
     side = _SIDES.get(_word(words, after))
     if side is None or _word(words, after + 1) in ("corner", *_PAIRED):
         return None
-    return DirectionalPlace(side, 0), after + 1
+    return ReadPlace(DirectionalPlace(side, 0), after + 1)
 
 
-def _read_extreme(words: Sentence, at: int) -> tuple[Place, int] | None:
+def _read_extreme(words: Sentence, at: int) -> ReadPlace | None:
     """Read ``far left``, ``furthest to the right``."""
     if _word(words, at) not in _FAR:
         return None
     after = _skip(words, at + 1)
     side = _SIDES.get(_word(words, after))
-    return None if side is None else (DirectionalPlace(side, 0), after + 1)
+    return None if side is None else ReadPlace(DirectionalPlace(side, 0), after + 1)
 
 
-def _read_corner(words: Sentence, at: int) -> tuple[Place, int] | None:
+def _read_corner(words: Sentence, at: int) -> ReadPlace | None:
     """Read ``near left corner``, ``closest to the left corner that is far from you``."""
     start = at
     if _word(words, at) in _NEAREST:
@@ -221,27 +230,27 @@ def _read_corner(words: Sentence, at: int) -> tuple[Place, int] | None:
         depth = _depth(_word(words, after))
         robot = _skip(words, after + 1)
         if depth and _word(words, robot) in _ROBOT:
-            return DirectionalPlace(_SIDES[word], depth), robot + 1
+            return ReadPlace(DirectionalPlace(_SIDES[word], depth), robot + 1)
     side, depth = _SIDES.get(_word(words, start + 1)), _depth(word)
     if side is not None and depth and _word(words, start + 2) == "corner":
-        return DirectionalPlace(side, depth), start + 3
+        return ReadPlace(DirectionalPlace(side, depth), start + 3)
     return None
 
 
-def _read_from(words: Sentence, at: int, rank: int) -> tuple[Place, int] | None:
+def _read_from(words: Sentence, at: int, rank: int) -> ReadPlace | None:
     """Read ``from the left``, after an ordinal."""
     if _word(words, at) != "from":
         return None
     after = _skip(words, at)
     word = _word(words, after)
     if word in _SIDES:
-        return DirectionalPlace(_SIDES[word], 0, rank), after + 1
+        return ReadPlace(DirectionalPlace(_SIDES[word], 0, rank), after + 1)
     if word in ("front", "back"):
-        return DirectionalPlace(None, -1 if word == "front" else 1, rank), after + 1
+        return ReadPlace(DirectionalPlace(None, -1 if word == "front" else 1, rank), after + 1)
     return None
 
 
-def _read_relative(words: Sentence, at: int, rank: int, depth: int) -> tuple[Place, int] | None:
+def _read_relative(words: Sentence, at: int, rank: int, depth: int) -> ReadPlace | None:
     """Read ``closest to you``, ``farthest from the button``, ``nearest to the red cube``."""
     word = _word(words, at)
     if word not in _NEAREST and word not in _FARTHEST:
@@ -250,26 +259,24 @@ def _read_relative(words: Sentence, at: int, rank: int, depth: int) -> tuple[Pla
     after = _skip(words, at + 1)
     noun, following = _word(words, after), _word(words, after + 1)
     if noun in _ROBOT:
-        return DirectionalPlace(None, -1 if nearest else 1, rank), after + 1
+        return ReadPlace(DirectionalPlace(None, -1 if nearest else 1, rank), after + 1)
     if noun in _FIXTURES:
         return _read_fixture(words, after, nearest=nearest, rank=rank)
     if color_of(noun) and following in _COLORED:
-        return RelativePlace(noun, following, nearest, rank), after + 2
+        return ReadPlace(RelativePlace(noun, following, nearest, rank), after + 2)
     if noun in _THINGS and depth < _MAX_DEPTH:
         inner = _read(words, _skip(words, after + 1), depth + 1)
         if inner is not None:
-            return RelativePlace(inner[0], noun, nearest, rank), inner[1]
+            return ReadPlace(RelativePlace(inner.place, noun, nearest, rank), inner.end)
     return None
 
 
-def _read_fixture(
-    words: Sentence, at: int, *, nearest: bool, rank: int
-) -> tuple[Place, int] | None:
+def _read_fixture(words: Sentence, at: int, *, nearest: bool, rank: int) -> ReadPlace | None:
     """Read ``button``, ``target on your left``."""
     noun, side = words[at], _SIDES.get(_word(words, at + 3))
     if side is not None and words[at + 1 : at + 3] in (("on", "your"), ("on", "the")):
-        return RelativePlace(DirectionalPlace(side, 0), noun, nearest, rank), at + 4
-    return RelativePlace(noun, noun, nearest, rank), at + 1
+        return ReadPlace(RelativePlace(DirectionalPlace(side, 0), noun, nearest, rank), at + 4)
+    return ReadPlace(RelativePlace(noun, noun, nearest, rank), at + 1)
 
 
 def _word(words: Sentence, at: int) -> str:
@@ -346,8 +353,7 @@ def present(scene: Scene, kind: str) -> list[SceneObject]:
     """Return the things of a kind, open or hidden, without cubes that appear later."""
     late: set[str] = set()
     if kind == "cube":
-        motions = [motion for motion in scene.motions if isinstance(motion, Away)]
-        late = {motion.subject for motion in motions if motion.start == 0}
+        late = {motion.subject for motion in scene.motions_of(Away) if motion.start == 0}
     kinds = ("cube", "hidden_cube") if kind == "cube" else (kind,)
     return [item for item in scene.objects if item.kind in kinds and item.name not in late]
 

@@ -157,7 +157,7 @@ class ReferenceResolver:
 
     def _series_length(self) -> int:
         """Return how many visits a shuttle makes, or placements on discs the video shows."""
-        passes = [motion.passes for motion in self._scene.motions if isinstance(motion, Shuttle)]
+        passes = [shuttle.passes for shuttle in self._scene.motions_of(Shuttle)]
         discs = {disc.name for disc in self._scene.of_kind("target")}
         placed = [fact for fact in self._scene.past if fact.kind == "placed"]
         return sum(passes) or sum(fact.place in discs for fact in placed)

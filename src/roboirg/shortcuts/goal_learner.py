@@ -30,6 +30,15 @@ LEARNED_FLOORS: tuple[LearnedFloor, ...] = get_args(LearnedFloor)
 View = Literal["words", "order", "scene"]
 Model = Literal["linear", "network"]
 MODELS: tuple[Model, ...] = get_args(Model)
+
+
+class Way(NamedTuple):
+    """One way to learn: a model that sees an instruction in a view."""
+
+    view: View
+    model: Model
+
+
 _VIEWS: Mapping[LearnedFloor, tuple[View, ...]] = {
     "majority": (),
     "text-only": ("words", "order"),
@@ -159,22 +168,21 @@ class _PlaceLearner:
             for (heard, _), value in zip(told, values, strict=True)
             if slot in heard.open
         ]
-        self._readers: dict[tuple[View, Model], Any] = {}
-        self._best: dict[LearnedFloor, tuple[View, Model]] = {}
+        self._readers: dict[Way, Any] = {}
+        self._best: dict[LearnedFloor, Way] = {}
         if not answers or len(self._frequent) == 1:
             return
-        right: dict[tuple[View, Model], int] = {}
+        right: dict[Way, int] = {}
         tested = [one for one in judged if slot in one[0].open]
-        for view, model in itertools.product(_VIEWS["union"], MODELS):
-            way = (view, model)
-            self._readers[way] = self._fit(view, model, answers)
+        for way in itertools.starmap(Way, itertools.product(_VIEWS["union"], MODELS)):
+            self._readers[way] = self._fit(way, answers)
             found = self._predict(way, [heard for heard, _ in tested]) if tested else []
             right[way] = sum(
                 value == dict(enumerate(values_in(goal[slot]))).get(index)
                 for value, (_, goal) in zip(found, tested, strict=True)
             )
         for floor, views in _VIEWS.items():
-            ways = [way for way in right if way[0] in views]
+            ways = [way for way in right if way.view in views]
             if ways:
                 self._best[floor] = max(ways, key=right.__getitem__)
 
@@ -184,17 +192,17 @@ class _PlaceLearner:
             return [self._frequent[0]] * len(heard)
         return self._predict(self._best[floor], heard)
 
-    def _fit(self, view: View, model: Model, answers: Sequence[tuple[Heard, Value | None]]) -> Any:  # noqa: ANN401 - scikit-learn has no types
-        labels = [self._label(view, *answer) for answer in answers]
-        inputs = [self._input(view, heard) for heard, _ in answers]
-        reader = _reader(view, model, is_constant=len(set(labels)) == 1)
+    def _fit(self, way: Way, answers: Sequence[tuple[Heard, Value | None]]) -> Any:  # noqa: ANN401 - scikit-learn has no types
+        labels = [self._label(way.view, *answer) for answer in answers]
+        inputs = [self._input(way.view, heard) for heard, _ in answers]
+        reader = _reader(way, is_constant=len(set(labels)) == 1)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # that an iteration more would be better
             return reader.fit(inputs, labels)
 
-    def _predict(self, way: tuple[View, Model], heard: Sequence[Heard]) -> list[Value | None]:
-        labels = self._readers[way].predict([self._input(way[0], one) for one in heard])
-        return [self._value(way[0], one, label) for one, label in zip(heard, labels, strict=True)]
+    def _predict(self, way: Way, heard: Sequence[Heard]) -> list[Value | None]:
+        labels = self._readers[way].predict([self._input(way.view, one) for one in heard])
+        return [self._value(way.view, one, label) for one, label in zip(heard, labels, strict=True)]
 
     def _input(self, view: View, heard: Heard) -> str | SceneFacts:
         if view == "scene":
@@ -227,7 +235,7 @@ class _PlaceLearner:
         return tuple(dict.fromkeys(one.value for one in named))
 
 
-def _reader(view: View, model: Model, *, is_constant: bool) -> Any:  # noqa: ANN401 - scikit-learn has no types
+def _reader(way: Way, *, is_constant: bool) -> Any:  # noqa: ANN401 - scikit-learn has no types
     """Return an unfitted model behind what makes numbers of a view."""
     from sklearn.dummy import DummyClassifier
     from sklearn.feature_extraction import DictVectorizer
@@ -241,10 +249,10 @@ def _reader(view: View, model: Model, *, is_constant: bool) -> Any:  # noqa: ANN
         return DummyClassifier()
     predictor = (
         LogisticRegression(C=10.0, max_iter=200)
-        if model == "linear"
+        if way.model == "linear"
         else MLPClassifier((32,), alpha=1e-3, max_iter=30, random_state=_SEED)
     )
-    if view == "scene":
+    if way.view == "scene":
         return make_pipeline(DictVectorizer(), MaxAbsScaler(), predictor)
     # Presence counts, frequency does not; words that occur once cannot help.
     ngrams = CountVectorizer(ngram_range=_NGRAMS, binary=True, min_df=2)

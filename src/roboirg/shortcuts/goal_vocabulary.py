@@ -65,8 +65,7 @@ def orders(goal: Goal) -> Iterator[Mapping[str, SlotValue]]:
     if not {"colors", "counts"} <= set(slots):
         yield slots
         return
-    pairs = list(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
-    for order in itertools.permutations(pairs):
+    for order in itertools.permutations(goal.amounts):
         yield {
             **slots,
             "colors": tuple(color for color, _ in order),

@@ -17,7 +17,7 @@ import sapien
 import sapien.render
 from numpy.typing import NDArray
 
-from roboirg.core.observations import CAMERAS, FRONT, WRIST
+from roboirg.core.observations import CAMERAS, FRONT, WRIST, Pixels
 from roboirg.core.waiting import DRAWING
 from roboirg.simulation.panda import CAMERA_LINK, Panda
 from roboirg.simulation.rendering.culling import CullableBodies
@@ -84,11 +84,11 @@ class Cameras:
         self._last_poses: dict[str, bytes] = {}
         self._frozen = False
 
-    def picture(self, camera: str) -> NDArray[np.uint8]:
+    def picture(self, camera: str) -> Pixels:
         """Return the current picture, RGB, shape (256, 256, 3)."""
         return self.pictures((camera,))[camera]
 
-    def pictures(self, cameras: Sequence[str]) -> dict[str, NDArray[np.uint8]]:
+    def pictures(self, cameras: Sequence[str]) -> dict[str, Pixels]:
         """Return the current pictures of several cameras; faster than one at a time."""
         self.draw(cameras)
         return {

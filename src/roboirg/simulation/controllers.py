@@ -10,9 +10,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from roboirg.core.actions import CHOICE, EE_POSE, JOINT_ANGLE, POSE_SIZE, WAYPOINT, ActionSpace
+from roboirg.core.actions import (
+    CHOICE,
+    EE_POSE,
+    JOINT_ANGLE,
+    POSE_SIZE,
+    WAYPOINT,
+    ActionSpace,
+    CheckedActions,
+)
 from roboirg.core.choices import Choice
 from roboirg.core.episode import HANDLES_HELD, PICKS, ROBOT, Primitive
 from roboirg.core.errors import MotionPlanningError
@@ -27,7 +34,7 @@ if TYPE_CHECKING:
 class Controller(Protocol):
     """Converts validated actions of one action space to joint actions."""
 
-    def trajectories(self, action: NDArray[np.float64]) -> Iterator[JointTrajectory]:
+    def trajectories(self, action: CheckedActions) -> Iterator[JointTrajectory]:
         """Yield the trajectories of one action; take the next after executing the last.
 
         Raises:
@@ -54,7 +61,7 @@ class JointAngleController:
     def __init__(self, _robot: Panda) -> None:
         pass
 
-    def trajectories(self, action: NDArray[np.float64]) -> Iterator[JointTrajectory]:
+    def trajectories(self, action: CheckedActions) -> Iterator[JointTrajectory]:
         """Yield one control step."""
         yield action[None]
 
@@ -66,7 +73,7 @@ class ToolPoseController:
         self._robot = robot
         self._planner = _make_planner(robot)
 
-    def trajectories(self, action: NDArray[np.float64]) -> Iterator[JointTrajectory]:
+    def trajectories(self, action: CheckedActions) -> Iterator[JointTrajectory]:
         """Yield one control step."""
         try:
             arm = self._planner.inverse_kinematics(self._robot.arm_positions, tool_pose(action))
@@ -85,7 +92,7 @@ class WaypointController:
         self._planner = _make_planner(robot)
         self._gripper = OPEN
 
-    def trajectories(self, action: NDArray[np.float64]) -> Iterator[JointTrajectory]:
+    def trajectories(self, action: CheckedActions) -> Iterator[JointTrajectory]:
         """Yield the move with the gripper unchanged, then six steps if it opens or closes."""
         try:
             path = self._planner.plan_move(self._robot.arm_positions, tool_pose(action))
@@ -110,7 +117,7 @@ class ChoiceController:
         self._world, self._choices = world, choices
         self._expert = MotionPrimitives(world)
 
-    def trajectories(self, action: NDArray[np.float64]) -> Iterator[JointTrajectory]:
+    def trajectories(self, action: CheckedActions) -> Iterator[JointTrajectory]:
         """Yield the trajectories of the motion; one control step at rest if it has none."""
         motion = self._motion(self._choices[int(action[0])], (round(action[1]), round(action[2])))
         if motion is None:
@@ -138,7 +145,7 @@ class ChoiceController:
         return motion
 
 
-def tool_pose(action: NDArray[np.float64]) -> ToolPose:
+def tool_pose(action: CheckedActions) -> ToolPose:
     """Return the pose of an action that starts with x, y, z, roll, pitch, yaw (extrinsic x-y-z)."""
     from scipy.spatial.transform import Rotation
 
@@ -147,7 +154,7 @@ def tool_pose(action: NDArray[np.float64]) -> ToolPose:
     return ToolPose(action[:3], Rotation.from_euler("xyz", action[3:POSE_SIZE]))
 
 
-def describe_pose(action: NDArray[np.float64]) -> str:
+def describe_pose(action: CheckedActions) -> str:
     """Return the pose of an action in words."""
     x, y, z, roll, pitch, yaw = (_format_number(number) for number in action[:POSE_SIZE])
     return f"({x}, {y}, {z}) with roll {roll}, pitch {pitch}, yaw {yaw}"

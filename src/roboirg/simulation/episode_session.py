@@ -10,6 +10,7 @@ import numpy as np
 import sapien.physx
 from numpy.typing import NDArray
 
+from roboirg.core.actions import Actions
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import MotionPlanningError
 from roboirg.judging import Event, Judge, Status, changes
@@ -69,7 +70,7 @@ class EpisodeSession:
         for judge in self._judges:
             judge.fail(cause)
 
-    def step(self, action: NDArray[np.floating[Any]]) -> None:
+    def step(self, action: Actions) -> None:
         """Execute one action (8) and judge the result."""
         before, tried = self.world.facts, self.world.attempts
         now = self.world.step(action)

@@ -15,7 +15,7 @@ import sapien.render
 from numpy.typing import NDArray
 from sapien.wrapper.urdf_loader import URDFLoader
 
-from roboirg.core.actions import ARM_JOINTS
+from roboirg.core.actions import ARM_JOINTS, Actions
 from roboirg.core.episode import ROBOT_BASE
 from roboirg.core.observations import CAMERAS, FRONT
 from roboirg.simulation import physics_settings
@@ -131,7 +131,7 @@ class Panda:
         for joint, target in zip(self._joints, qpos, strict=True):
             joint.set_drive_target(float(target))
 
-    def set_targets(self, action: NDArray[np.floating[Any]]) -> None:
+    def set_targets(self, action: Actions) -> None:
         """Set the drive targets of an action (8): seven joints (rad) and the gripper in [-1, 1]."""
         for joint, target in zip(self._joints, action[:ARM_JOINTS], strict=False):
             joint.set_drive_target(float(target))

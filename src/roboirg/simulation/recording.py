@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from roboirg.core.actions import CheckedActions
 from roboirg.core.episode import Episode
 from roboirg.core.observations import DemonstrationSource
 
@@ -23,7 +24,7 @@ class RecordedStep(NamedTuple):
     """
 
     stage: int
-    action: NDArray[np.float64]
+    action: CheckedActions
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +39,7 @@ class Recording:
         source: where the actions come from.
     """
 
-    actions: NDArray[np.float64]
+    actions: CheckedActions
     stages: NDArray[np.uint8]
     end: str
     source: DemonstrationSource = "planned"
@@ -54,7 +55,7 @@ class Recording:
         pairs = zip(self.stages, self.actions, strict=True)
         return (RecordedStep(int(stage), action) for stage, action in pairs)
 
-    def video_actions(self, episode: Episode) -> NDArray[np.float64]:
+    def video_actions(self, episode: Episode) -> CheckedActions:
         """Return the actions (T, 8) of the steps in the episode's video."""
         in_video = np.array([stage.in_video for stage in episode.demonstration], dtype=bool)
         return self.actions[in_video[self.stages]] if len(in_video) else self.actions[:0]

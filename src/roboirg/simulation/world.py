@@ -6,15 +6,14 @@ import os
 from collections.abc import Set as AbstractSet
 from typing import Any
 
-import numpy as np
 import sapien
 import sapien.physx
-from numpy.typing import NDArray
 
+from roboirg.core.actions import Actions
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
 from roboirg.core.errors import InvalidValueError, RoboIRGError, check_names
-from roboirg.core.observations import CAMERAS
+from roboirg.core.observations import CAMERAS, Pixels
 from roboirg.core.waiting import PHYSICS
 from roboirg.simulation import bodies, physics_settings
 from roboirg.simulation.cameras import Cameras
@@ -67,7 +66,7 @@ class World:
         self.elapsed = 0
         self.facts: frozenset[Fact] = self._detector.detect([], self._motions.absent())
 
-    def step(self, action: NDArray[np.floating[Any]]) -> frozenset[Fact]:
+    def step(self, action: Actions) -> frozenset[Fact]:
         """Execute one action (8) for one control step.
 
         Args:
@@ -85,7 +84,7 @@ class World:
         self._motions.after_step(self.facts)
         return self.facts
 
-    def advance(self, action: NDArray[np.floating[Any]]) -> None:
+    def advance(self, action: Actions) -> None:
         """Run only the physics of one control step: no motions, no facts, no time."""
         with PHYSICS:
             self.robot.set_targets(action)
@@ -106,7 +105,7 @@ class World:
         """Record the step at which a stage became due, for the motions that wait for it."""
         self._stages.setdefault(index, self.elapsed)
 
-    def picture(self, camera: str) -> NDArray[np.uint8]:
+    def picture(self, camera: str) -> Pixels:
         """Return the current picture of a camera, RGB, shape (256, 256, 3)."""
         check_names("camera", [camera], CAMERAS)
         return self.cameras.picture(camera)

@@ -28,6 +28,7 @@ from roboirg.core.motions import Away, Motion, Vanish
 from roboirg.core.plain_text import counted
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
+    Bounds,
     bin_keep_out,
     button_keep_out,
     draw_bin,
@@ -37,18 +38,19 @@ from roboirg.tasks.shared.fixtures import (
     footprint,
 )
 from roboirg.tasks.shared.stages import PRESSED, press_stage
-from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.util.random_draws import shuffled
 
 COLORS_PRESENT: dict[Difficulty, int] = {"easy": 1, "medium": 2, "hard": 3}
-CUBES: dict[Difficulty, tuple[int, int]] = {"easy": (4, 6), "medium": (8, 10), "hard": (10, 12)}
+CUBES: dict[Difficulty, Bounds] = {"easy": (4, 6), "medium": (8, 10), "hard": (10, 12)}
 """Fewest and most cubes on the table."""
-GOAL_COLORS: dict[Difficulty, tuple[int, int]] = {
+GOAL_COLORS: dict[Difficulty, Bounds] = {
     "easy": (1, 1),
     "medium": (1, 2),
     "hard": (2, 3),
 }
 """Number of colors among which the goal's cubes are drawn; one may get none."""
-GOAL_CUBES: dict[Difficulty, tuple[int, int]] = {"easy": (1, 3), "medium": (2, 4), "hard": (3, 5)}
+GOAL_CUBES: dict[Difficulty, Bounds] = {"easy": (1, 3), "medium": (2, 4), "hard": (3, 5)}
 """Fewest and most cubes that the goal puts into the bin."""
 MAX_GOAL_CUBES = 5
 GOAL_ORDER: tuple[Color, ...] = ("red", "blue", "green")
@@ -61,21 +63,20 @@ APPEAR_STEPS = 50
 """Control steps between the late cubes of a color."""
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, bin and cubes of one to three colors, and a count for one or more of them."""
     late = bool(rng.integers(2))
     button = draw_button(rng, BUTTON_REGION)
     # RoboMME places the bin without looking at the button; here its walls stay off the base.
     bin_ = draw_bin(rng, BIN_REGION, [footprint(button)])
-    present = [COLORS[index] for index in rng.permutation(len(COLORS))]
-    present = present[: COLORS_PRESENT[difficulty]]
+    present = shuffled(rng, COLORS)[: COLORS_PRESENT[difficulty]]
     wanted = _draw_wanted(rng, difficulty, present)
     spawned = _draw_spawned(rng, difficulty, present, wanted)
     obstacles: list[Obstacle] = [button_keep_out(button), bin_keep_out(bin_)]
     cubes = draw_cubes(rng, _numbered(spawned), CUBE_GAP, obstacles)
     named = tuple(color for color in GOAL_ORDER if wanted.get(color))
     goal = Goal.of(colors=named, counts=tuple(wanted[color] for color in named))
-    order = tuple(named[index] for index in rng.permutation(len(named)))
+    order = tuple(shuffled(rng, named))
     return Scene((button, bin_, *cubes), plan_motions(cubes, late=late), color_order=order), goal
 
 
@@ -101,7 +102,7 @@ def _draw_spawned(
     spawned = [color for color in present for _ in range(max(wanted[color], 1))]
     left = draw_number(rng, CUBES[difficulty]) - len(spawned)
     spawned += [present[index] for index in rng.integers(len(present), size=left)]
-    return [spawned[index] for index in rng.permutation(len(spawned))]
+    return shuffled(rng, spawned)
 
 
 def _numbered(spawned: list[Color]) -> Iterator[tuple[str, Color, Region]]:
@@ -175,7 +176,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
 
 def _wanted(scene: Scene, goal: Goal) -> Iterator[tuple[str, str, str]]:
     """Yield color, ordinal and name of the cubes that the oracle takes, color by color."""
-    counts = dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
+    counts = dict(goal.amounts)
     for color in dict.fromkeys((*scene.color_order, *counts)):
         cubes = _of_color(scene, color)[: counts.get(color, 0)]
         for ordinal, cube in zip(ORDINALS, cubes, strict=False):
@@ -184,7 +185,7 @@ def _wanted(scene: Scene, goal: Goal) -> Iterator[tuple[str, str, str]]:
 
 def _wrong_counts(scene: Scene, goal: Goal) -> Iterator[Rule]:
     """Yield rules against more cubes in the bin than the goal's, and fewer, for each color."""
-    wanted = dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
+    wanted = dict(goal.amounts)
     for color in GOAL_ORDER:
         binned, count = _binned(_of_color(scene, color)), wanted.get(color, 0)
         if not binned:

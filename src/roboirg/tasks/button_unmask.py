@@ -16,12 +16,12 @@ from roboirg.core.footprints import Region
 from roboirg.tasks.shared import unmask
 from roboirg.tasks.shared.fixtures import draw_button
 from roboirg.tasks.shared.stages import press_stage
-from roboirg.tasks.task import Task, command_pools
+from roboirg.tasks.task import SceneAndGoal, Task, command_pools
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.05)
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw a button, then containers as in VideoUnmask; the first ones are to be lifted."""
     return unmask.sample(rng, difficulty, [draw_button(rng, BUTTON_REGION)])
 

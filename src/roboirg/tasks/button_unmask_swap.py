@@ -17,7 +17,7 @@ from roboirg.tasks.shared import unmask, unmask_swap
 from roboirg.tasks.shared.fixtures import button_keep_out, draw_button
 from roboirg.tasks.shared.layouts import PlanePoint
 from roboirg.tasks.shared.stages import press_stage
-from roboirg.tasks.task import Task, command_pools
+from roboirg.tasks.task import SceneAndGoal, Task, command_pools
 
 RIGHT, LEFT = "button_right", "button_left"
 """On the robot's right (smaller y) and left."""
@@ -41,7 +41,7 @@ def shifted_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ..
     return tuple((x + MAX_SHIFT * rng.random(), y) for x, y in pattern)
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw two buttons, and containers near the points of a layout, three of them over a cube."""
     right = draw_button(rng, RIGHT_REGION, RIGHT)
     left = draw_button(rng, LEFT_REGION, LEFT)

@@ -10,6 +10,7 @@ import numpy as np
 from roboirg.core.arms import OTHER_GOAL
 from roboirg.core.episode import PICKS, Episode, Goal, Stage
 from roboirg.tasks import get_task
+from roboirg.util.random_draws import draw
 
 
 def other_goals(episode: Episode) -> tuple[Goal, ...]:
@@ -36,7 +37,7 @@ def draw_other_goal(episode: Episode) -> Goal | None:
     if not goals:
         return None
     rng = np.random.default_rng([episode.seed, zlib.crc32(f"{OTHER_GOAL}|{episode.task}".encode())])
-    return goals[int(rng.integers(len(goals)))]
+    return draw(rng, goals)
 
 
 def begins_with(stages: Sequence[Stage], first: Sequence[Stage]) -> bool:

@@ -16,7 +16,8 @@ from roboirg.core.footprints import Circle, Footprint, Region
 from roboirg.tasks.shared.fixtures import counted_goals, draw_number, draw_target
 from roboirg.tasks.shared.real_table import draw_sides, draw_tape, on_side
 from roboirg.tasks.shared.stages import placing_stages
-from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.util.random_draws import draw
 
 TAPES: tuple[Color, ...] = ("yellow", "gray")
 REPEATS = (1, 2)
@@ -30,7 +31,7 @@ WAIT_STEPS = 140
 then. The longest pick in RoboMME's data takes 137."""
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw the target and a tape on either side; sides, goal tape and number are uniform."""
     del difficulty
     target = draw_target(rng, "target", TARGET_RADIUS, TARGET_REGION, 0.0, ())
@@ -47,7 +48,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
         )
         for color in TAPES
     )
-    chosen = TAPES[int(rng.integers(len(TAPES)))]
+    chosen = draw(rng, TAPES)
     goal = Goal.of(color=str(chosen), repeats=draw_number(rng, REPEATS))
     return Scene((*tapes, target)), goal
 

@@ -14,16 +14,18 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.core.footprints import Region
 from roboirg.tasks.shared.fixtures import (
+    Bounds,
     counted_goals,
     draw_button_and_cubes,
     draw_number,
     draw_target,
 )
 from roboirg.tasks.shared.stages import PRESSED, placing_stages, press_stage
-from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.util.random_draws import draw
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
-REPEATS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 3), "medium": (1, 3), "hard": (4, 5)}
+REPEATS: dict[Difficulty, Bounds] = {"easy": (1, 3), "medium": (1, 3), "hard": (4, 5)}
 MAX_REPEATS = 5
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
@@ -33,14 +35,14 @@ TARGET_RADIUS = 0.04
 TARGET_GAP = 0.04
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, cubes of different colors, target disc; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
     button, cubes, obstacles = draw_button_and_cubes(
         rng, BUTTON_REGION, CUBES[difficulty], WORK_REGION, CUBE_GAP
     )
     target = draw_target(rng, "target", TARGET_RADIUS, WORK_REGION, TARGET_GAP, obstacles)
-    chosen = cubes[int(rng.integers(len(cubes)))]
+    chosen = draw(rng, cubes)
     goal = Goal.of(color=str(chosen.color), repeats=repeats)
     return Scene((button, *cubes, target)), goal
 

@@ -20,7 +20,8 @@ from roboirg.tasks.shared.real_table import (
     on_side,
 )
 from roboirg.tasks.shared.stages import pick_stage
-from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.util.random_draws import draw
 
 BOXES: tuple[Color, ...] = ("green", "purple")
 TAPE: Color = "yellow"
@@ -30,7 +31,7 @@ TAPE_REGION = Region(-0.13, 0.0, 0.08, 0.18)
 TAPE_GAP = 0.03
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw a box on either side, the tape in front of them; sides and goal box are uniform."""
     del difficulty
     sides = draw_sides(rng, BOXES)
@@ -40,7 +41,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     )
     obstacles: list[Footprint] = [footprint(box) for box in boxes]
     tape = draw_tape(rng, "tape", TAPE, TAPE_REGION, TAPE_GAP, obstacles)
-    goal = Goal.of(color=str(BOXES[int(rng.integers(len(BOXES)))]))
+    goal = Goal.of(color=str(draw(rng, BOXES)))
     return Scene((*boxes, tape)), goal
 
 

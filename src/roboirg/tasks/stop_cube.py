@@ -16,7 +16,8 @@ from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject
 from roboirg.core.footprints import Region
 from roboirg.core.motions import Point, Shuttle
 from roboirg.tasks.shared.fixtures import ORDINALS, draw_button
-from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.util.random_draws import draw
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
 TARGET_REGION = Region(0.0, 0.0, 0.1, 0.1)
@@ -39,7 +40,7 @@ CHECKPOINT = 100
 """Waiting is split into stages that end at multiples of this number of control steps."""
 
 
-def sample(rng: np.random.Generator, _difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, _difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, target and cube; speed, goal visit and direction of the path are uniform."""
     button = draw_button(rng, BUTTON_REGION)
     x, y = TARGET_REGION.draw(rng)
@@ -51,7 +52,7 @@ def sample(rng: np.random.Generator, _difficulty: Difficulty) -> tuple[Scene, Go
         thickness=TARGET_THICKNESS,
     )
     red, green, blue = rng.random(3).tolist()
-    interval = INTERVALS[int(rng.integers(len(INTERVALS)))]
+    interval = draw(rng, INTERVALS)
     visit = int(rng.integers(VISITS.start, VISITS.stop))
     angle = (2.0 * rng.random() - 1.0) * PATH_ANGLE
     along_x, along_y = -PATH_HALF * math.sin(angle), PATH_HALF * math.cos(angle)
@@ -70,7 +71,7 @@ def goals(_scene: Scene) -> tuple[Goal, ...]:
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Return the stages: move above the button, wait, press."""
     visit = goal.number("visit")
-    interval = next(motion.interval for motion in scene.motions if isinstance(motion, Shuttle))
+    interval = scene.motions_of(Shuttle)[0].interval
     stopped = Fact("stopped", "shuttle", "target")
     wrong = _wrong(interval, visit)
     hover = Stage(

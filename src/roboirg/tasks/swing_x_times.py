@@ -17,6 +17,7 @@ from roboirg.core.footprints import Circle, Region
 from roboirg.core.motions import Glow
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
+    Bounds,
     counted_goals,
     draw_button_and_cubes,
     draw_number,
@@ -24,10 +25,11 @@ from roboirg.tasks.shared.fixtures import (
     marker_over,
 )
 from roboirg.tasks.shared.stages import PRESSED, pick_stage, press_stage
-from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.util.random_draws import draw
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
-REPEATS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 3), "medium": (1, 2), "hard": (3, 3)}
+REPEATS: dict[Difficulty, Bounds] = {"easy": (1, 3), "medium": (1, 2), "hard": (3, 3)}
 MAX_REPEATS = 3
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
@@ -45,7 +47,7 @@ LINGER = 20
 """Control steps for which a target stays lit after the cube has left it."""
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, cubes and a target on either side; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
     button, cubes, obstacles = draw_button_and_cubes(
@@ -57,7 +59,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
         target = draw_target(rng, name, TARGET_RADIUS, region, TARGET_GAP, obstacles, TARGET_RGB)
         targets.append(target)
         obstacles.append(Circle(target.position.x, target.position.y, TARGET_RADIUS))
-    chosen = cubes[int(rng.integers(len(cubes)))]
+    chosen = draw(rng, cubes)
     goal = Goal.of(color=str(chosen.color), repeats=repeats)
     return make_scene(button, cubes, targets, chosen.name), goal
 

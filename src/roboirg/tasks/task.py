@@ -79,6 +79,10 @@ class Commands:
         return any("left" in wording.text for wording in self.wordings.everything)
 
 
+SceneAndGoal = tuple[Scene, Goal]
+"""What the seed of an episode gives."""
+
+
 @dataclass(frozen=True, slots=True)
 class Task:
     """One task, of this package or another (docs/add-task.md).
@@ -100,7 +104,7 @@ class Task:
     suite: Suite
     code: int
     spatial: bool
-    sample: Callable[[np.random.Generator, Difficulty], tuple[Scene, Goal]]
+    sample: Callable[[np.random.Generator, Difficulty], SceneAndGoal]
     goals: Callable[[Scene], tuple[Goal, ...]]
     stages: Callable[[Scene, Goal], tuple[Stage, ...]]
     commands: Commands

@@ -12,14 +12,15 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.tasks.shared import video_place
 from roboirg.tasks.shared.stages import PRESSED
-from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.util.random_draws import draw
 
 DISCS: dict[Difficulty, int] = {"easy": 3, "medium": 4, "hard": 4}
 SITE_RADIUS = 0.06
 RELATIONS = ("before", "after")
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw a scene in which the cube goes to ``target_0``, then to ``target_1`` after the press."""
     cubes = video_place.CUBES[difficulty]
     table, cube = video_place.draw_table(rng, cubes, DISCS[difficulty], SITE_RADIUS)
@@ -27,7 +28,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goa
     before, after = (Fact("placed", cube.name, disc.name) for disc in discs[:2])
     past = (before, PRESSED, after)
     swaps = (video_place.draw_swap(rng, discs, past),) if difficulty == "hard" else ()
-    relation = RELATIONS[int(rng.integers(len(RELATIONS)))]
+    relation = draw(rng, RELATIONS)
     return Scene(table.objects, swaps, past), Goal.of(color=str(cube.color), relation=relation)
 
 

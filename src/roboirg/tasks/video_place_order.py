@@ -14,7 +14,7 @@ from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.tasks.shared import video_place
 from roboirg.tasks.shared.fixtures import draw_number
 from roboirg.tasks.shared.stages import PRESSED
-from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
 
 DISCS = 4
 PLACEMENTS = (2, 4)
@@ -22,7 +22,7 @@ PLACEMENTS = (2, 4)
 SITE_RADIUS = 0.1
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw the visited discs, their order, the goal's disc and the time of the press."""
     cubes = video_place.CUBES[difficulty]
     table, cube = video_place.draw_table(rng, cubes, DISCS, SITE_RADIUS)

@@ -17,6 +17,7 @@ from roboirg.core.footprints import Region
 from roboirg.core.motions import Swap
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
+    Bounds,
     button_keep_out,
     draw_button,
     draw_cubes,
@@ -32,10 +33,11 @@ from roboirg.tasks.shared.stages import (
     retreat,
 )
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS, plan_swaps
-from roboirg.tasks.task import Commands, Task, command_pools
+from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.util.random_draws import draw, shuffled
 
 REPEATS = (1, 3)
-SWAPS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 2), "medium": (2, 3), "hard": (0, 0)}
+SWAPS: dict[Difficulty, Bounds] = {"easy": (1, 2), "medium": (2, 3), "hard": (0, 0)}
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.05)
 GAP = 0.02
@@ -57,14 +59,14 @@ EARLY_PRESS = (50, 500)
 """A premature press fails only within these control steps of its timer."""
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button and cubes; the cube of the video and the number of repeats are uniform."""
     repeats = draw_number(rng, REPEATS)
     swaps = draw_number(rng, SWAPS[difficulty])
     button = draw_button(rng, BUTTON_REGION)
     cubes = _draw_clutter(rng, button) if difficulty == "hard" else _draw_layout(rng, button)
     # The cube of the video starts the first swap, the others follow in any order.
-    target, *others = (cubes[index].name for index in rng.permutation(len(cubes)))
+    target, *others = (cube.name for cube in shuffled(rng, cubes))
     scene = make_scene(button, cubes, target, (target, *others)[:swaps])
     return scene, Goal.of(repeats=repeats)
 
@@ -95,7 +97,7 @@ def make_scene(
 
 def _draw_layout(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
     """Draw three cubes of one color, each near its point of a layout."""
-    color = COLORS[int(rng.integers(len(COLORS)))]
+    color = draw(rng, COLORS)
     cubes = (
         (f"cube_{color}_{number}", color, Region(*point, LAYOUT_HALF, LAYOUT_HALF))
         for number, point in enumerate(layout_points(rng, LAYOUT_CUBES))
@@ -107,9 +109,9 @@ def _draw_clutter(rng: np.random.Generator, button: SceneObject) -> list[SceneOb
     """Draw five cubes of each color; in each round one of each, in any order."""
     # The colors of a round are drawn after the cubes of the one before.
     cubes = (
-        (f"cube_{COLORS[index]}_{number}", COLORS[index], CLUTTER_REGION)
+        (f"cube_{color}_{number}", color, CLUTTER_REGION)
         for number in range(CLUTTER_ROUNDS)
-        for index in rng.permutation(len(COLORS))
+        for color in shuffled(rng, COLORS)
     )
     return draw_cubes(rng, cubes, GAP, [button_keep_out(button)])
 
@@ -123,7 +125,7 @@ def demonstration(scene: Scene) -> tuple[Stage, ...]:
         primitive=Primitive("put_down", target, height=SHOWN_RELEASE),
         subgoal="drop the cube on the table",
     )
-    swaps = [motion for motion in scene.motions if isinstance(motion, Swap)]
+    swaps = scene.motions_of(Swap)
     waiting = [retreat()] if swaps else []
     waiting += [hold_still(SWAP_STEPS) for _ in swaps]
     return (pick_stage(target), put_down, *waiting, go_home())

@@ -10,15 +10,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.core.episode import Difficulty, Scene, Stage
 from roboirg.tasks.shared import unmask, unmask_swap
 from roboirg.tasks.shared.layouts import layout_points
 from roboirg.tasks.shared.stages import hold_still
 from roboirg.tasks.shared.swapping import last_step
-from roboirg.tasks.task import Task, command_pools
+from roboirg.tasks.task import SceneAndGoal, Task, command_pools
 
 
-def sample(rng: np.random.Generator, difficulty: Difficulty) -> tuple[Scene, Goal]:
+def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw containers near the points of a turned layout, three of them over a cube."""
     points = layout_points(rng, unmask_swap.CONTAINERS[difficulty])
     return unmask_swap.sample(rng, difficulty, unmask_swap.draw_containers_about(rng, points))

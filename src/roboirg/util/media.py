@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.extras import extra_needed
-
-Pixels = NDArray[np.uint8]
+from roboirg.core.observations import Pixels
 
 VIDEO_RATE = 30
 """Frames per second at which MME-VLA's planners show control steps (20 per second of the world)."""

@@ -16,7 +16,7 @@ from roboirg.apps.demonstrations.dataset_part import EPISODE_TABLE
 from roboirg.apps.demonstrations.formats.robomme_hdf5 import SHARED_FOLDER, check_hdf5_support
 from roboirg.apps.demonstrations.frame_columns import EXECUTED
 from roboirg.apps.demonstrations.parquet_tables import read_rows
-from roboirg.core.actions import JOINT_ANGLE
+from roboirg.core.actions import JOINT_ANGLE, CheckedActions
 from roboirg.core.errors import InvalidValueError
 from roboirg.util.parquet_support import check_parquet_support
 
@@ -47,7 +47,7 @@ class ReplayableTrajectory:
     seed: int
     split: str | None
     index: int | None
-    actions: NDArray[np.float64]
+    actions: CheckedActions
     states: NDArray[np.float64]
     final_state: NDArray[np.float64] | None
     status: str

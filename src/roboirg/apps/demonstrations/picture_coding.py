@@ -10,7 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.util.media import CONTROL_RATE, Pixels
+from roboirg.core.observations import Pixels
+from roboirg.util.media import CONTROL_RATE
 
 PictureCoding = Literal["png", "lossless-video", "lossy-video", "none"]
 

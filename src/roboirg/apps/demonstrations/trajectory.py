@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.picture_coding import PictureCoding
-from roboirg.core.actions import JOINT_ANGLE
+from roboirg.core.actions import JOINT_ANGLE, CheckedActions
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import CAMERAS
+from roboirg.core.observations import CAMERAS, Pixels
 from roboirg.util.atomic_write import replacing
 from roboirg.util.media import decode_png
 
@@ -123,18 +123,18 @@ class Trajectory:
     joint_positions: NDArray[np.float32]
     gripper: NDArray[np.float32]
     end_effector: NDArray[np.float64]
-    actions: NDArray[np.float64]
-    pose_actions: NDArray[np.float64]
+    actions: CheckedActions
+    pose_actions: CheckedActions
     subgoals: NDArray[np.str_]
     online_subgoals: NDArray[np.str_]
     grounded_subgoals: NDArray[np.str_]
     grounded_online_subgoals: NDArray[np.str_]
     histograms: Mapping[str, NDArray[np.int64]]
     calibration: Mapping[str, NDArray[np.float32]]
-    labels: NDArray[np.float64] | None = None
+    labels: CheckedActions | None = None
 
     @property
-    def targets(self) -> NDArray[np.float64]:
+    def targets(self) -> CheckedActions:
         """The actions to learn from, as `actions`."""
         return self.actions if self.labels is None else self.labels
 
@@ -219,7 +219,7 @@ def video_name(camera: str) -> str:
     return f"{camera}.mp4"
 
 
-def read_picture(archive: zipfile.ZipFile, camera: str, row: int) -> NDArray[np.uint8]:
+def read_picture(archive: zipfile.ZipFile, camera: str, row: int) -> Pixels:
     """Return a row's picture from a trajectory's open file, RGB, (size, size, 3)."""
     return decode_png(archive.read(picture_name(camera, row)))
 

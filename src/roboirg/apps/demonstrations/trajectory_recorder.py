@@ -29,20 +29,21 @@ from roboirg.core.actions import (
     JOINT_ANGLE,
     POSE_SIZE,
     WAYPOINT,
+    CheckedActions,
     check_chunk,
     find_action_space,
 )
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.observations import CAMERAS
+from roboirg.core.observations import CAMERAS, Pixels
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.subgoal_text import split_point
 from roboirg.envs.factory import make
 from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.play import EpisodeLoop, Moment
 from roboirg.util.atomic_write import replacing
-from roboirg.util.media import PICTURE_SIZE, Pixels, scaled_square
+from roboirg.util.media import PICTURE_SIZE, scaled_square
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -76,8 +77,8 @@ class _Row(NamedTuple):
     """What one step of the policy gives; see `Trajectory`."""
 
     observation: Mapping[str, Any]
-    action: NDArray[np.float64]
-    label: NDArray[np.float64]
+    action: CheckedActions
+    label: CheckedActions
     subgoal: str
     online: str
 
@@ -265,7 +266,7 @@ class _Recorder(EpisodeLoop):
                 break
         return observation, {**info, "heard": heard}
 
-    def _rounded(self, action: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _rounded(self, action: CheckedActions) -> CheckedActions:
         """Return an action in float32; a waypoint's angles near those of the one before."""
         if self._is_waypoint:
             angles = np.unwrap([self._rows[-1].action[_ANGLES], action[_ANGLES]], axis=0)[1]
@@ -274,8 +275,8 @@ class _Recorder(EpisodeLoop):
 
     def _add_row(
         self,
-        action: NDArray[np.float64],
-        label: NDArray[np.float64],
+        action: CheckedActions,
+        label: CheckedActions,
         observation: Mapping[str, Any],
         doing: str,
         online: str,
@@ -339,7 +340,7 @@ class _Recorder(EpisodeLoop):
             arrays[f"{camera}_histogram"] = counts
         return arrays
 
-    def _pose_actions(self, actions: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _pose_actions(self, actions: CheckedActions) -> CheckedActions:
         """Return the tool's pose at the joint targets of each action, with unwrapped angles."""
         from roboirg.simulation.expert.motion_planning import MotionPlanner
 

@@ -26,6 +26,7 @@ from roboirg.shortcuts.shortcut_tables import learn_goals
 from roboirg.shortcuts.text_guess import TextGuess
 from roboirg.tasks import goals_of
 from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.random_draws import draw
 
 ORACLE, CHANCE, COMMAND = "oracle", "chance", "command"
 TEXT_ONLY = "text-only"
@@ -85,13 +86,11 @@ def _random_points(item: GroundingItem, rng: np.random.Generator) -> str:
 
 
 def _random_goal(_item: GroundingItem, episode: Episode, rng: np.random.Generator) -> Goal:
-    goals = goals_of(episode)
-    return goals[int(rng.integers(len(goals)))]
+    return draw(rng, goals_of(episode))
 
 
 def _command_goal(item: GroundingItem, episode: Episode, rng: np.random.Generator) -> Goal:
-    goals = _left_by_command(item, episode) or goals_of(episode)
-    return goals[int(rng.integers(len(goals)))]
+    return draw(rng, _left_by_command(item, episode) or goals_of(episode))
 
 
 def _left_by_command(item: GroundingItem, episode: Episode) -> tuple[Goal, ...]:

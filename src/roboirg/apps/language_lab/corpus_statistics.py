@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import get_args
 
 from roboirg.language.instruction import Expression, Instruction
+from roboirg.language.settings import setting_names
 
 ClassCounts = Mapping[str, Mapping[str, int]]
 """Counts by group (setting or task), then by class."""
@@ -16,11 +17,11 @@ ClassCounts = Mapping[str, Mapping[str, int]]
 def by_setting(
     instructions: Iterable[Instruction], size_of: Callable[[str], int]
 ) -> dict[str, list[int]]:
-    """Return the sizes of the prompts by setting, in words for example."""
-    found: dict[str, list[int]] = {}
+    """Return the sizes of the prompts by setting, in words for example; settings in their order."""
+    found: dict[str, list[int]] = {name: [] for name in setting_names()}
     for instruction in instructions:
-        found.setdefault(instruction.setting, []).append(size_of(instruction.text))
-    return found
+        found[instruction.setting].append(size_of(instruction.text))
+    return {setting: sizes for setting, sizes in found.items() if sizes}
 
 
 def expression_counts(instructions: Iterable[Instruction]) -> ClassCounts:

@@ -127,7 +127,7 @@ def stand_in(goal: Goal, difficulty: str) -> SimpleNamespace:
     slots = goal.as_mapping()
     found: dict[str, object] = {"difficulty": difficulty}
     if "counts" in slots:
-        counts = dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
+        counts = dict(goal.amounts)
         found |= {f"{color}_cubes_target_number": counts.get(color, 0) for color in COLORS}
     elif "colors" in slots:
         colors = goal.texts("colors")

@@ -56,8 +56,7 @@ def phrase_tables(counts: ClassCounts) -> Iterator[Table]:
 def _lengths(instructions: Sequence[Instruction]) -> Table:
     table = _table("Words per instruction", "setting", ("mean", "fewest", "most"))
     found = corpus_statistics.by_setting(instructions, lambda text: len(text.split()))
-    for setting in filter(found.__contains__, setting_names()):
-        words = found[setting]
+    for setting, words in found.items():
         table.add_row(setting, f"{fmean(words):.1f}", str(min(words)), str(max(words)))
     return table
 
@@ -66,8 +65,7 @@ def _tokens(instructions: Sequence[Instruction]) -> Table:
     columns = ("median", "most", f"over {SHORT_LIMIT}", f"over {USUAL_LIMIT}")
     table = _table("Tokens per instruction (vocabulary of 32,000)", "setting", columns)
     found = corpus_statistics.by_setting(instructions, count_tokens)
-    for setting in filter(found.__contains__, setting_names()):
-        counts = found[setting]
+    for setting, counts in found.items():
         over = (fmean(one > limit for one in counts) for limit in (SHORT_LIMIT, USUAL_LIMIT))
         shares = (f"{one:.1%}" for one in over)
         table.add_row(setting, f"{median(counts):.0f}", str(max(counts)), *shares)

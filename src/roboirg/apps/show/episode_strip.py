@@ -8,9 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from roboirg.core.observations import Pixels
 from roboirg.evaluation.analysis.figures.figure_style import PAGE_INCHES
 from roboirg.util.media import CONTROL_RATE
 
@@ -47,7 +45,7 @@ class StripMoment:
 
     step: int
     caption: str
-    picture: NDArray[np.uint8]
+    picture: Pixels
     is_demonstration: bool = False
 
 

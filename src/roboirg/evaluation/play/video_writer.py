@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboirg.core.errors import EndOfRunError
 from roboirg.core.extras import extra_needed
-from roboirg.core.observations import CAMERAS, FRONT
+from roboirg.core.observations import CAMERAS, FRONT, Pixels
 from roboirg.core.subgoal_text import Point
 from roboirg.evaluation.records.film import FRAME_RATE, FRAME_STEPS, LAST_FRAME_REPEATS, poster_name
 from roboirg.util.media import draw_text, encode_jpeg, wrap_text
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
     from av.video.stream import VideoStream
 
     from roboirg.envs.environment import RoboIRGEnv
-
-Frame = NDArray[np.uint8]
 
 DEMONSTRATION_COLOR = (255, 176, 32)
 """RGB of the border around the frames of the demonstration."""
@@ -59,12 +56,12 @@ def check_video_support() -> None:
 
 
 def compose_frame(
-    pictures: Sequence[Frame],
+    pictures: Sequence[Pixels],
     caption: str = "",
     *,
     is_demonstration: bool = False,
     longest_caption: str = "",
-) -> Frame:
+) -> Pixels:
     """Return one frame with the pictures side by side and a line between them.
 
     Args:
@@ -75,7 +72,7 @@ def compose_frame(
     """
     line = np.zeros((pictures[0].shape[0], GAP, 3), np.uint8)
     parts = [part for picture in pictures for part in (line, picture)][1:]
-    frame: Frame = np.concatenate(parts, axis=1)
+    frame: Pixels = np.concatenate(parts, axis=1)
     if is_demonstration:
         color = np.array(DEMONSTRATION_COLOR, np.uint8)
         frame[:BORDER] = frame[-BORDER:] = color
@@ -85,7 +82,7 @@ def compose_frame(
     return np.concatenate([frame, _caption_bar(caption, frame.shape[1], longest_caption)])
 
 
-def with_ring(picture: Frame, point: Point) -> Frame:
+def with_ring(picture: Pixels, point: Point) -> Pixels:
     """Return a copy of a picture with a ring around a point; inside it the picture is unchanged."""
     rows, columns = np.indices(picture.shape[:2])
     distance = np.hypot(rows - point[0], columns - point[1])
@@ -95,14 +92,14 @@ def with_ring(picture: Frame, point: Point) -> Frame:
 
 
 @functools.lru_cache(maxsize=8)
-def _caption_bar(caption: str, width: int, longest: str) -> Frame:
+def _caption_bar(caption: str, width: int, longest: str) -> Pixels:
     """Return a caption as an image; its height is even, because H.264 needs that."""
     lines, room = (
         wrap_text(text, width - 2 * _TEXT_MARGIN, _TEXT_SCALE)[:_MAX_LINES]
         for text in (caption, longest)
     )
     height = max(len(lines), len(room)) * _TEXT_LINE + 2 * _TEXT_MARGIN
-    bar: Frame = np.full((height, width, 3), _BACKGROUND, np.uint8)
+    bar: Pixels = np.full((height, width, 3), _BACKGROUND, np.uint8)
     for number, text in enumerate(lines, start=1):
         draw_text(bar, text, _TEXT_MARGIN, number * _TEXT_LINE, _TEXT_SCALE, _TEXT_COLOR)
     return bar
@@ -135,7 +132,7 @@ class VideoWriter:
     _output: tuple[OutputContainer, VideoStream] | None = field(
         default=None, init=False, repr=False
     )
-    _last: Frame | None = field(default=None, init=False, repr=False)
+    _last: Pixels | None = field(default=None, init=False, repr=False)
 
     @property
     def partial(self) -> Path:
@@ -202,7 +199,7 @@ class VideoWriter:
         self.error = error
         self.discard()
 
-    def _encode(self, frame: Frame) -> None:
+    def _encode(self, frame: Pixels) -> None:
         """Encode a frame, uint8 (height, width, 3), both even; all of one size."""
         import av
 
@@ -210,7 +207,7 @@ class VideoWriter:
         self._last = frame
         container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
 
-    def _open(self, frame: Frame) -> tuple[OutputContainer, VideoStream]:
+    def _open(self, frame: Pixels) -> tuple[OutputContainer, VideoStream]:
         import av
 
         self.path.parent.mkdir(parents=True, exist_ok=True)

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.actions import check_chunk, find_action_space
+from roboirg.core.actions import CheckedActions, check_chunk, find_action_space
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.evaluation.records.record_codec import StoreError
 from roboirg.util.atomic_write import write_atomically
@@ -52,7 +52,7 @@ class ActionLog:
     """
 
     space: str
-    rows: NDArray[np.float64]
+    rows: CheckedActions
     requests: NDArray[np.int32]
     end_state: NDArray[np.float64]
 
@@ -65,7 +65,7 @@ class ActionLog:
             digest.update(np.ascontiguousarray(array).tobytes())
         return digest.hexdigest()
 
-    def chunks(self) -> list[NDArray[np.float64]]:
+    def chunks(self) -> list[CheckedActions]:
         """Return the rows of each answer of the policy; none if it gave none."""
         return np.split(self.rows, self.requests[1:]) if len(self.requests) else []
 

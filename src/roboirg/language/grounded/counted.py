@@ -51,7 +51,7 @@ def _colors(request: InstructionRequest) -> tuple[str, ...]:
 
 
 def _swaps(request: InstructionRequest, number: GoalValue) -> Clue | None:
-    swaps = sum(isinstance(motion, Swap) for motion in request.episode.scene.motions)
+    swaps = len(request.episode.scene.motions_of(Swap))
     kept, of = KEPT_SWAPS.get(swaps, (0, 1))
     if swaps != number.number or request.sampler.pick("kept swaps", range(of)) >= kept:
         return None

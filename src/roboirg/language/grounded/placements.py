@@ -53,7 +53,7 @@ def _at(request: InstructionRequest, shown: list[SceneObject], place: int) -> It
 
 def _moved(request: InstructionRequest, shown: list[SceneObject], place: int) -> Iterator[Clue]:
     """Yield words for the only target of the series that changes places in the end, or does not."""
-    swaps = [motion for motion in request.episode.scene.motions if isinstance(motion, Swap)]
+    swaps = request.episode.scene.motions_of(Swap)
     moved = {name for swap in swaps for name in (swap.first, swap.second)}
     for kind, wanted in (("moved", True), ("still", False)):
         if moved and [item for item in shown if (item.name in moved) is wanted] == [shown[place]]:

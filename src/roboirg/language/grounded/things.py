@@ -198,13 +198,13 @@ def directed(axis: str, sign: int) -> Callable[[SceneObject], float]:
 
 def late(scene: Scene) -> bool:
     """Return whether some cubes arrive later."""
-    return any(isinstance(motion, Away) and motion.under is None for motion in scene.motions)
+    return any(motion.under is None for motion in scene.motions_of(Away))
 
 
 def _moves(request: InstructionRequest, color: GoalValue) -> list[Clue]:
     """Return the words for a container by how often it changes places."""
     scene = request.episode.scene
-    swaps = [motion for motion in scene.motions if isinstance(motion, Swap)]
+    swaps = scene.motions_of(Swap)
     if not swaps:
         return []
     moves = Counter({item.name: 0 for item in scene.of_kind("container")})

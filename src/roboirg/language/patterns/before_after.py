@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from roboirg.language.instruction import REFERENCE
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import Phrase, antecedent, fill, plain
+from roboirg.language.phrases import MentionedValue, Phrase, antecedent, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest, NoCommandError
 from roboirg.language.slot_types import relation
 from roboirg.language.templates import derivations
@@ -25,13 +24,14 @@ def _other(request: InstructionRequest) -> Derived:
     rejected = _rejected(goal_value)
     template = request.pick("two moments", derivations.TWO_MOMENTS_INTRODUCTIONS)
     introduced: dict[str, Phrase] = {
-        "pair": antecedent(derivations.BOTH_MOMENTS, REFERENCE, " and ".join(derivations.MOMENTS)),
-        "single": antecedent(f"the one right {rejected} it", REFERENCE, rejected),
+        "pair": antecedent(
+            derivations.BOTH_MOMENTS, MentionedValue(" and ".join(derivations.MOMENTS))
+        ),
+        "single": antecedent(f"the one right {rejected} it", MentionedValue(rejected)),
     }
     single = derivations.MOMENTS[rejected]
-    slot, value = goal_value.slot, goal_value.value
     named = derivations.RESOLVED_MOMENT_COMPLEMENT.format(single=single)
-    other = request.refer(derivations.MOMENT_COMPLEMENT, "other", slot, value, resolved=named)
+    other = request.refer(derivations.MOMENT_COMPLEMENT, "other", goal_value, resolved=named)
     fields = relation.placed(request, goal_value, other)
     return Derived(fill(template, introduced), fields, {"patterns": ["contextual logic"]})
 
@@ -42,13 +42,13 @@ def _neighbor(request: InstructionRequest) -> Derived:
     rejected = _rejected(goal_value)
     template = request.pick("neighbor introduction", derivations.NEIGHBOR_INTRODUCTIONS)
     context = fill(
-        template, {"moment": antecedent(derivations.MOMENTS[rejected], REFERENCE, rejected)}
+        template, {"moment": antecedent(derivations.MOMENTS[rejected], MentionedValue(rejected))}
     )
     outside = request.outside_phrase(goal_value.field)
     if outside is not None and not outside.before and not outside.is_place:
         raise NoCommandError  # there is no word for the target that this could replace
     words = _single(request, rejected)
-    single = request.refer(words, "that", REFERENCE, rejected, resolved=words)
+    single = request.refer(words, "that", MentionedValue(rejected), resolved=words)
     placement = (*plain("the target of "), *fill(derivations.NEIGHBOR, {"single": single}))
     notes: dict[str, object] = {
         "patterns": ["sequential relation"],

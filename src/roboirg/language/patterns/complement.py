@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import cardinal, ordinal, plural
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, plain, sentences
+from roboirg.language.phrases import (
+    MentionedValue,
+    Phrase,
+    anaphor,
+    antecedent,
+    fill,
+    plain,
+    sentences,
+)
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.rivals.pair_words import (
     INTRODUCTIONS,
@@ -38,11 +45,11 @@ def _complement(request: InstructionRequest) -> Derived:
     order = request.sampler.pick("complement order", ((0, 1), (1, 0)))
     values = (pair[order[0]], pair[order[1]])
     named = [
-        antecedent(name, REFERENCE, value.value)
+        antecedent(name, MentionedValue(value.value))
         for name, value in zip(introduced_names(request, pair, values), values, strict=True)
     ]
     template = request.pick("complement introduction", INTRODUCTIONS[pair.word_kind])
-    single = antecedent(_single(request, pair), REFERENCE, pair.rival.value)
+    single = antecedent(_single(request, pair), MentionedValue(pair.rival.value))
     remark = request.pick("taken", derivations.TAKEN_REMARKS)
     context = sentences(
         [
@@ -86,7 +93,7 @@ def _pointing(request: InstructionRequest, pair: ValuePair) -> Phrase:
     template = request.pick(f"other {kind}", derivations.OTHERS[kind])
     noun = pair_noun(request, pair)
     words = template.format(noun=noun, nouns=plural(noun))
-    return anaphor(words, "other", pair.meant.slot, pair.meant.value)
+    return anaphor(words, "other", pair.meant)
 
 
 def _resolved(request: InstructionRequest, pair: ValuePair, order: tuple[int, int]) -> Phrase:
@@ -104,7 +111,7 @@ def _resolved(request: InstructionRequest, pair: ValuePair, order: tuple[int, in
         left=short[pair.rival.field],
         noun=noun,
     )
-    return antecedent(words, pair.meant.slot, pair.meant.value)
+    return antecedent(words, pair.meant)
 
 
 def _short_name(pair: ValuePair, value: GoalValue) -> str:

@@ -9,7 +9,7 @@ from roboirg.core.goal_slots import SlotTypeName
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import cardinal
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
+from roboirg.language.phrases import MentionedValue, Phrase, anaphor, antecedent, fill, words_of
 from roboirg.language.request import AMOUNT_FIELD, GoalValues, InstructionRequest
 from roboirg.language.slot_types import amount
 from roboirg.language.slot_types.number import introduce_quantity
@@ -60,7 +60,7 @@ def _open(relation: derivations.Relation, choices: Sequence[Sequence[int]]) -> b
 
 def _deductions(request: InstructionRequest) -> list[Deduction]:
     slot = "counts" if request.values_of("amount") else "repeats"
-    results = [goal_value.number for goal_value in request.goal_values if goal_value.slot == slot]
+    results = [value.number for value in request.values_in(slot)]
     return deductions(results, request.alternative_numbers(slot))
 
 
@@ -73,7 +73,7 @@ def _chosen(request: InstructionRequest) -> Deduction:
 
 
 def _pointer(request: InstructionRequest, number: int) -> Phrase:
-    return request.refer("that", "that", REFERENCE, number, resolved=cardinal(number))
+    return request.refer("that", "that", MentionedValue(number), resolved=cardinal(number))
 
 
 def _notes(deduction: Deduction) -> dict[str, object]:
@@ -117,11 +117,10 @@ def _of_each(request: InstructionRequest, goal_values: GoalValues, deduction: De
     """Return ``half as many of each``; resolved, ``of each as six red and four blue cubes``."""
     relation, colors = deduction.relation, amount.all_colors(goal_values)
     if not request.resolved:
-        return fill(relation.each, {"number": anaphor("of each", "each", "colors", colors)})
+        return fill(relation.each, {"number": anaphor("of each", "each", colors)})
     quantities = amount.references(goal_values, REFERENCE, deduction.references)
-    named = "".join(piece.text for piece in quantities)
-    words = f"of each {relation.than} {named}"
-    return fill(relation.each, {"number": antecedent(words, "colors", colors)})
+    words = f"of each {relation.than} {words_of(quantities)}"
+    return fill(relation.each, {"number": antecedent(words, colors)})
 
 
 TIMES = Pattern(lambda request: _possible(request, "number"), _times)

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import itertools
 
-from roboirg.language.instruction import REFERENCE
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import Phrase, antecedent, fill, plain, sentences
+from roboirg.language.phrases import MentionedValue, Phrase, antecedent, fill, plain, sentences
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import described
 from roboirg.language.templates import derivations
@@ -46,7 +45,9 @@ def _introduction(request: InstructionRequest, colors: tuple[str, ...], *, share
     known = derivations.SHARED_INTRODUCTIONS if shared else derivations.EXCLUDED_INTRODUCTIONS
     template = request.pick("pair introduction", known)
     words = " and ".join(colors)
-    return fill(template, {"colors": antecedent(words, REFERENCE, words)}, plural=len(colors) > 1)
+    return fill(
+        template, {"colors": antecedent(words, MentionedValue(words))}, plural=len(colors) > 1
+    )
 
 
 def _excluding(request: InstructionRequest, target: GoalValue, colors: tuple[str, ...]) -> Phrase:
@@ -56,8 +57,7 @@ def _excluding(request: InstructionRequest, target: GoalValue, colors: tuple[str
     excluded = request.refer(
         words,
         "pair" if len(colors) > 1 else "that",
-        REFERENCE,
-        " and ".join(colors),
+        MentionedValue(" and ".join(colors)),
         resolved=resolved.format(colors=" nor ".join(colors)),
     )
     article = "" if request.values_of("amount") else "the "
@@ -76,14 +76,13 @@ def _singled(request: InstructionRequest, goal_value: GoalValue, pair: tuple[str
     """Return a remark that chooses the color of the pair that is not meant."""
     chosen = _rejected(goal_value, pair)
     remark = request.pick("singled introduction", derivations.SINGLED_INTRODUCTIONS)
-    return fill(remark, {"single": antecedent(chosen, REFERENCE, chosen)})
+    return fill(remark, {"single": antecedent(chosen, MentionedValue(chosen))})
 
 
 def _other(request: InstructionRequest, goal_value: GoalValue, pair: tuple[str, ...]) -> Phrase:
     """Return the command's words for the other color of the pair."""
     named = f"{' or '.join(pair)}, not {_rejected(goal_value, pair)}"
-    slot, value = goal_value.slot, goal_value.value
-    return request.refer("the other color", "other", slot, value, resolved=named)
+    return request.refer("the other color", "other", goal_value, resolved=named)
 
 
 def _rejected(goal_value: GoalValue, pair: tuple[str, ...]) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import ordinal as ordinal_word
 from roboirg.language.patterns.pattern import Derived, Pattern
-from roboirg.language.phrases import Phrase, fill, plain
+from roboirg.language.phrases import MentionedValue, Phrase, fill, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import Fields, ordinal
 from roboirg.language.templates import derivations
@@ -75,7 +75,7 @@ def _goal_values(request: InstructionRequest) -> list[GoalValue]:
 
 def _reference(request: InstructionRequest, position: int) -> Phrase:
     named = f"the {ordinal_word(position)}"
-    return request.refer("that", "that", REFERENCE, position, resolved=named)
+    return request.refer("that", "that", MentionedValue(position), resolved=named)
 
 
 def _derived(

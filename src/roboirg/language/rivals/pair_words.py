@@ -31,8 +31,7 @@ def pair_introduction(request: InstructionRequest, draw: PairDraw) -> UtteranceS
     """Return a sentence that names both values on equal terms."""
     names = introduced_names(request, draw.pair, draw.introduced)
     first, second = (
-        antecedent(name, value.slot, value.value)
-        for name, value in zip(names, draw.introduced, strict=True)
+        antecedent(name, value) for name, value in zip(names, draw.introduced, strict=True)
     )
     pools = INTRODUCTIONS[draw.pair.word_kind]
     template = request.pick("pair introduction of rivals", pools)
@@ -63,7 +62,7 @@ def _choosing_remark(request: InstructionRequest, draw: PairDraw) -> Phrase:
     }
     if request.resolved:
         words = {
-            field: antecedent(value_name(request, draw.pair, value), value.slot, value.value)
+            field: antecedent(value_name(request, draw.pair, value), value)
             for field, value in (("yes", meant), ("no", rival))
         }
     return fill(draw.text, words)
@@ -72,12 +71,12 @@ def _choosing_remark(request: InstructionRequest, draw: PairDraw) -> Phrase:
 def _chosen(request: InstructionRequest, draw: PairDraw, words: str) -> Phrase:
     """Return ``the cube I mean`` for a noun phrase such as ``the cube``."""
     clause = request.pick("rival clause", templates.CLAUSES)
-    return anaphor(f"{words} {clause}", "choice", draw.pair.meant.slot, draw.pair.meant.value)
+    return anaphor(f"{words} {clause}", "choice", draw.pair.meant)
 
 
 def _the_other(value: GoalValue, words: str) -> Phrase:
     """Return words for the value that is not meant."""
-    return anaphor(words, "other", value.slot, value.value)
+    return anaphor(words, "other", value)
 
 
 def pair_notes(draw: PairDraw) -> dict[str, object]:
@@ -124,7 +123,7 @@ def _pointer(draw: PairDraw, value: GoalValue, thing: str, *, points: bool) -> P
         first, second = first_many, second_many
     words = first if value is draw.introduced[0] else second
     found = next(one for one in _POINTER_CLASSES if one in words.split())
-    return anaphor(words, found, value.slot, value.value)
+    return anaphor(words, found, value)
 
 
 def introduced_names(
@@ -165,7 +164,7 @@ def _counted(request: InstructionRequest, draw: PairDraw) -> Fields:
     meant, (color,) = draw.pair.meant, request.color_values
     words = request.pick("rival number", templates.NUMBERS_OF)
     named = cardinal(meant.number)
-    number = request.refer(words, "choice", meant.slot, meant.value, resolved=named)
+    number = request.refer(words, "choice", meant, resolved=named)
     # The plural fits any number that is not named.
     count = meant.number if request.resolved else 2
     return amount.amounts([amount.amount(number, amount.cubes(color, count))])

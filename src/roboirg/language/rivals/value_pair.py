@@ -79,7 +79,7 @@ def possible_pairs(request: InstructionRequest) -> Iterator[ValuePair]:
     if len(request.values_of("amount")) > 2:  # noqa: PLR2004 - a color and its count
         return
     for slot, _ in goal.slots:
-        values = [one for one in request.goal_values if one.slot == slot]
+        values = request.values_in(slot)
         meant = values[0]
         others = [
             one

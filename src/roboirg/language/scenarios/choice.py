@@ -29,7 +29,7 @@ from roboirg.language.scenarios.introduced import (
 from roboirg.language.scenarios.markup import Slot, Text, slots_said
 from roboirg.language.scenarios.scenario import PERSON, Scenario
 from roboirg.language.settings.grounded import clues_of
-from roboirg.language.settings.reasoning import BLOCK
+from roboirg.language.settings.reasoning import in_turn
 
 _DESCRIBED = ("place", "clue", "aside", "rest")
 """Slots for a thing that is described; a scenario fits the things that have those that it names."""
@@ -51,25 +51,35 @@ class Chosen(NamedTuple):
     remark: str
 
 
+class _Sayable(NamedTuple):
+    """A way to lead to the goal, and the scenarios that can say it."""
+
+    offer: Offer
+    scenarios: list[Scenario]
+
+
 def choose(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
 ) -> Chosen | None:
     """Return what is said in a setting that does not refuse; None if no scenario fits."""
     sampler = request.sampler
-    known = [scenario for scenario in scenarios if _fits(scenario, request)]
-    possible = _OFFERS[setting](request)
-    offers = [offer for offer in possible if any(_says(scenario, offer) for scenario in known)]
-    if not offers:
+    fitting = [scenario for scenario in scenarios if _fits(scenario, request)]
+    sayable: list[_Sayable] = []
+    for offer in _OFFERS[setting](request):
+        saying = [scenario for scenario in fitting if _says(scenario, offer)]
+        if saying:
+            sayable.append(_Sayable(offer, saying))
+    if not sayable:
         return None
     if setting == "reasoning":
-        offers = [_in_turn(request, offers)]
-    saying = [scenario for scenario in known if any(_says(scenario, offer) for offer in offers)]
+        sayable = [_in_turn(request, sayable)]
+    by_frame = {scenario.fields.frame: scenario for way in sayable for scenario in way.scenarios}
     purpose = setting.removeprefix("direct-")
-    kinds = {kind: kind for scenario in saying for kind in scenario.classes}
+    kinds = {kind: kind for scenario in by_frame.values() for kind in scenario.classes}
     kind = sampler.pick_named(f"{purpose} class", kinds)
-    of_kind = {scenario.fields.frame: scenario for scenario in saying if kind in scenario.classes}
+    of_kind = {frame: scenario for frame, scenario in by_frame.items() if kind in scenario.classes}
     scenario = sampler.pick_named(f"{purpose} scenario", of_kind)
-    offer = next(offer for offer in offers if _says(scenario, offer))
+    offer = next(way.offer for way in sayable if scenario in way.scenarios)
     words = sampler.pick(f"{purpose} words", scenario.classes[kind])
     values = {**goal_values(request), **offer.values}
     if offer.listed is None and scenario.fields.list:
@@ -78,59 +88,51 @@ def choose(
     return Chosen(scenario, Introduced(values, offer.notes), words, offer.remark)
 
 
-def _in_turn(request: InstructionRequest, offers: Sequence[Offer]) -> Offer:
+def _in_turn(request: InstructionRequest, sayable: Sequence[_Sayable]) -> _Sayable:
     """Draw a derivation of the pattern whose turn it is, as in language 3."""
-    patterns = list(dict.fromkeys(str(offer.notes["pattern"]) for offer in offers))
-    index = request.episode.index
-    pattern = patterns[(index + index // BLOCK) % len(patterns)]
-    derivations: dict[str, Offer] = {}
-    for offer in offers:
-        if offer.notes["pattern"] == pattern:
-            name = f"{offer.notes['relation']} {offer.notes['reference']} {offer.listed}"
-            derivations[name] = offer
-    return request.sampler.pick_named(f"{pattern} derivation", derivations)
+    by_pattern: dict[str, dict[str, _Sayable]] = {}
+    for way in sayable:
+        notes = way.offer.notes
+        name = f"{notes['relation']} {notes['reference']} {way.offer.listed}"
+        by_pattern.setdefault(str(notes["pattern"]), {})[name] = way
+    pattern = in_turn(request.episode, list(by_pattern))
+    return request.sampler.pick_named(f"{pattern} derivation", by_pattern[pattern])
 
 
 def _people(request: InstructionRequest, scenario: Scenario) -> Values:
     """Return two people, who are different, and their pronouns, if a scenario speaks of any."""
     if not scenario.people:
         return {}
-    one = request.sampler.pick("person", scenario.people)
-    left = [each for each in scenario.people if each is not one]
-    other = request.sampler.pick("other person", left)
-    return {
-        f"{slot}{number}": (IntroducedValue("", "person", word, word),)
-        for number, words in (("", one), (".2", other))
-        for slot, word in zip(PERSON, words, strict=True)
-    }
+    first = request.sampler.pick("person", scenario.people)
+    others = [person for person in scenario.people if person is not first]
+    second = request.sampler.pick("other person", others)
+    values: dict[str, tuple[IntroducedValue, ...]] = {}
+    for slot, word, other_word in zip(PERSON, first, second, strict=True):
+        values[slot] = (IntroducedValue("", "person", word, word),)
+        values[f"{slot}.2"] = (IntroducedValue("", "person", other_word, other_word),)
+    return values
 
 
 def _fits(scenario: Scenario, request: InstructionRequest) -> bool:
     """Return whether an episode has what a scenario needs."""
-    needs, slot = scenario.fields.needs, scenario.fields.list
-    return (
-        (not needs.colors or len(request.color_values) in needs.colors)
-        and (not needs.shown or len(request.scene_colors) in needs.shown)
-        and (not slot or bool(_lengths(request, scenario)))
-    )
+    needs = scenario.fields.needs
+    if needs.colors and len(request.color_values) not in needs.colors:
+        return False
+    if needs.shown and len(request.scene_colors) not in needs.shown:
+        return False
+    return not scenario.fields.list or bool(_lengths(request, scenario))
 
 
 def _says(scenario: Scenario, offer: Offer) -> bool:
     """Return whether a scenario points back in exactly the fields of an offer, by its way."""
-    fields, notes = scenario.fields, offer.notes
-    derive = fields.derive
-    return (
-        set(scenario.said) == set(offer.fields)
-        and offer.listed in (None, fields.list)
-        and all(_has_words(slot, offer) for slot in slots_said(scenario.text("introduction")))
-        and (
-            derive is None
-            or (
-                derive.pattern == notes["pattern"]
-                and notes["relation"] in (None, *derive.relations)
-            )
-        )
-    )
+    derive, notes = scenario.fields.derive, offer.notes
+    if set(scenario.said) != set(offer.fields) or offer.listed not in (None, scenario.fields.list):
+        return False
+    if derive is not None:
+        relations = (None, *derive.relations)
+        if derive.pattern != notes["pattern"] or notes["relation"] not in relations:
+            return False
+    return all(_has_words(slot, offer) for slot in slots_said(scenario.text("introduction")))
 
 
 def _has_words(slot: Slot, offer: Offer) -> bool:
@@ -141,34 +143,30 @@ def _has_words(slot: Slot, offer: Offer) -> bool:
     return bool(values) and (values[0].kind != "place" or values[0].form == slot.form)
 
 
-def _of_slot(request: InstructionRequest, slot: str) -> list[GoalValue]:
-    return [one for one in request.goal_values if one.slot == slot]
-
-
 def _others(request: InstructionRequest, slot: str) -> list[str | int]:
     """Return the values that a slot could have in the scene, without those that it has."""
-    own = {one.value for one in _of_slot(request, slot)}
+    own = [value.value for value in request.values_in(slot)]
     possible = itertools.chain.from_iterable(request.alternatives(slot))
-    return [one for one in dict.fromkeys(possible) if one not in own]
+    return [value for value in dict.fromkeys(possible) if value not in own]
 
 
 def _lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
     """Return the lengths that the list of a scenario can have."""
     slot, wanted = scenario.fields.list, scenario.fields.needs.list or (2, 3)
-    meant = len(_of_slot(request, slot))
-    possible = meant + len(_others(request, slot))
-    return [one for one in wanted if meant <= one <= possible]
+    least = len(request.values_in(slot))
+    most = least + len(_others(request, slot))
+    return [length for length in wanted if least <= length <= most]
 
 
 def _list(request: InstructionRequest, scenario: Scenario) -> Sequence[IntroducedValue]:
     """Draw the goal's values among others, in any order."""
     slot = scenario.fields.list
-    own, others = goal_values(request)[slot], _others(request, slot)
+    members = [*goal_values(request)[slot]]
     size = request.sampler.pick("list length", _lengths(request, scenario))
-    left = list(itertools.permutations(others, size - len(own)))
-    drawn = request.sampler.pick("listed others", left)
-    values = [*own, *(IntroducedValue(REFERENCE, own[0].kind, one) for one in drawn)]
-    return request.sampler.pick("list order", list(itertools.permutations(values)))
+    left = list(itertools.permutations(_others(request, slot), size - len(members)))
+    for other in request.sampler.pick("listed others", left):
+        members.append(IntroducedValue(REFERENCE, members[0].kind, other))
+    return request.sampler.pick("list order", list(itertools.permutations(members)))
 
 
 def _direct(request: InstructionRequest) -> Iterator[Offer]:
@@ -223,13 +221,8 @@ def _grounded(request: InstructionRequest) -> Iterator[Offer]:
         return
     # Of two things only that with the shorter words is described.
     thing, clue = min(clues.items(), key=lambda item: len(item[1].words))
-    alike = [value for value in request.goal_values if value.slot == thing.slot]
-    fields = {value.field for value in (*clues, *alike)}
-    notes: dict[str, object] = {
-        "touched": [thing.slot],
-        "pattern": clue.kind,
-        "patterns": [clue.kind],
-    }
+    fields = {value.field for value in (*clues, *request.values_in(thing.slot))}
+    notes = {"touched": [thing.slot], "pattern": clue.kind, "patterns": [clue.kind]}
     yield Offer(fields, _seen(thing, clue), notes)
 
 
@@ -250,7 +243,7 @@ def _rival(request: InstructionRequest) -> Iterator[Offer]:
     """Yield a pair whose partners make both values equally likely."""
     pair = balanced_rival(request, rival_pairs(request))
     order = draw_order(request)
-    fields = [one.field for one in pair if pair.ordered or one is pair.meant]
+    fields = [value.field for value in pair if pair.ordered or value is pair.meant]
     rival = IntroducedValue(pair.rival.slot, pair.meant.slot_type, pair.rival.value)
     both = (named(pair.meant), rival) if order.meant_first else (rival, named(pair.meant))
     aimed = "former" if order.meant_first == order.points_at_meant else "latter"
@@ -260,7 +253,7 @@ def _rival(request: InstructionRequest) -> Iterator[Offer]:
         "rival_slot": pair.slot,
         "rival_position": "second" if order.meant_first else "first",
         "rival_reference": remark,
-        "candidates": {pair.slot: [one.value for one in both]},
+        "candidates": {pair.slot: [value.value for value in both]},
     }
     yield Offer(fields, {**several("list", both), "taken": (rival,)}, notes, pair.slot, remark)
 
@@ -276,11 +269,13 @@ _OFFERS: Mapping[str, Callable[[InstructionRequest], Iterable[Offer]]] = {
 
 def rival_values(request: InstructionRequest, introduced: Introduced) -> Iterator[Introduced]:
     """Yield the slots with another value for a competing remark: ``rival color`` of each color."""
-    said = {one.value for one in introduced.values.get("list", ())}
-    for slot, kind in {one.slot: one.slot_type for one in request.goal_values}.items():
-        own = {one.value for one in _of_slot(request, slot)}
-        colors: Sequence[str | int] = request.task.commands.colors
-        for other in colors if kind == "color" else _others(request, slot):
-            if other not in said | own:
+    said = [value.value for value in introduced.values.get("list", ())]
+    said += [value.value for value in request.goal_values]
+    for slot, kind in {value.slot: value.slot_type for value in request.goal_values}.items():
+        others: Sequence[str | int] = request.task.commands.colors
+        if kind != "color":
+            others = _others(request, slot)
+        for other in others:
+            if other not in said:
                 rival = (IntroducedValue(REFERENCE, kind, other),)
                 yield introduced.with_values(**{f"rival {slot}": rival})

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from roboirg.language.instruction import REFERENCE, Expression
 from roboirg.language.number_words import cardinal, ordinal, plural, times
-from roboirg.language.phrases import Phrase, antecedent, listed, plain
+from roboirg.language.phrases import Mentionable, MentionedValue, Phrase, antecedent, listed, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.scenarios.markup import Slot
 from roboirg.language.templates.derivations import MOMENTS
@@ -72,21 +72,20 @@ class Introduced:
         """Return the words for a slot, each value a mention."""
         found = self.values[slot.name]
         joint, form = (slot.form, None) if slot.form in ("or", "nor") else ("and", slot.form)
-        said = [(one.said(form), one) for one in found]
-        phrases = [
-            antecedent(words, one.slot, one.value) if one.slot else plain(words)
-            for words, one in said
-        ]
+        phrases: list[Phrase] = []
+        for value in found:
+            words = value.said(form)
+            phrases.append(antecedent(words, value) if value.slot else plain(words))
         return listed(phrases, joint)
 
-    def referent(self, name: str) -> tuple[str, str | int]:
-        """Return the slot and the value of mentions that point back at a slot."""
+    def referent(self, name: str) -> Mentionable:
+        """Return what mentions that point back at a slot stand for."""
         found = self.values[name]
-        slots = {one.slot for one in found}
         if len(found) == 1:
-            return found[0].slot, found[0].value
+            return found[0]
+        slots = {value.slot for value in found}
         slot = slots.pop() if len(slots) == 1 else REFERENCE
-        return slot, " and ".join(str(one.value) for one in found)
+        return MentionedValue(" and ".join(str(value.value) for value in found), slot)
 
     def ranked(self, name: str, *, ordinals: bool) -> tuple[Introduced, Expression]:
         """Return the same with the rank of a slot's value in the list, and the rank's class."""
@@ -127,13 +126,14 @@ def named(value: GoalValue) -> IntroducedValue:
 
 def goal_values(request: InstructionRequest) -> Values:
     """Return the values of the goal by field, and all of a slot with several by its name."""
-    together = {
-        slot: tuple(named(one) for one in request.goal_values if one.slot == slot)
-        for slot in {one.slot for one in request.goal_values}
-    }
-    return {**together, **{one.field: (named(one),) for one in request.goal_values}}
+    values: dict[str, tuple[IntroducedValue, ...]] = {}
+    for value in request.goal_values:
+        values[value.slot] = tuple(map(named, request.values_in(value.slot)))
+        values[value.field] = (named(value),)
+    return values
 
 
 def several(name: str, values: Sequence[IntroducedValue]) -> Values:
     """Return the slots of several values: one by one, and all together."""
-    return {name: tuple(values), **{f"{name}.{at}": (one,) for at, one in enumerate(values)}}
+    one_by_one = {f"{name}.{at}": (value,) for at, value in enumerate(values)}
+    return {name: tuple(values), **one_by_one}

@@ -19,6 +19,7 @@ from roboirg.language.phrases import (
     fill,
     plain,
     swap_particles,
+    words_of,
 )
 from roboirg.language.request import (
     InstructionRequest,
@@ -212,13 +213,13 @@ class Speech:
         values, kind = self._introduced, cast("Expression", pointer.expression)
         if pointer.expression == "rank":
             values, kind = values.ranked(pointer.of, ordinals="ordinal" in pointer.words)
-        words = self._joined(self.phrase(pointer.parts, values))
-        return anaphor(words, kind, *values.referent(pointer.of))
+        words = words_of(self.phrase(pointer.parts, values))
+        return anaphor(words, kind, values.referent(pointer.of))
 
     def _named(self, pointer: Pointer) -> Phrase:
         """Return words that name what a pointer stands for."""
-        words = self._joined(self.phrase(pointer.resolved or self._referent(pointer.of)))
-        return antecedent(words, *self._introduced.referent(pointer.of))
+        words = words_of(self.phrase(pointer.resolved or self._referent(pointer.of)))
+        return antecedent(words, self._introduced.referent(pointer.of))
 
     def _referent(self, name: str) -> Text:
         """Return the words for what a slot stands for."""
@@ -317,10 +318,6 @@ class Speech:
         if not found:
             raise InvalidValueError("no competing remark has another value than the goal's")
         return self._request.sampler.cycle("competing distractor", list(found))
-
-    @staticmethod
-    def _joined(phrase: Phrase) -> str:
-        return "".join(piece.text for piece in phrase)
 
 
 def _begun(words: Phrase, case: Callable[[str], str]) -> Phrase:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from roboirg.core.episode import Goal, values_in
+from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.language.grounded import (
     Clue,
     amount_clues,
@@ -55,12 +56,14 @@ def say(request: InstructionRequest) -> InstructionSpec:
     clues = clues_of(request)
     remarks: list[Phrase] = []
     fields = stated(request)
+    colors: dict[GoalValue, Clue] = {}
     for value, clue in clues.items():
-        if value.slot not in ("color", "colors"):
+        if value.slot in COLOR_SLOTS:
+            colors[value] = clue
+        else:
             remark, field = _WORDS[value.slot](request, value, clue)
             remarks.append(remark)
             fields |= field
-    colors = {value: clue for value, clue in clues.items() if value.slot in ("color", "colors")}
     if colors:
         remarks.append(_introduced(request, colors))
         fields |= described(request, _pointed(request, colors))
@@ -84,10 +87,7 @@ def clues_of(request: InstructionRequest, *, spoken: bool = False) -> Clues:
     """
     found: dict[GoalValue, Clue] = {}
     for value in request.goal_values:
-        sought = _SOUGHT.get(value.slot) if _is_open(request, value.slot) else None
-        if spoken and sought is _thing_clues:
-            sought = _spoken_clues
-        clues = sought(request, value) if sought else []
+        clues = _clues_to(request, value, spoken=spoken)
         clue = draw_clue(request, f"{value.field} seen", clues)
         if clue is not None:
             found[value] = clue
@@ -114,37 +114,44 @@ def _others(goal: Goal, slot: str) -> list[str]:
     )
 
 
-def _thing_clues(request: InstructionRequest, value: GoalValue) -> list[Clue]:
-    single = len(request.color_values) == 1
-    # Two sets in one sentence are too long.
-    return [one for one in thing_clues(request, value) if single or one.kind != "sets"]
+def _clues_to(request: InstructionRequest, value: GoalValue, *, spoken: bool) -> list[Clue]:
+    """Return the clues to a value that the scene leaves open, in the words of a language."""
+    if not _is_open(request, value.slot):
+        return []
+    if value.slot not in COLOR_SLOTS:
+        clues_to = _SOUGHT.get(value.slot)
+        return clues_to(request, value) if clues_to else []
+    clues = _spoken_clues(request, value) if spoken else thing_clues(request, value)
+    if len(request.color_values) == 1:
+        return clues
+    return [clue for clue in clues if clue.kind != "sets"]  # two in one sentence are too long
 
 
-def _spoken_clues(request: InstructionRequest, value: GoalValue) -> list[Clue]:
-    targets = request.objects_to_point_at(value)
+def _spoken_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
+    """Return the clues of language 4 to the things of a color."""
+    targets = request.objects_to_point_at(color)
     known = spoken_clues(request.episode.scene, request.task.commands.pointed)
-    clues = [found.clue for found in known if found.thing in targets]
-    single = len(request.color_values) == 1
-    return [clue for clue in clues if single or clue.kind != "sets"]
+    return [found.clue for found in known if found.thing in targets]
 
 
 _SOUGHT = {
     "repeats": repeat_clues,
     "placement": placement_clues,
     "relation": placement_clues,
-    "color": _thing_clues,
-    "colors": _thing_clues,
     "counts": amount_clues,
 }
-"""The clues to a value, by slot; those to a visit are missing, because nothing can be counted."""
+"""The clues to a value that is no color, by slot.
+
+Those to a visit are missing, because nothing can be counted.
+"""
 
 
 def _introduced(request: InstructionRequest, colors: Clues) -> Phrase:
     """Return a sentence that describes the things, or two about the only one."""
     (value, clue), *others = colors.items()
     if clue.said and not others:
-        return fill(clue.said, {"which": antecedent(clue.short, value.slot, value.value)})
-    things = [antecedent(clue.words, value.slot, value.value) for value, clue in colors.items()]
+        return fill(clue.said, {"which": antecedent(clue.short, value)})
+    things = [antecedent(clue.words, value) for value, clue in colors.items()]
     template = request.pick("place introduction", introductions.PLACE_INTRODUCTIONS)
     return fill(template, {"things": listed(things)}, plural=len(things) > 1)
 
@@ -160,7 +167,7 @@ def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
         pointers = (request.sampler.pick("color anaphor", single),)
     things: list[Phrase] = []
     for (value, clue), pointer in zip(colors.items(), pointers, strict=True):
-        place = request.refer(*pointer, value.slot, value.value, resolved=clue.words)
+        place = request.refer(*pointer, value, resolved=clue.words)
         template = commands.by_rank or commands.by_color.replace("{cube}", "{place}")
         if clue.of_handled or (commands.pointed == commands.thing and commands.by_rank is None):
             template = "{place}"
@@ -172,27 +179,27 @@ def _pointed(request: InstructionRequest, colors: Clues) -> list[Phrase]:
 def _repeats(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
     template = request.pick("number introduction", COUNTED)
     words = request.pick("same number", number.SAME_NUMBER)
-    said = fill(template, {"times": antecedent(clue.short, value.slot, value.value)})
-    times = request.refer(words, "that", value.slot, value.value, resolved=clue.words)
+    said = fill(template, {"times": antecedent(clue.short, value)})
+    times = request.refer(words, "that", value, resolved=clue.words)
     return said, {value.field: times}
 
 
 def _counts(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
     (shade,) = request.color_values
     cubes = (*plain(" of the "), *amount.cubes(shade, MOST_COLORS))
-    said = (*antecedent(clue.words, value.slot, value.value), *cubes)
+    said = (*antecedent(clue.words, value), *cubes)
     if clue.after:
-        said = (*said, *plain(" "), *antecedent(clue.after, value.slot, value.value))
+        said = (*said, *plain(" "), *antecedent(clue.after, value))
     template = request.pick("amount introduction", introductions.AMOUNT_INTRODUCTIONS)
-    pointing = (*anaphor("that many", "that", value.slot, value.value), *cubes)
+    pointing = (*anaphor("that many", "that", value), *cubes)
     command = amount.amounts([said if request.resolved else pointing])
     return fill(template, {"things": said}), command
 
 
 def _placed(request: InstructionRequest, value: GoalValue, clue: Clue) -> tuple[Phrase, Fields]:
-    said = antecedent(clue.words, value.slot, value.value)
+    said = antecedent(clue.words, value)
     template = request.pick("seen placement", PLACEMENT_INTRODUCTIONS)
-    pointing = anaphor("that placement", "that", value.slot, value.value)
+    pointing = anaphor("that placement", "that", value)
     target = (*plain("the target of "), *(said if request.resolved else pointing))
     return fill(template, {"which": said}), {value.field: target}
 

@@ -7,34 +7,36 @@ that the pattern does not cover.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeVar
 
+from roboirg.core.episode import Episode
 from roboirg.language.patterns import PATTERNS, Pattern
 from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.settings.setting import Setting
 from roboirg.language.slot_types import stated
 
+Turn = TypeVar("Turn")
 BLOCK = 4
-"""Number of episodes after which difficulties repeat; see `pattern_of`."""
+"""Number of episodes after which difficulties repeat; see `in_turn`."""
 
 
 NamedPattern = tuple[str, Sequence[Pattern]]
 """The name of a reasoning pattern, and its rules, each of which derives the goal."""
 
 
-def _turn_of(request: InstructionRequest) -> NamedPattern:
-    """Return an episode's main pattern.
+def in_turn(episode: Episode, patterns: Sequence[Turn]) -> Turn:
+    """Return an episode's main pattern of those that it allows.
 
     Cycle through the patterns that the episode allows, so that none takes the turns of another.
     Move on by one more after each block of four episodes: otherwise a task with two patterns
     would use only one of them in its hard episodes.
     """
-    possible, index = possible_patterns(request), request.episode.index
-    return possible[(index + index // BLOCK) % len(possible)]
+    return patterns[(episode.index + episode.index // BLOCK) % len(patterns)]
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return an intermediate reference, and a command that derives the goal from it."""
-    name, rules = _turn_of(request)
+    name, rules = in_turn(request.episode, possible_patterns(request))
     rule = rules[0] if len(rules) == 1 else request.sampler.pick(f"{name} rule", rules)
     derived = rule.derive(request)
     utterances = (

@@ -106,8 +106,8 @@ def _pointed(
     """Return the command's words for a thing, which name its place or point at it."""
     words, expression = pointer
     if expression != "there":
-        return _at_place(request, color, landmark, anaphor(words, expression, *_of(color)))
-    place = request.refer(words, expression, *_of(color), resolved=landmark.phrase)
+        return _at_place(request, color, landmark, anaphor(words, expression, color))
+    place = request.refer(words, expression, color, resolved=landmark.phrase)
     template = None
     stands_last = _STANDS_LAST.fullmatch(request.task.commands.by_place)
     if request.wordings is None and stands_last:
@@ -118,13 +118,9 @@ def _pointed(
             (f"the {noun}", "that one", f"that {noun} over", "the one over"),
         )
         named = f"the {noun} {landmark.phrase}"
-        place = request.refer(f"{words} there", expression, *_of(color), resolved=named)
+        place = request.refer(f"{words} there", expression, color, resolved=named)
         template = stands_last["before"] + "{place}"
     return request.by_place(color, place, plural=request.count_of(color) > 1, template=template)
-
-
-def _of(color: GoalValue) -> tuple[str, str | int]:
-    return color.slot, color.value
 
 
 def _at_place(
@@ -140,7 +136,7 @@ def _at_place(
         named = named.format(place=landmark.phrase)
         handled = commands.pointed == commands.thing
         template = "{place}" if handled else commands.by_color.replace("{cube}", "{place}")
-    place = antecedent(named, *_of(value)) if request.resolved else words
+    place = antecedent(named, value) if request.resolved else words
     return request.by_place(value, place, plural=request.count_of(value) > 1, template=template)
 
 
@@ -153,7 +149,7 @@ def _introduction(
     if len(marks) > PAIR:  # short: "the cubes closest to you, farthest to your left and ..."
         first, rest = _NOUN.sub(lambda noun: plural(noun[0]), first), "{place}"
     things = [
-        fill(template, {"place": antecedent(landmark.phrase, color.slot, color.value)})
+        fill(template, {"place": antecedent(landmark.phrase, color)})
         for template, color, landmark in zip((first, rest, rest), colors, marks, strict=False)
     ]
     sentence = request.pick("place introduction", introductions.PLACE_INTRODUCTIONS)

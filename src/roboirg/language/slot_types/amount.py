@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from roboirg.language.number_words import cardinal
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
+from roboirg.language.phrases import (
+    Mentionable,
+    MentionedValue,
+    Phrase,
+    anaphor,
+    antecedent,
+    fill,
+    listed,
+    plain,
+)
 from roboirg.language.request import (
     AMOUNT_FIELD,
     GoalValue,
@@ -40,7 +49,7 @@ def amounts(items: Sequence[Phrase]) -> Fields:
 
 def cubes(shade: GoalValue, count: int) -> Phrase:
     """Return ``red cube`` or ``red cubes``."""
-    return antecedent(f"{shade.color} {noun(count)}", shade.slot, shade.value)
+    return antecedent(f"{shade.color} {noun(count)}", shade)
 
 
 def noun(count: int) -> str:
@@ -49,7 +58,7 @@ def noun(count: int) -> str:
 
 
 def _count(goal_value: GoalValue) -> Phrase:
-    return antecedent(cardinal(goal_value.number), goal_value.slot, goal_value.value)
+    return antecedent(cardinal(goal_value.number), goal_value)
 
 
 def _stated(request: InstructionRequest, goal_values: GoalValues) -> Fields:
@@ -68,9 +77,8 @@ def _counts_said(request: InstructionRequest, goal_values: GoalValues) -> bool:
     return request.sampler.pick("said in the command", ("color", "count")) == "count"
 
 
-def _color_reference(request: InstructionRequest, goal_values: GoalValues) -> color.ColorReference:
-    shades = tuple(shade for shade, _ in pairs(goal_values))
-    return color.draw_reference(request, shades, THEM)
+def _color_reference(request: InstructionRequest) -> color.ColorReference:
+    return color.draw_reference(request, request.values_in("colors"), THEM)
 
 
 def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
@@ -80,29 +88,28 @@ def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """
     matched = pairs(goal_values)
     if _counts_said(request, goal_values):
-        ((words, expression),) = _color_reference(request, goal_values).pointers
+        ((words, expression),) = _color_reference(request).pointers
         ((shade, _),) = matched
-        thing = anaphor(
-            f"of {words.replace(' one', ' color')}", expression, shade.slot, shade.value
-        )
+        thing = anaphor(f"of {words.replace(' one', ' color')}", expression, shade)
         return _described(request, goal_values, [thing])
     pointers = THEM if len(matched) == 1 else color.LISTS[len(matched)]
     items = [
         amount(
-            anaphor("that many", "that", count.slot, count.value),
-            anaphor(f"of {words}", expression, shade.slot, shade.value),
+            anaphor("that many", "that", count),
+            anaphor(f"of {words}", expression, shade),
         )
         for (shade, count), (words, expression) in zip(matched, pointers, strict=True)
     ]
     fields = amounts([(*item, *_after(request, at)) for at, item in enumerate(items)])
     if len(matched) > 1:
-        fields[AMOUNT_FIELD] = anaphor("exactly those", "them", "colors", all_colors(goal_values))
+        fields[AMOUNT_FIELD] = anaphor("exactly those", "them", all_colors(goal_values))
     return fields
 
 
-def all_colors(goal_values: Sequence[GoalValue]) -> str:
-    """Return ``red and green``, the value of a mention of several colors."""
-    return " and ".join(one.color for one in goal_values if one.slot == "colors")
+def all_colors(goal_values: Sequence[GoalValue]) -> Mentionable:
+    """Return what a mention of several colors stands for: ``red and green``."""
+    colors = [value.color for value in goal_values if value.slot == "colors"]
+    return MentionedValue(" and ".join(colors), "colors")
 
 
 def _after(request: InstructionRequest, index: int) -> Phrase:
@@ -113,8 +120,8 @@ def _after(request: InstructionRequest, index: int) -> Phrase:
 
 def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
     if _counts_said(request, goal_values):
-        shades = tuple(shade for shade, _ in pairs(goal_values))
-        reference = _color_reference(request, goal_values)
+        reference = _color_reference(request)
+        shades = request.values_in("colors")
         return color.introduce_colors(request, shades, reference, many=True)
     template = request.pick("amount introduction", introductions.AMOUNT_INTRODUCTIONS)
     # "One of the red cubes": "them" then also fits a count of one.
@@ -126,7 +133,7 @@ def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
 
 def color_of(shade: GoalValue) -> Phrase:
     """Return ``red``."""
-    return antecedent(shade.color, shade.slot, shade.value)
+    return antecedent(shade.color, shade)
 
 
 def introduce_references(
@@ -146,17 +153,17 @@ def references(goal_values: GoalValues, slot: str, quantities: Sequence[int]) ->
     nouns = [*map(color_of, shades[:-1]), cubes(shades[-1], quantities[-1])]
     return listed(
         [
-            amount(antecedent(cardinal(quantity), slot, quantity), noun)
+            amount(antecedent(cardinal(quantity), MentionedValue(quantity, slot)), noun)
             for quantity, noun in zip(quantities, nouns, strict=True)
         ]
     )
 
 
 def _pointing(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
-    shades = tuple(shade for shade, _ in pairs(goal_values))
+    shades = request.values_in("colors")
     introduced = tuple(shade.color for shade in shades)
     if _counts_said(request, goal_values):
-        introduced = _color_reference(request, goal_values).introduced
+        introduced = _color_reference(request).introduced
     return color.them(shades, introduced)
 
 

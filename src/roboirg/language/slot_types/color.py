@@ -12,7 +12,15 @@ from typing import NamedTuple
 
 from roboirg.language.instruction import REFERENCE, Expression
 from roboirg.language.number_words import plural
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill, listed, plain
+from roboirg.language.phrases import (
+    MentionedValue,
+    Phrase,
+    anaphor,
+    antecedent,
+    fill,
+    listed,
+    plain,
+)
 from roboirg.language.request import GoalValue, GoalValues, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_with
 from roboirg.language.templates import introductions, remarks
@@ -85,7 +93,10 @@ def introduce_colors(
 ) -> Phrase:
     """Return a sentence that names colors: ``I like the red, green and blue cubes``."""
     slots = {goal_value.color: goal_value.slot for goal_value in goal_values}
-    colors = [antecedent(one, slots.get(one, REFERENCE), one) for one in reference.introduced]
+    colors = [
+        antecedent(one, MentionedValue(one, slots.get(one, REFERENCE)))
+        for one in reference.introduced
+    ]
     several = many or len(colors) > 1
     noun = request.task.commands.colored
     things = (*plain("the "), *listed(colors), *plain(f" {plural(noun) if several else noun}"))
@@ -96,7 +107,7 @@ def introduce_colors(
 def named(request: InstructionRequest, goal_value: GoalValue) -> Phrase:
     """Return ``the red cube``."""
     noun = request.task.commands.colored
-    return antecedent(f"the {goal_value.color} {noun}", goal_value.slot, goal_value.value)
+    return antecedent(f"the {goal_value.color} {noun}", goal_value)
 
 
 def _stated(request: InstructionRequest, goal_values: GoalValues) -> Fields:
@@ -111,9 +122,7 @@ def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``it``, ``the former`` and ``the latter``, or ``the first``, etc."""
     pointers = draw_reference(request, goal_values).pointers
     return {
-        goal_value.field: request.by_color(
-            goal_value, anaphor(words, expression, goal_value.slot, goal_value.value)
-        )
+        goal_value.field: request.by_color(goal_value, anaphor(words, expression, goal_value))
         for goal_value, (words, expression) in zip(goal_values, pointers, strict=True)
     }
 
@@ -126,14 +135,14 @@ def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
 def _pointing(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
     introduced = draw_reference(request, goal_values).introduced
     if len(introduced) == 1:
-        return anaphor("it", "it", goal_values[0].slot, goal_values[0].value)
+        return anaphor("it", "it", goal_values[0])
     return them(goal_values, introduced)
 
 
 def them(goal_values: GoalValues, introduced: tuple[str, ...]) -> Phrase:
     """Return a plural that refers to the things of all introduced colors."""
     slot = goal_values[0].slot if len(introduced) == len(goal_values) else REFERENCE
-    return anaphor("them", "them", slot, " and ".join(introduced))
+    return anaphor("them", "them", MentionedValue(" and ".join(introduced), slot))
 
 
 def competing(request: InstructionRequest, goal_values: GoalValues) -> list[Phrase]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboirg.core.word_pools import Pools
 from roboirg.language.number_words import cardinal, times
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
+from roboirg.language.phrases import MentionedValue, Phrase, anaphor, antecedent, fill
 from roboirg.language.request import GoalValues, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_with, pointing_at
 from roboirg.language.templates import introductions, remarks
@@ -21,7 +21,7 @@ SAME_NUMBER = Pools(
 def _stated(_request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``three times``."""
     return {
-        goal_value.field: antecedent(times(goal_value.number), goal_value.slot, goal_value.value)
+        goal_value.field: antecedent(times(goal_value.number), goal_value)
         for goal_value in goal_values
     }
 
@@ -29,10 +29,7 @@ def _stated(_request: InstructionRequest, goal_values: GoalValues) -> Fields:
 def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``the same number of times``."""
     words = request.pick("same number", SAME_NUMBER)
-    return {
-        goal_value.field: anaphor(words, "that", goal_value.slot, goal_value.value)
-        for goal_value in goal_values
-    }
+    return {goal_value.field: anaphor(words, "that", goal_value) for goal_value in goal_values}
 
 
 def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
@@ -42,7 +39,7 @@ def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
 def introduce_quantity(request: InstructionRequest, slot: str, quantity: int) -> Phrase:
     """Return a sentence that names a quantity."""
     template = request.pick("number introduction", introductions.NUMBER_INTRODUCTIONS)
-    return fill(template, {"times": antecedent(times(quantity), slot, quantity)})
+    return fill(template, {"times": antecedent(times(quantity), MentionedValue(quantity, slot))})
 
 
 competing = competing_with(

@@ -8,7 +8,7 @@ from roboirg.core.motions import Shuttle
 from roboirg.core.word_pools import Pools
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.number_words import ordinal
-from roboirg.language.phrases import Phrase, anaphor, antecedent, fill
+from roboirg.language.phrases import MentionedValue, Phrase, anaphor, antecedent, fill
 from roboirg.language.request import GoalValue, GoalValues, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_with, pointing_at
 from roboirg.language.templates import introductions, remarks
@@ -35,7 +35,7 @@ def series_length(request: InstructionRequest, goal_value: GoalValue) -> int:
     """Return the length of the episode's series: visits to come, or placements shown."""
     scene = request.episode.scene
     if goal_value.slot_type == "visit":
-        return sum(motion.passes for motion in scene.motions if isinstance(motion, Shuttle))
+        return sum(shuttle.passes for shuttle in scene.motions_of(Shuttle))
     targets = {target.name for target in scene.of_kind("target")}
     return sum(fact.kind == "placed" and fact.place in targets for fact in scene.past)
 
@@ -50,19 +50,18 @@ def _stated(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``during its third visit``, ``the target of the second placement``."""
     (goal_value,) = goal_values
     words = f"{OWNERS[goal_value.slot_type]} {ordinal(goal_value.number)} {goal_value.slot_type}"
-    return wrapped(request, goal_value, antecedent(words, goal_value.slot, goal_value.value))
+    return wrapped(request, goal_value, antecedent(words, goal_value))
 
 
 def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``that visit``."""
     (goal_value,) = goal_values
     words = f"that {goal_value.slot_type}"
-    slot, value = goal_value.slot, goal_value.value
     if request.outside_phrase(goal_value.field) is None:
-        return wrapped(request, goal_value, anaphor(words, "that", slot, value))
+        return wrapped(request, goal_value, anaphor(words, "that", goal_value))
     # All of it takes the place of "the second target".
     words = WRAPPED[goal_value.slot_type].format(which=words)
-    pointing = anaphor(words, "that", slot, value)
+    pointing = anaphor(words, "that", goal_value)
     return {goal_value.field: request.around(goal_value.field, pointing)}
 
 
@@ -77,7 +76,7 @@ def introduce_position(
     known = REFERENCE_INTRODUCTIONS if slot == REFERENCE else INTRODUCTIONS
     template = request.pick(f"{goal_value.slot_type} introduction", known[goal_value.slot_type])
     words = f"{INTRODUCED_OWNERS[goal_value.slot_type]} {ordinal(position)} {goal_value.slot_type}"
-    which = antecedent(words, slot, position)
+    which = antecedent(words, MentionedValue(position, slot))
     return fill(template, {"which": which})
 
 

@@ -25,7 +25,7 @@ def placed(request: InstructionRequest, goal_value: GoalValue, moment: Phrase) -
 
 def named(goal_value: GoalValue) -> Phrase:
     """Return ``right before the button press``."""
-    return antecedent(derivations.MOMENTS[str(goal_value.value)], goal_value.slot, goal_value.value)
+    return antecedent(derivations.MOMENTS[str(goal_value.value)], goal_value)
 
 
 def _stated(request: InstructionRequest, goal_values: GoalValues) -> Fields:
@@ -38,10 +38,10 @@ def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     words = request.sampler.pick("moment anaphor", derivations.MOMENT_ANAPHORS)
     outside, pointing = request.outside_phrase(goal_value.field), EXPRESSIONS[words]
     if outside is None or not outside.is_place:
-        moment = anaphor(words, pointing, goal_value.slot, goal_value.value)
+        moment = anaphor(words, pointing, goal_value)
         return placed(request, goal_value, moment)
     # All of it takes the place of "the target right before the button press".
-    target = anaphor(f"{USED}{words}", pointing, goal_value.slot, goal_value.value)
+    target = anaphor(f"{USED}{words}", pointing, goal_value)
     return {goal_value.field: request.around(goal_value.field, target)}
 
 

@@ -12,6 +12,10 @@ from roboirg.language.request import GoalValues, InstructionRequest
 
 Fields = dict[str, Phrase]
 """Words for the fields of a command."""
+SaysFields = Callable[[InstructionRequest, GoalValues], Fields]
+SaysPhrase = Callable[[InstructionRequest, GoalValues], Phrase]
+SaysRemarks = Callable[[InstructionRequest, GoalValues], list[Phrase]]
+"""Return words for the values of a type."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,28 +36,26 @@ class SlotType:
     """
 
     name: SlotTypeName
-    stated: Callable[[InstructionRequest, GoalValues], Fields]
-    reduced: Callable[[InstructionRequest, GoalValues], Fields]
-    introduce: Callable[[InstructionRequest, GoalValues], Phrase]
-    pointing: Callable[[InstructionRequest, GoalValues], Phrase]
+    stated: SaysFields
+    reduced: SaysFields
+    introduce: SaysPhrase
+    pointing: SaysPhrase
     reinforcements: Pools[str]
-    competing: Callable[[InstructionRequest, GoalValues], list[Phrase]]
+    competing: SaysRemarks
     plural: Callable[[InstructionRequest, GoalValues], bool] = lambda _request, goal_values: (
         len(goal_values) > 1
     )
     described: Callable[[InstructionRequest, GoalValues, Sequence[Phrase]], Fields] | None = None
 
 
-def pointing_at(noun: str) -> Callable[[InstructionRequest, GoalValues], Phrase]:
+def pointing_at(noun: str) -> SaysPhrase:
     """Return what points at the first value of a type: *that number* for the noun ``number``."""
-    return lambda _request, goal_values: anaphor(
-        f"that {noun}", "that", goal_values[0].slot, goal_values[0].value
-    )
+    return lambda _request, goal_values: anaphor(f"that {noun}", "that", goal_values[0])
 
 
 def competing_with(
     templates: Pools[str], words: Mapping[str, str] | Mapping[int, str]
-) -> Callable[[InstructionRequest, GoalValues], list[Phrase]]:
+) -> SaysRemarks:
     """Return what fills every template with the words of every value that is not the goal's."""
     return lambda request, goal_values: [
         fill(template, {"other": plain(word)}, plural=value != 1)

@@ -15,6 +15,7 @@ from roboirg.policies.contract.policy_calls import GUESSED
 from roboirg.shortcuts import draw_goal, guess_goal
 from roboirg.shortcuts.command_chance import goals_of_command, understood_goals
 from roboirg.tasks import goals_of
+from roboirg.util.random_draws import draw
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
@@ -58,7 +59,7 @@ class ListenerPolicy(ScriptedPolicy):
             self._has_guessed = True
             goals = goals_of(env.episode)
         rng = choice_generator(self.seed, env.episode, words)
-        return goals[int(rng.integers(len(goals)))]
+        return draw(rng, goals)
 
     def usage(self) -> dict[str, float]:
         """Return whether it has guessed because the words mean nothing."""

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW
+from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW, Actions
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.builtin.scripted import WORDLESS
 
@@ -34,7 +33,7 @@ class RandomPolicy:
         """Begin a walk that depends on the seed and the instruction alone."""
         self._rng = np.random.default_rng([self.seed, zlib.crc32(instruction.encode())])
 
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def act(self, observation: Observation) -> Actions:
         """Return sixteen actions toward a target within the joint limits."""
         joints = np.asarray(observation["joint_positions"], dtype=np.float64)
         target = self._rng.uniform(JOINT_LOW, JOINT_HIGH)

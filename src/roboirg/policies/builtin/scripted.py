@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from roboirg.core.actions import Actions
 from roboirg.core.episode import HANDLES_HELD, Goal, Stage
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.judging import Judge
@@ -96,7 +97,7 @@ class ScriptedPolicy(AttachedPolicy, ABC):
         self.stages = () if goal is None else with_goal(env.episode, goal).stages
         self._chunks = _execute(env, self.stages, self.make_primitives(env))
 
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
+    def act(self, observation: Observation) -> Actions:  # noqa: ARG002
         """Return the next chunk of the motion; without one, actions that hold still."""
         staged = next(self._chunks, None)
         if staged is None:

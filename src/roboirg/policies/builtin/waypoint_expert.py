@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE, POSE_SIZE, WAYPOINT
+from roboirg.core.actions import (
+    ARM_JOINTS,
+    JOINT_ANGLE,
+    POSE_SIZE,
+    WAYPOINT,
+    Actions,
+    CheckedActions,
+)
 from roboirg.core.episode import HANDLES_HELD, Goal
 from roboirg.core.observations import Observation
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
@@ -69,7 +76,7 @@ class ExpertWaypoint(NamedTuple):
         turn: how the tool turns: ``keep``, ``align`` with the anchor, or ``home``.
     """
 
-    action: NDArray[np.float64]
+    action: CheckedActions
     anchor: str | None
     turn: str
 
@@ -88,7 +95,7 @@ class WaypointExpert(OraclePolicy):
 
     actions: ClassVar[str] = WAYPOINT.name
     last: ExpertWaypoint
-    labels: NDArray[np.float64]
+    labels: CheckedActions
 
     def __init__(self, seed: int = 0, disturbance: Disturbance | None = None) -> None:
         super().__init__(seed)
@@ -107,7 +114,7 @@ class WaypointExpert(OraclePolicy):
         self._rng = np.random.default_rng((env.episode.seed, self.seed))
         return super().decide(env, instruction)
 
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
+    def act(self, observation: Observation) -> Actions:  # noqa: ARG002
         """Return the next waypoint (1, 7), perhaps disturbed; `last` is the undisturbed one."""
         decided = self._stalled or self._next()
         self._stalled = None
@@ -157,7 +164,7 @@ class WaypointExpert(OraclePolicy):
         action = self._pose_at(chunk[-1, :ARM_JOINTS], LEAVE)
         return ExpertWaypoint(action, *self._meaning(action))
 
-    def _meaning(self, action: NDArray[np.float64]) -> tuple[str | None, str]:
+    def _meaning(self, action: CheckedActions) -> tuple[str | None, str]:
         """Return the anchor of a move, and how the tool turns in it."""
         env = self.env
         tool = np.asarray(env.session.world.robot.tool_pose.p)
@@ -171,16 +178,16 @@ class WaypointExpert(OraclePolicy):
             return str(name), _TURNS.get(primitive.kind, "keep")
         return None, "keep"
 
-    def _here(self, gripper: float) -> NDArray[np.float64]:
+    def _here(self, gripper: float) -> CheckedActions:
         robot = self.env.session.world.robot
         return self._pose_at(robot.arm_positions, gripper)
 
-    def _pose_at(self, arm: NDArray[np.floating[Any]], gripper: float) -> NDArray[np.float64]:
+    def _pose_at(self, arm: NDArray[np.floating[Any]], gripper: float) -> CheckedActions:
         """Return the waypoint at joint positions (7)."""
         position, rotation = self._primitives.tool_at(np.asarray(arm, np.float64))
         return np.concatenate([position, rotation.as_euler("xyz"), [gripper]])
 
-    def _disturb(self, action: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _disturb(self, action: CheckedActions) -> CheckedActions:
         """Return a waypoint moved at random, if it is its turn; gripper actions stay."""
         how, rng = self._disturbance, self._rng
         if how is None or action[-1] != LEAVE:
@@ -213,7 +220,7 @@ class JointWaypointExpert(WaypointExpert):
         self._way: JointTrajectory | None = None
         return super().decide(env, instruction)
 
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def act(self, observation: Observation) -> Actions:
         """Return the targets (n, 8) of the next move, perhaps disturbed, or of the gripper."""
         executed = next(self._moves, None)
         if executed is None:
@@ -230,7 +237,7 @@ class JointWaypointExpert(WaypointExpert):
             self._way = self._way[min(len(executed), last) :]
         return executed
 
-    def _way_of(self, waypoint: NDArray[np.float64]) -> JointTrajectory:
+    def _way_of(self, waypoint: CheckedActions) -> JointTrajectory:
         """Return the way to a waypoint, with the gripper's action at its end."""
         move = next(self._controller.trajectories(waypoint))
         if waypoint[-1] == LEAVE:

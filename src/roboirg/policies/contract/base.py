@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
+from roboirg.core.actions import Actions
 from roboirg.core.observations import Demonstration, Observation
 
 if TYPE_CHECKING:
@@ -45,7 +43,7 @@ class Policy(Protocol):
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode; the instruction is complete unless it is delivered in turns."""
 
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def act(self, observation: Observation) -> Actions:
         """Return the next n >= 1 actions; all are executed before the next call.
 
         Returns:

@@ -11,9 +11,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from roboirg.core.actions import Actions
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.plain_text import counted
 
@@ -47,13 +45,13 @@ class BatchedEpisode:
         seed = {"seed": self._seed} if "seed" in parameters_of(begin) else {}
         self._state = begin(instruction, demonstration, **seed)
 
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def act(self, observation: Observation) -> Actions:
         """Return the next actions."""
         return self.act_together([self], [observation])[0]
 
     def act_together(
         self, episodes: Sequence[BatchedEpisode], observations: Sequence[Observation]
-    ) -> list[NDArray[np.floating[Any]]]:
+    ) -> list[Actions]:
         """Return the next actions of several episodes of the same policy.
 
         Raises:

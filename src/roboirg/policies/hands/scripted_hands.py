@@ -6,11 +6,12 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from roboirg.core.actions import Actions
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import HANDLES_HELD, PICKS, ROBOT, Primitive
 from roboirg.core.errors import MotionPlanningError
@@ -141,7 +142,7 @@ class ScriptedHands(AttachedPolicy):
             self._last = now if how == "done" and now.motion.kind != "hold" else None
             self._report(now.subgoal, how, why, now.thing)
 
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:  # noqa: ARG002
+    def act(self, observation: Observation) -> Actions:  # noqa: ARG002
         """Return the next move; without a motion, actions that hold still."""
         self.settle()
         if self._underway is None or self._underway.next is None:

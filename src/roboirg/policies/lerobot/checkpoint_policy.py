@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from roboirg.core.actions import Actions
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
 from roboirg.core.observations import Demonstration, Observation
@@ -130,14 +131,14 @@ class LeRobotPolicy:
 
     def act_batch(
         self, states: Sequence[CheckpointEpisode], observations: Sequence[Observation]
-    ) -> list[NDArray[np.floating[Any]]]:
+    ) -> list[Actions]:
         """Return the checkpoint's next actions, (n, 8) for each episode."""
         import torch
 
         size = 1  # the noise of an episode, or what is remembered of it, would depend on the others
         if self._takes_batches:
             size = self.options.batch or (1 if self.options.device == "cpu" else _BATCH)
-        chunks: list[NDArray[np.floating[Any]]] = []
+        chunks: list[Actions] = []
         with torch.inference_mode():
             for start in range(0, len(states), size):
                 stop = start + size
@@ -146,7 +147,7 @@ class LeRobotPolicy:
 
     def _ask(
         self, states: Sequence[CheckpointEpisode], observations: Sequence[Observation], size: int
-    ) -> list[NDArray[np.floating[Any]]]:
+    ) -> list[Actions]:
         """Ask the model about at most `size` episodes; the last one fills up the batch."""
         import torch
 

@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from roboirg.core.actions import Actions
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation
 from roboirg.core.policy_needs import PolicyNeeds
@@ -152,7 +152,7 @@ class HierarchicalPolicy(PlannerParts):
         self.planner.reset(instruction, views[0])
         self.policy.reset(instruction, views[1])
 
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def act(self, observation: Observation) -> Actions:
         """Pass the planner's subgoal to the policy, and return the policy's actions."""
         history = observation.get("history", ())
         self._step += (

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from roboirg.core.observations import Observation
+from roboirg.core.observations import Observation, Pixels
 from roboirg.core.subgoal_text import split_point
 from roboirg.policies.planners.planner import WHEN_DONE
 from roboirg.policies.planners.points import normalize_subgoal, parse_points
@@ -22,7 +22,7 @@ from roboirg.policies.planners.vlm_planner import (
 from roboirg.policies.vlm.goal_schema import object_schema
 from roboirg.policies.vlm.model_content import ChatTurn, Part
 from roboirg.policies.vlm.models import ModelQuery
-from roboirg.util.media import VIDEO_RATE, Clip, Picture, Pixels, contact_sheets, evenly_spaced
+from roboirg.util.media import VIDEO_RATE, Clip, Picture, contact_sheets, evenly_spaced
 from roboirg.util.reply_reading import UnparsableReplyError, json_object, text_of, whole_number
 
 TEXT: Mapping[str, Any] = {"type": "string"}

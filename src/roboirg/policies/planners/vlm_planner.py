@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Generic, TypeVar
 from pydantic import Field
 
 from roboirg.core.environment_options import DemonstrationFrames
-from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.observations import Demonstration, Observation, Pixels
 from roboirg.core.subgoal_text import split_point
 from roboirg.policies.contract.base import SubgoalEnd
 from roboirg.policies.planners.planner import EACH_CHUNK, WHEN_DONE, SubgoalOptions
@@ -20,7 +20,7 @@ from roboirg.policies.vlm.models import ModelOptions, ModelQuery
 from roboirg.policies.vlm.models.model import config_version
 from roboirg.policies.vlm.prompt_files import SHARED, load_prompts
 from roboirg.policies.vlm.vlm_query import VLMQuery
-from roboirg.util.media import Clip, Pixels
+from roboirg.util.media import Clip
 from roboirg.util.reply_reading import UnparsableReplyError
 
 FINISHED = ""

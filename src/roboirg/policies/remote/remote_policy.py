@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.actions import JOINT_ANGLE, check_chunk, find_action_space
+from roboirg.core.actions import JOINT_ANGLE, Actions, check_chunk, find_action_space
 from roboirg.core.errors import InvalidActionError, PolicyReplyError
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
 from roboirg.core.policy_ref import UNKNOWN_VERSION
@@ -85,7 +85,7 @@ class RemotePolicy(ABC):
             self.metadata = server | {"execute": getattr(self.options, "execute", None) or "all"}
             self.begin_episode(demonstration)
 
-    def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def act(self, observation: Observation) -> Actions:
         """Return the server's next actions; an error ends the episode.
 
         Raises:
@@ -106,7 +106,7 @@ class RemotePolicy(ABC):
         """Reset the server; the demonstration may be kept for `request_actions`."""
 
     @abstractmethod
-    def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def request_actions(self, observation: Observation) -> Actions:
         """Return the server's next actions, (n, size); see `request` and `read_actions`."""
 
     def close(self) -> None:

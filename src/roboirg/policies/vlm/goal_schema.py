@@ -147,7 +147,7 @@ def _answer(goal: Goal) -> Answer:
     """Return the answer that names a goal; of counted colors, those that it names."""
     slots = goal.as_mapping()
     if "counts" in slots:
-        return dict(zip(goal.texts("colors"), goal.numbers("counts"), strict=True))
+        return dict(goal.amounts)
     return slots
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Literal, NamedTuple
 
-from roboirg.util.media import VIDEO_RATE, Clip, Picture, Pixels, sample_evenly
+from roboirg.core.observations import Pixels
+from roboirg.util.media import VIDEO_RATE, Clip, Picture, sample_evenly
 
 Part = str | Picture | Clip
 

@@ -15,6 +15,7 @@ from roboirg.core.episode import COLORS, Color, Goal, ObjectKind, Scene, SceneOb
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.footprints import Circle, Footprint, Line, Obstacle, Rectangle, Region, place
 from roboirg.core.motions import Point
+from roboirg.util.random_draws import shuffled
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
@@ -27,7 +28,11 @@ YAW_DIGITS = 1e6
 """Digits of a yaw (rad) behind this one are as good as random."""
 
 
-def draw_number(rng: np.random.Generator, bounds: tuple[int, int]) -> int:
+Bounds = tuple[int, int]
+"""Fewest and most, both included."""
+
+
+def draw_number(rng: np.random.Generator, bounds: Bounds) -> int:
     """Draw a whole number between two bounds, both included, uniformly."""
     low, high = bounds
     return int(rng.integers(low, high + 1))
@@ -115,7 +120,7 @@ def draw_colored_cubes(
     obstacles: Sequence[Obstacle],
 ) -> tuple[SceneObject, ...]:
     """Draw `count` cubes of different colors, ``cube_red`` and so on, in random order."""
-    colors = [COLORS[index] for index in rng.permutation(len(COLORS))[:count]]
+    colors = shuffled(rng, COLORS)[:count]
     cubes = ((f"cube_{color}", color, region) for color in colors)
     return tuple(draw_cubes(rng, cubes, gap, obstacles))
 

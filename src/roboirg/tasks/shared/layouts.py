@@ -9,6 +9,8 @@ import math
 
 import numpy as np
 
+from roboirg.util.random_draws import draw
+
 PlanePoint = tuple[float, float]
 """x and y in the world frame, meters."""
 
@@ -22,8 +24,7 @@ PATTERNS: dict[int, tuple[tuple[PlanePoint, ...], ...]] = {3: (TRIANGLE, LINE), 
 
 def layout_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ...]:
     """Draw a pattern of `count` points, turned about the origin by any angle of the full circle."""
-    patterns = PATTERNS[count]
-    pattern = patterns[int(rng.integers(len(patterns)))]
+    pattern = draw(rng, PATTERNS[count])
     angle = 2.0 * math.pi * rng.random()
     cos, sin = math.cos(angle), math.sin(angle)
     return tuple((cos * x - sin * y, sin * x + cos * y) for x, y in pattern)

@@ -18,6 +18,7 @@ from roboirg.core.episode import Color, ObjectKind, Scene, SceneObject
 from roboirg.core.footprints import Circle, Footprint, Region
 from roboirg.core.motions import Point
 from roboirg.tasks.shared.fixtures import placed
+from roboirg.util.random_draws import shuffled
 
 BOX_YAW = math.radians(15.0)
 """Largest rotation of a box to either side."""
@@ -34,7 +35,7 @@ def on_side(region: Region, side: Side) -> Region:
 
 def draw_sides(rng: np.random.Generator, colors: Sequence[Color]) -> dict[Color, Side]:
     """Draw the sides of two colors, both orders equally likely."""
-    left, right = (colors[index] for index in rng.permutation(len(colors)))
+    left, right = shuffled(rng, colors)
     return {left: "left", right: "right"}
 
 

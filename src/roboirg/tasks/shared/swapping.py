@@ -49,10 +49,9 @@ def plan_swaps(
 def places_at_last(scene: Scene) -> dict[str, Point]:
     """Return where each object of a scene stands after the last swap."""
     places = {item.name: item.position for item in scene.objects}
-    for motion in scene.motions:
-        if isinstance(motion, Swap):
-            first, second = motion.first, motion.second
-            places[first], places[second] = places[second], places[first]
+    for swap in scene.motions_of(Swap):
+        first, second = swap.first, swap.second
+        places[first], places[second] = places[second], places[first]
     return places
 
 

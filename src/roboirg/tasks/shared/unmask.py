@@ -26,7 +26,8 @@ from roboirg.core.footprints import Circle, Footprint, Region, place
 from roboirg.core.motions import Away, Point
 from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import button_keep_out, footprint
-from roboirg.tasks.task import Commands, Wording
+from roboirg.tasks.task import Commands, SceneAndGoal, Wording
+from roboirg.util.random_draws import shuffled
 
 APPEAR_STEP = 32
 """The step at which all containers appear over the cubes at once."""
@@ -39,7 +40,7 @@ GAP = 0.04
 
 def sample(
     rng: np.random.Generator, difficulty: Difficulty, buttons: Sequence[SceneObject] = ()
-) -> tuple[Scene, Goal]:
+) -> SceneAndGoal:
     """Draw containers that stay in their places, three over a cube; the first are to be lifted."""
     obstacles = [button_keep_out(button) for button in buttons]
     containers = draw_containers_in(rng, [REGION] * CONTAINERS[difficulty], GAP, obstacles)
@@ -85,11 +86,7 @@ def hide_cubes(
     """Draw a red, a green and a blue cube, in random order under the first three containers."""
     if len(containers) < len(COLORS):
         raise SceneRejectedError("fewer than three containers fit")
-    order = rng.permutation(len(COLORS))
-    return tuple(
-        hidden_cube(COLORS[index], container)
-        for index, container in zip(order, containers, strict=False)
-    )
+    return tuple(map(hidden_cube, shuffled(rng, COLORS), containers))
 
 
 def hidden_cube(color: Color, container: SceneObject) -> SceneObject:

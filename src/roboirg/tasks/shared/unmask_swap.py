@@ -9,13 +9,15 @@ import numpy as np
 from roboirg.core.episode import COLORS, Difficulty, Goal, Scene, SceneObject
 from roboirg.core.footprints import Footprint, Region
 from roboirg.core.motions import Away, Motion
-from roboirg.tasks.shared.fixtures import draw_number
+from roboirg.tasks.shared.fixtures import Bounds, draw_number
 from roboirg.tasks.shared.swapping import last_step, plan_swaps
 from roboirg.tasks.shared.unmask import appearing, draw_containers_in, hide_cubes
+from roboirg.tasks.task import SceneAndGoal
+from roboirg.util.random_draws import draw
 
 CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 4, "hard": 4}
-SWAPS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 2), "medium": (1, 2), "hard": (2, 3)}
-PICKS: dict[Difficulty, tuple[int, int]] = {"easy": (1, 2), "medium": (1, 1), "hard": (2, 2)}
+SWAPS: dict[Difficulty, Bounds] = {"easy": (1, 2), "medium": (1, 2), "hard": (2, 3)}
+PICKS: dict[Difficulty, Bounds] = {"easy": (1, 2), "medium": (1, 1), "hard": (2, 2)}
 """Fewest and most swaps and picks; both numbers are uniform."""
 START = 64
 LANE = 0.07
@@ -39,7 +41,7 @@ def sample(
     difficulty: Difficulty,
     containers: Sequence[SceneObject],
     buttons: Sequence[SceneObject] = (),
-) -> tuple[Scene, Goal]:
+) -> SceneAndGoal:
     """Draw hidden cubes, swaps and goal for containers that have been placed.
 
     The cubes are out of the world while the containers move, and return under their own ones. As in
@@ -75,5 +77,5 @@ def _initiators(
     names = [container.name for container in containers]
     first, second = (names[index] for index in rng.permutation(len(COLORS))[:2])
     others = [name for name in names if name not in (first, second)]
-    third = others[int(rng.integers(len(others)))]
+    third = draw(rng, others)
     return (first, second, third)[:number]

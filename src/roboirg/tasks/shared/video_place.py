@@ -26,6 +26,7 @@ from roboirg.tasks.shared.stages import (
     retreat,
 )
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS
+from roboirg.util.random_draws import draw, shuffled
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
 
@@ -58,12 +59,12 @@ def draw_table(
         disc = draw_target(rng, f"target_{number}", TARGET_RADIUS, WORK_REGION, GAP, obstacles)
         objects.append(disc)
         obstacles.append(Circle(disc.position.x, disc.position.y, TARGET_RADIUS))
-    return Scene(tuple(objects)), colored[int(rng.integers(len(colored)))]
+    return Scene(tuple(objects)), draw(rng, colored)
 
 
 def draw_swap(rng: np.random.Generator, discs: Sequence[SceneObject], past: Sequence[Fact]) -> Swap:
     """Draw two discs that change places when the robot holds still at the end of the video."""
-    first, second, *others = (discs[index].name for index in rng.permutation(len(discs)))
+    first, second, *others = (disc.name for disc in shuffled(rng, discs))
     return plan_swap(first, second, others, past)
 
 

@@ -11,12 +11,13 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from roboirg.core.actions import Actions
 from roboirg.core.environment_options import MAX_STEPS
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.field_types import check_whole
-from roboirg.core.observations import CAMERAS, proprioception
-from roboirg.envs.action_chunks import StepResult
+from roboirg.core.observations import CAMERAS, Pixels, proprioception
 from roboirg.envs.env_settings import EnvOptions
+from roboirg.envs.environment import StepResult
 from roboirg.envs.factory import make
 from roboirg.policies.contract.play import Moment
 from roboirg.util.media import PICTURE_SIZE, scaled_square
@@ -30,7 +31,7 @@ STATE_SIZE = 8
 _log = logging.getLogger(__name__)
 
 
-class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[Any]]]):
+class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
     """Episodes of one task, chosen by seeds: ``seed % n`` of the n in the split.
 
     Observation: `pixels`, uint8 (size, size, 3) for each camera; `agent_pos` float32 (8,), seven
@@ -88,7 +89,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
         self._shown: Mapping[str, NDArray[Any]] = {}
         self._next_frame = self._length = 0
         self._seen: dict[str, Any] = {}
-        self._picture: NDArray[np.uint8] | None = None
+        self._picture: Pixels | None = None
         self._last: StepResult | None = None
 
     @property
@@ -112,7 +113,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
             self._shown, self._length = demonstration, demonstration.length
         return self._observe(self._seen), self._info(success=False)
 
-    def step(self, action: NDArray[np.floating[Any]]) -> StepResult:
+    def step(self, action: Actions) -> StepResult:
         """Execute one action; while the video is streamed, show its next frame instead."""
         if self._last is not None:
             return self._last
@@ -134,7 +135,7 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], NDArray[np.floating[An
             self._last = observation, 0.0, terminated, truncated, after
         return observation, reward, terminated, truncated, after
 
-    def render(self) -> NDArray[np.uint8] | None:
+    def render(self) -> Pixels | None:
         """Return the first camera's picture in the last observation."""
         return self._picture
 

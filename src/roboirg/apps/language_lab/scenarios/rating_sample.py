@@ -15,6 +15,7 @@ from roboirg.language.settings import EXPLICIT
 from roboirg.language.variants import instructions
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.csv_text import csv_text
+from roboirg.util.random_draws import shuffled
 
 LANGUAGE = 4
 POOL = "test"
@@ -38,11 +39,11 @@ def draw_sample(
     found, old = list[SampledText](), list[SampledText]()
     for setting in settings:
         every = [one for task in tasks for one in _texts(task, setting, LANGUAGE, seed, TEXTS)]
-        found += [every[at] for at in rng.permutation(len(every))[:TEXTS]]
+        found += shuffled(rng, every)[:TEXTS]
         for task in tasks:
             old += _texts(task, setting, DEFAULT_LANGUAGE, seed, anchors)
-    found += [old[at] for at in rng.permutation(len(old))[:anchors]]
-    return [found[at] for at in rng.permutation(len(found))]
+    found += shuffled(rng, old)[:anchors]
+    return shuffled(rng, found)
 
 
 def _texts(task: str, setting: str, language: int, seed: int, number: int) -> Iterator[SampledText]:
@@ -68,8 +69,8 @@ def sheet(texts: Sequence[SampledText], order: int) -> str:
     """Return a rater's sheet: number and text in an order of its own, and a column to fill in."""
     rng = np.random.default_rng(order)
     rows = [
-        {"number": at + 1, "text": texts[at]["text"], "rating": ""}
-        for at in rng.permutation(len(texts)).tolist()
+        {"number": number, "text": text["text"], "rating": ""}
+        for number, text in shuffled(rng, list(enumerate(texts, 1)))
     ]
     return csv_text(rows)
 

@@ -31,6 +31,7 @@ from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import write_atomically
+from roboirg.util.random_draws import shuffled
 from roboirg.util.short_hash import short_hash
 
 PLAN_FILE = "plan.json"
@@ -188,8 +189,7 @@ def make_study(
     conditions = list(product(settings, range(len(named))))
     planned: list[PlannedTrial] = []
     for block, (task, episode) in enumerate(_blocks(chosen, rng), 1):
-        for index in rng.permutation(len(conditions)):
-            setting, policy = conditions[index]
+        for setting, policy in shuffled(rng, conditions):
             name, spec = named[policy]
             job = Job(
                 policy=name,
@@ -251,8 +251,8 @@ def _blocks(
     tasks = list(chosen)
     drawn = {task: rng.permutation(chosen[task]) for task in tasks}
     for position in range(len(drawn[tasks[0]])):
-        for index in rng.permutation(len(tasks)):
-            yield tasks[index], int(drawn[tasks[index]][position])
+        for task in shuffled(rng, tasks):
+            yield task, int(drawn[task][position])
 
 
 def _demonstrations(

@@ -12,6 +12,7 @@ from typing import Any, ClassVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from roboirg.core.actions import Actions
 from roboirg.core.observations import CAMERAS, Demonstration, Observation
 from roboirg.policies.remote.endpoints import ActionSpaceName, RemoteOptions
 from roboirg.policies.remote.protocols import Protocol
@@ -74,7 +75,7 @@ class ChallengePolicy(RemotePolicy):
         self._demonstration = demonstration
         self.request_confirmed({"reset": True}, "reset_finished")
 
-    def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def request_actions(self, observation: Observation) -> Actions:
         """Send everything seen since the last call; return all actions of the reply."""
         intrinsic = INTRINSIC_FIELDS if self.calibration else {}
         demonstration, self._demonstration = self._demonstration, None

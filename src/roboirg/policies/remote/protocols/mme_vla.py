@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from roboirg.core.actions import Actions
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.policies.contract.base import SubgoalFollower
@@ -95,7 +96,7 @@ class MmeVlaPolicy(RemotePolicy):
             )
         self._subgoal = subgoal.lower()
 
-    def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def request_actions(self, observation: Observation) -> Actions:
         """Send the frames since the last call, then request actions."""
         if self.options.history:
             self._send_frames(observation)

@@ -11,9 +11,9 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from roboirg.core.actions import Actions
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.policies.contract.base import close_policy
 from roboirg.policies.contract.option_checking import NOT_COMPARED
@@ -61,7 +61,7 @@ class OpenpiPolicy(RemotePolicy):
     def begin_episode(self, demonstration: Demonstration) -> None:
         """Do nothing: the protocol has neither a reset nor a memory."""
 
-    def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def request_actions(self, observation: Observation) -> Actions:
         """Send the observation; return the rows of the reply to execute."""
         message = {
             **{key: observation[field] for key, field in self._pictures.items()},  # type: ignore[literal-required]

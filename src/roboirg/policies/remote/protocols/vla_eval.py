@@ -12,9 +12,7 @@ import time
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from roboirg.core.actions import Actions
 from roboirg.core.errors import InvalidValueError, PolicyReplyError, RoboIRGError
 from roboirg.core.observations import Demonstration, Observation, proprioception
 from roboirg.core.version import __version__
@@ -98,7 +96,7 @@ class VlaEvalPolicy(RemotePolicy):
         """Send a subgoal with every observation from now on."""
         self._subgoal = subgoal
 
-    def request_actions(self, observation: Observation) -> NDArray[np.floating[Any]]:
+    def request_actions(self, observation: Observation) -> Actions:
         """Send an observation; return the action of the reply, one row."""
         images = {"agentview": observation["front_rgb"]}
         wrist = self.options.wrist and self._wants("send_wrist_image")
