@@ -13,8 +13,8 @@ ADVERBS = {1: "once", 2: "twice"}
 
 
 def plural(noun: str) -> str:
-    """Return the plural of a noun: ``cubes``, ``boxes``."""
-    return f"{noun}es" if noun.endswith("x") else f"{noun}s"
+    """Return the plural of a noun: ``cubes``, ``passes``."""
+    return f"{noun}es" if noun.endswith(("s", "x")) else f"{noun}s"
 
 
 def cardinal(number: int) -> str:
