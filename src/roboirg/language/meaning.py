@@ -7,7 +7,7 @@ with their margins; the goal of the episode is never read.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from roboirg.core.episode import Episode, Goal, SceneObject
 from roboirg.language.grounded import spoken_clues
@@ -23,73 +23,83 @@ Operand = Value | Described
 
 
 def meant_goals(meaning: Meaning, episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals that all of an instruction leaves; empty if its terms give no value."""
+    """Return the goals of the scene that fit everything that was said."""
     return _goals_with(_values_of(meaning.terms, meaning, episode), meaning, episode)
 
 
 def command_goals(meaning: Meaning, episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals that the last utterance alone leaves."""
+    """Return the goals that fit the command alone: it settles some fields, the others are open."""
     return _goals_with(_values_of(meaning.settled, meaning, episode), meaning, episode)
 
 
 def candidate_goals(meaning: Meaning, episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals among which a guess is blind: those with values that the words offer.
+    """Return the goals left to a guesser who heard which values were listed, not which is meant.
 
-    To pick one of two that are named takes no understanding of which one is meant.
+    A field that the command settles has its value, one that is picked from a list has any value
+    of the list, and all others are open.
     """
-    values = _values_of(meaning.settled, meaning, episode)
+    possible = _values_of(meaning.settled, meaning, episode)
     for field, term in meaning.terms.items():
-        if field not in values and term.operation in ("rank", "other"):
-            offered = [_operand_values(operand, field, episode) for operand in term.operands]
-            values[field] = frozenset[Value]().union(*offered)
-    return _goals_with(values, meaning, episode)
+        is_picked = term.operation in ("rank", "other")
+        if is_picked and field not in meaning.settled:
+            possible[field] = _listed_values(term, field, episode)
+    return _goals_with(possible, meaning, episode)
 
 
 def field_values(meaning: Meaning, field: str, episode: Episode) -> Values:
-    """Return the values that an instruction gives a field: none if it is open, one if clear."""
+    """Return the values that a field can have by what was said; empty if no term is about it."""
     term = meaning.terms.get(field)
     return frozenset() if term is None else _term_values(term, field, episode)
 
 
 def _values_of(fields: Iterable[str], meaning: Meaning, episode: Episode) -> dict[str, Values]:
-    """Return the values that an instruction gives some of its fields."""
+    """Return the possible values of some fields by their terms."""
     return {field: _term_values(meaning.terms[field], field, episode) for field in fields}
 
 
 def _goals_with(
-    values: Mapping[str, Values], meaning: Meaning, episode: Episode
+    possible: Mapping[str, Values], meaning: Meaning, episode: Episode
 ) -> tuple[Goal, ...]:
-    """Return the scene's goals with the fields of a meaning and one of the values in each."""
+    """Return the scene's goals with the fields that were said, each with a possible value."""
     found: list[Goal] = []
     for goal in goals_of(episode):
         own = {value.field: value.value for value in values_of_goal(goal)}
-        has_fields = not meaning.terms or own.keys() == meaning.terms.keys()
-        if has_fields and all(own[field] in possible for field, possible in values.items()):
+        if meaning.terms and own.keys() != meaning.terms.keys():
+            continue  # it asks for two containers, and the words for one
+        if all(own[field] in values for field, values in possible.items()):
             found.append(goal)
     return tuple(found)
 
 
 def _term_values(term: Term, field: str, episode: Episode) -> Values:
-    """Return the values that a term gives a field: one if it is clear, none without operands."""
+    """Return the values that a term gives a field; empty if it picks no operand."""
     if term.operation == "without":
         return _values_without(term.operands, field, episode)
-    operand = _chosen_operand(term)
+    operand = _picked_operand(term)
     if operand is None:
         return frozenset()
-    if term.operation in ("double", "half", "step"):
-        return frozenset([_reckoned(term, operand)]) if isinstance(operand, int) else frozenset()
+    if isinstance(operand, int) and term.operation in ("double", "half", "step"):
+        return frozenset([_reckoned(term, operand)])
     return _operand_values(operand, field, episode)
 
 
-def _chosen_operand(term: Term) -> Operand | None:
-    """Return the operand from which a value follows; None if there is none, or if it is open."""
-    operands, rank = term.operands, term.rank
+def _picked_operand(term: Term) -> Operand | None:
+    """Return the only operand that a term picks; None if it picks none or several."""
+    picked = [
+        operand
+        for position, operand in enumerate(term.operands, start=1)
+        if _is_picked(position, term)
+    ]
+    return picked[0] if len(picked) == 1 else None
+
+
+def _is_picked(position: int, term: Term) -> bool:
+    """Return whether a term picks the operand at a position, from 1."""
     if term.operation == "rank":
-        return operands[rank - 1] if 1 <= rank <= len(operands) else None
+        return position == term.rank
     if term.operation == "other":
-        is_pair = len(operands) == 2 and rank in (1, 2)  # noqa: PLR2004
-        return operands[2 - rank] if is_pair else None
-    return operands[0] if len(operands) == 1 else None
+        return position != term.rank
+    return True
 
 
 def _reckoned(term: Term, number: int) -> int:
@@ -101,17 +111,30 @@ def _reckoned(term: Term, number: int) -> int:
     return number + term.step
 
 
-def _values_without(operands: tuple[Operand, ...], field: str, episode: Episode) -> Values:
-    """Return what is left of a field's values, or of the things, when some are set aside."""
+def _values_without(operands: Sequence[Operand], field: str, episode: Episode) -> Values:
+    """Return the values of a field that are left when some values, or things, are set aside."""
     described = [operand for operand in operands if isinstance(operand, Described)]
-    if not described:
-        return _possible_values(field, episode).difference(operands)
-    aside = [_described_thing(operand, episode) for operand in described]
-    things = candidates_in(episode.scene, get_task(episode.task).commands.pointed)
-    left = [thing for thing in things if thing not in aside]
-    if None in aside or len(left) != 1:
+    if described:
+        return _values_of_last_thing(described, field, episode)
+    return _possible_values(field, episode).difference(operands)
+
+
+def _values_of_last_thing(aside: Sequence[Described], field: str, episode: Episode) -> Values:
+    """Return the values of the only thing that none of some descriptions fits; empty if unclear."""
+    set_aside = [_described_thing(description, episode) for description in aside]
+    if None in set_aside:
         return frozenset()
-    return _values_of_thing(left[0], field, episode)
+    things = candidates_in(episode.scene, get_task(episode.task).commands.pointed)
+    left = [thing for thing in things if thing not in set_aside]
+    return _values_of_thing(left[0], field, episode) if len(left) == 1 else frozenset()
+
+
+def _listed_values(term: Term, field: str, episode: Episode) -> Values:
+    """Return the values of a field for which any operand of a term stands."""
+    found: set[Value] = set()
+    for operand in term.operands:
+        found |= _operand_values(operand, field, episode)
+    return frozenset(found)
 
 
 def _operand_values(operand: Operand, field: str, episode: Episode) -> Values:
@@ -123,29 +146,29 @@ def _operand_values(operand: Operand, field: str, episode: Episode) -> Values:
 
 
 def _described_thing(described: Described, episode: Episode) -> SceneObject | None:
-    """Return the only thing that fits a description; None if none is clear by the margin."""
-    kind = get_task(episode.task).commands.pointed
+    """Return the only thing in the scene that fits a description; None if there is no such one."""
+    kind_of_thing = get_task(episode.task).commands.pointed
     if described.kind == "place":
-        return things_at(episode.scene, kind, described.frame).get(described.phrase)
-    for found in spoken_clues(episode.scene, kind):
+        return things_at(episode.scene, kind_of_thing, described.frame).get(described.phrase)
+    for found in spoken_clues(episode.scene, kind_of_thing):
         if found.clue.words == described.phrase:
             return found.thing
     return None
 
 
 def _values_of_thing(thing: SceneObject, field: str, episode: Episode) -> Values:
-    """Return the values of a field by which a goal would ask for a thing: its color."""
-    kind = get_task(episode.task).commands.pointed
-    return frozenset(
-        color
-        for color in _possible_values(field, episode)
-        if thing in things_of_color(episode.scene, kind, str(color))
-    )
+    """Return the colors by which a goal can ask for a thing: of a container, those under it."""
+    kind_of_thing = get_task(episode.task).commands.pointed
+    found: set[Value] = set()
+    for color in _possible_values(field, episode):
+        if thing in things_of_color(episode.scene, kind_of_thing, str(color)):
+            found.add(color)
+    return frozenset(found)
 
 
 def _possible_values(field: str, episode: Episode) -> Values:
-    """Return all values that the scene's goals have in the slot of a field."""
-    slot = field.partition(".")[0]
+    """Return the values that a field's slot has in any goal of the scene."""
+    slot = field.partition(".")[0]  # of "colors.1", the second color
     found: set[Value] = set()
     for goal in goals_of(episode):
         found.update(value.value for value in values_of_goal(goal) if value.slot == slot)
