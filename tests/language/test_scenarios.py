@@ -402,7 +402,7 @@ def test_any_of_the_asides_of_a_scenario_can_be_said_before_the_others():
 def test_a_list_and_a_position_in_it_before_the_command_give_the_value():
     """*It's the second one's turn, so lift the container over it.*"""
     words, scenes = task_scenarios("VideoUnmask"), scenes_of("VideoUnmask", 0)[::10]
-    (report,) = check_scenarios(words, "cube of the day", scenes)
+    (report,) = check_scenarios(words, "video series", scenes)
     assert report.scenes > report.broken.total() == 0
 
 
