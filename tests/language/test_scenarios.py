@@ -391,7 +391,7 @@ def test_nobody_says_that_many_times_of_one():
 
 def test_any_of_the_asides_of_a_scenario_can_be_said_before_the_others():
     found = defaultdict(set)
-    for index in range(120):
+    for index in range(240):
         episode = get_episode("StopCube", "random", index)
         said = instruct_with(episode, InstructionOptions("contextual", language=4))
         (aside,) = (one.text for one in said.utterances if one.stage == "distractor")

@@ -1,6 +1,6 @@
-"""Choose what is said of an episode: how the goal follows, the class of expression, the scenario.
+"""Choose what is said of an episode: how the goal follows, then the scenario.
 
-In this order, and all equally likely, so that neither class nor frame goes with a value.
+All are equally likely, so that no frame goes with a value.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from roboirg.language.scenarios.introduced import (
     named,
     several,
 )
-from roboirg.language.scenarios.markup import Slot, Text, slots_said
+from roboirg.language.scenarios.markup import Slot, slots_said
 from roboirg.language.scenarios.scenario import PERSON, Scenario
 from roboirg.language.settings.grounded import clues_of
 from roboirg.language.settings.reasoning import in_turn
@@ -41,13 +41,11 @@ class Chosen(NamedTuple):
     Attributes:
         scenario: the scenario.
         introduced: the values that its words name.
-        first: the words for the first of its fields.
         remark: the name of the remark that chooses; empty if none does.
     """
 
     scenario: Scenario
     introduced: Introduced
-    first: Text
     remark: str
 
 
@@ -75,17 +73,13 @@ def choose(
         sayable = [_in_turn(request, sayable)]
     by_frame = {scenario.fields.frame: scenario for way in sayable for scenario in way.scenarios}
     purpose = setting.removeprefix("direct-")
-    kinds = {kind: kind for scenario in by_frame.values() for kind in scenario.classes}
-    kind = sampler.pick_named(f"{purpose} class", kinds)
-    of_kind = {frame: scenario for frame, scenario in by_frame.items() if kind in scenario.classes}
-    scenario = sampler.pick_named(f"{purpose} scenario", of_kind)
+    scenario = sampler.pick_named(f"{purpose} scenario", by_frame)
     offer = next(way.offer for way in sayable if scenario in way.scenarios)
-    words = sampler.pick(f"{purpose} words", scenario.classes[kind])
     values = {**goal_values(request), **offer.values}
     if offer.listed is None and scenario.fields.list:
         values |= several("list", _list(request, scenario))
     values |= _people(request, scenario)
-    return Chosen(scenario, Introduced(values, offer.notes), words, offer.remark)
+    return Chosen(scenario, Introduced(values, offer.notes), offer.remark)
 
 
 def _in_turn(request: InstructionRequest, sayable: Sequence[_Sayable]) -> _Sayable:

@@ -82,14 +82,12 @@ class Scenario(msgspec.Struct, frozen=True):
         texts: its sentences by field, ``say.color`` has several.
         people: who can be spoken of, each with his or her pronouns; empty if nobody is.
         said: the fields of the command that point back.
-        classes: the words for the first of these, by their class of expression.
     """
 
     fields: ScenarioFields
     texts: Mapping[str, tuple[Text, ...]]
     people: tuple[Texts, ...]
     said: Texts
-    classes: Mapping[str, tuple[Text, ...]]
 
     def text(self, field: str) -> Text:
         """Return the only sentence of a field; empty if it has none."""

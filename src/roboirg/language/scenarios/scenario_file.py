@@ -16,7 +16,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.core.word_pools import PoolName
 from roboirg.language.phrases import TaggedText
-from roboirg.language.scenarios.markup import Pointer, Text, parse, pointers_in, slots_in
+from roboirg.language.scenarios.markup import Pointer, Text, parse, slots_in
 from roboirg.language.scenarios.scenario import (
     PEOPLE,
     REMARKS,
@@ -132,11 +132,7 @@ def _scenario(
         mistakes += [f"{where} {one}." for one in _unmet(fields, texts, said, stated)]
     if fields is None or mistakes:
         return None
-    classes: dict[str, tuple[Text, ...]] = {}
-    for one in texts[f"say.{said[0]}"]:
-        kind = next((pointer.expression for pointer in pointers_in(one)), "")
-        classes[kind] = (*classes.get(kind, ()), one)
-    return Scenario(fields, texts, _people(fields, texts), said, classes)
+    return Scenario(fields, texts, _people(fields, texts), said)
 
 
 def _people(

@@ -128,9 +128,10 @@ def say_chosen(
         notes["stages"] = list(options.stages)
         if contextual.DISTRACTOR in options.stages:
             notes |= {"distractor": options.distractor, "distractors": options.distractors}
-    said = {scenario.said[0]: chosen.first}
-    for name in scenario.said[1:]:
-        said[name] = request.sampler.pick(f"{name} words", scenario.texts[f"say.{name}"])
+    said = {
+        name: request.sampler.pick(f"{name} words", scenario.texts[f"say.{name}"])
+        for name in scenario.said
+    }
     lead, remark = _lead(request, chosen)
     before = speech.phrase(lead, resolved=request.resolved)
     fields = {name: speech.field(name, text, remark) for name, text in said.items()}
