@@ -20,6 +20,7 @@ UNFAIR = [
     ({"language_version": "2"}, "Mixed versions of the language: 1, 2."),
     ({"environment_version": 99}, "Mixed versions of the environment: 1, 99."),
 ]
+WORDS = "PickXtimes/test@0a", "PickXtimes/test@1b", "StopCube/test@2c", "PickXtimes/train@3d"
 APART = [
     ({"policy_version": "new"}, "Mixed versions of {}: new, unknown."),
     (
@@ -58,3 +59,19 @@ def test_each_difference_is_one_sentence(result, policy, fields, sentence) -> No
             assert str(refused.value) == found[0]
         else:
             compare(*sides)
+
+
+def test_other_words_are_refused_where_task_and_pool_are_the_same_and_split_no_rows(result) -> None:
+    first, same_task, other_task, other_pool = (result(words=words) for words in WORDS)
+    no_words = result(episode=1)  # a language whose words are code
+    assert not mixtures([first, other_task, other_pool, no_words])
+    (sentence,) = mixtures([first, other_task, same_task])
+    assert sentence == (
+        "Mixed words of a task and pool: PickXtimes/test@0a, PickXtimes/test@1b. They cannot be "
+        "compared, and rates average over them."
+    )
+    both = [("a", [first, other_task]), ("b", [result(words=WORDS[1], episode=1)])]
+    assert len(make_frame(both).names) == 1
+    frames = [make_frame([("a", [one])]) for one in (first, same_task)]
+    with pytest.raises(InvalidValueError, match=sentence[:60]):
+        compare(*frames)

@@ -109,6 +109,7 @@ def test_logs_are_copied_with_the_records_that_are_kept(tmp_path: Path) -> None:
     [
         ("language_version", "0.9", "language version of language 3 is 0.9 in the first"),
         ("environment_version", 7, "environment version is 7 in the first"),
+        ("words", "PickXtimes/test@0a", "words version of PickXtimes/test is PickXtimes/test@0a"),
         ("policy_version", "old", "policy version of random is old in the first"),
         (
             "server_version",
@@ -119,7 +120,7 @@ def test_logs_are_copied_with_the_records_that_are_kept(tmp_path: Path) -> None:
     ],
 )
 def test_versions_are_not_mixed(tmp_path: Path, field: str, value: object, words: str) -> None:
-    record = some()[0]
+    record = replace(some()[0], words="PickXtimes/test@1b")
     is_policy = field == "policy_version"
     odd = with_version(record, "old") if is_policy else replace(record, **{field: value})
     one, other = fill(tmp_path / "a", record), fill(tmp_path / "b", odd)

@@ -30,8 +30,9 @@ from roboirg.core.errors import InvalidValueError, RenderDeviceError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.evaluation.plan.stored_plans import read_plan, read_plans
+from roboirg.evaluation.play import episode_record
 from roboirg.evaluation.records.record import ErrorKind, Job, Record
-from roboirg.evaluation.records.record_codec import StoreError
+from roboirg.evaluation.records.record_codec import StoreError, encode
 from roboirg.evaluation.records.run_files import earlier_plans
 from roboirg.evaluation.records.store import (
     RECORDS_FILE,
@@ -231,6 +232,50 @@ def test_a_record_of_another_version_is_not_stored(tmp_path: Path, field: str) -
     with pytest.raises(StoreError, match=f"with {what} version 7, .* was not stored"):
         run_plan(plan, tmp_path, elsewhere, InProcess())
     assert not (tmp_path / RECORDS_FILE).read_bytes()
+
+
+def test_other_words_of_the_same_version_are_neither_resumed_nor_stored(tmp_path: Path) -> None:
+    plan = changed(small_plan(1), language=4).checked()
+    (words,) = plan.words
+    other = "PickXtimes/test@0a0a0a0a0a0a"
+    sentence = f"words version {other}, but this roboirg has version {words}; "
+
+    def elsewhere(job: Job) -> Record:
+        return replace(FakePlay()(job), words=other)
+
+    with pytest.raises(StoreError, match=f"A worker .* {sentence}the record was not stored"):
+        run_plan(plan, tmp_path / "worker", elsewhere, InProcess())
+    run_plan(plan, tmp_path, FakePlay(), InProcess())
+    assert {record.words for record in read_records(tmp_path)} == {words}
+    assert read_plan(tmp_path) == plan
+    path = tmp_path / RECORDS_FILE
+    path.write_text(path.read_text().replace(f'"words":"{words}"', f'"words":"{other}"'))
+    with pytest.raises(StoreError, match=f"holds episodes of {sentence}choose another --out"):
+        run_plan(plan, tmp_path, FakePlay(), InProcess())
+
+
+def test_plans_and_records_of_language_3_have_no_words() -> None:
+    plan = small_plan(1).checked()
+    record = FakePlay()(plan.jobs()[0])
+    assert not record.words
+    assert b'"words"' not in encode(record)
+    assert '"words"' not in plan.model_dump_json()
+
+
+def test_the_fingerprint_of_the_code_sees_data_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "roboirg"
+    monkeypatch.setattr(episode_record, "__file__", str(folder / "a" / "b" / "module.py"))
+    folder.mkdir()
+    found = set()
+    for name, text in (("a.py", "1"), ("words.toml", "1"), ("words.toml", "2")):
+        (folder / name).write_text(text)
+        found.add(episode_record.code_fingerprint.__wrapped__())
+    assert len(found) == 3
+    (folder / "__pycache__").mkdir()
+    (folder / "__pycache__" / "a.pyc").write_text("1")
+    assert episode_record.code_fingerprint.__wrapped__() in found
 
 
 @pytest.mark.parametrize(("error", "place"), [("infrastructure", 1), ("environment", -1)])

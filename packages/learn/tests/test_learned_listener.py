@@ -133,6 +133,13 @@ def plan_of(**changes):
     return few._replace(**changes)
 
 
+def test_a_plan_of_language_4_names_the_words_of_its_tasks(torch):
+    version, words = plan_of(language=4).about["language_version"].split()
+    assert version.startswith("4.")
+    assert words.startswith("StopCube/train@")
+    assert plan_of().about["language_version"].startswith("3.")
+
+
 @pytest.fixture
 def few(torch, monkeypatch):
     """Few episodes of each split, and two listeners in a study."""

@@ -12,6 +12,7 @@ Makeup = tuple[tuple[str, str], ...]
 options that change what it sees or does, but not those with their defaults. Empty if unknown."""
 
 POLICY = "policy"
+WORDS = "words version"  # differs if the words of a task and pool do
 _DEFAULT = "at its default"
 
 
@@ -40,6 +41,7 @@ class Versions(NamedTuple):
         policy_version: distinguishes it from an earlier policy of the same name.
         server_version: that the policy's server reported, or `NO_VERSION`.
         seed: of the scene.
+        words_version: which words of a task and pool were said, in a language of data files.
     """
 
     makeup: Makeup = ()
@@ -48,6 +50,7 @@ class Versions(NamedTuple):
     policy_version: str | None = None
     server_version: str | None = None
     seed: int | None = None
+    words_version: str | None = None
 
     def differences(self, other: Versions) -> list[Mismatch]:
         """Return all in which two differ, in the order of the fields."""

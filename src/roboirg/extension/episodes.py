@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Goal, Split
 from roboirg.core.instruction_options import DEFAULT_LANGUAGE, InstructionOptions
 from roboirg.core.subgoal_words import read_subgoal
-from roboirg.language import FORMS, LANGUAGE_VERSIONS
+from roboirg.language import FORMS
+from roboirg.language.scenarios.identity import language_label
 from roboirg.language.settings import all_settings, plain_settings
 from roboirg.language.variants import instructions
 from roboirg.policies.planners.model_planners import merge_keyframes
@@ -17,13 +18,13 @@ from roboirg.tasks.splits.splits import SIZES, get_episode
 
 __all__ = [
     "ENVIRONMENT_VERSION",
-    "LANGUAGE_VERSIONS",
     "Episode",
     "Goal",
     "all_settings",
     "episodes_of",
     "goal_schema",
     "goals_of",
+    "language_label",
     "merge_keyframes",
     "plain_settings",
     "read_subgoal",

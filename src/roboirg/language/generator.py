@@ -31,6 +31,7 @@ from roboirg.language.request import (
     NoCommandError,
 )
 from roboirg.language.scenarios import in_language_4
+from roboirg.language.scenarios.identity import words_of
 from roboirg.language.settings import all_settings, get_setting, settings_of
 from roboirg.language.settings.setting import Setting
 from roboirg.language.template_sampler import sampler_of
@@ -213,6 +214,9 @@ def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> In
     """Return the instruction that has the words of a request."""
     utterances, mentions = _spoken(spec, as_written=bool(request.filled))
     notes: dict[str, object] = {"wordings": request.options.wordings, "pool": request.pool}
+    words = words_of(request.task.name, request.pool, request.options.language)
+    if words:
+        notes["words"] = words
     if request.filled:
         command = request.filled[-1]
         notes["command"] = command.text

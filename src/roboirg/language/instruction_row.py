@@ -58,6 +58,7 @@ def row(episode: Episode, instruction: Instruction) -> ExportRow:
         "pool": metadata["pool"],
         "command_template": metadata["command"],
         "language_version": metadata["language_version"],
+        "words_version": metadata.get("words", "none"),
     }
 
 

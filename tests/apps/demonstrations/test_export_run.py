@@ -165,7 +165,7 @@ def test_a_trajectory_s_name_has_all_that_it_depends_on(make_plan):
 def test_a_stopped_export_of_another_version_is_another_one(make_plan, monkeypatch):
     found = {make_plan().fingerprint()}
     for name, other in (
-        ("LANGUAGE_VERSIONS", {3: "another"}),
+        ("language_label", lambda *_: "another"),  # which names the words of each task
         ("ENVIRONMENT_VERSION", "another"),
         ("TRAJECTORY_VERSION", "another"),
     ):

@@ -25,6 +25,7 @@ from roboirg.evaluation.records.run_files import PLAN_FILE
 from roboirg.evaluation.records.store import read_records
 from roboirg.evaluation.run.executor import InProcess
 from roboirg.evaluation.run.runner import run_plan
+from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.main import app
 
 pytestmark = pytest.mark.sim
@@ -78,6 +79,41 @@ def test_what_was_altered_does_not_hold(name: str, honest: Path, tmp_path: Path)
     forge(forged, forgery, random.Random(name))
     (found, *_) = verify_run(forged).checks
     assert words in "\n".join(found.findings)
+
+
+def test_words_that_are_not_installed_are_not_checked_and_the_verdict_is(
+    honest: Path, tmp_path: Path
+) -> None:
+    def other_words(lines: Lines, _folder: Path, _rng: random.Random) -> Lines:
+        for line in lines:
+            line["options"]["language"] = 4
+            line.update(language_version=LANGUAGE_VERSIONS[4], words="StopCube/test@0a0a0a0a0a0a")
+        return lines
+
+    folder = tmp_path / "other"
+    shutil.copytree(honest, folder)
+    (folder / PLAN_FILE).unlink()
+    forge(folder, other_words, random.Random(0))
+    found = verify_run(folder)
+    assert (found.holds, found.verdicts) == (True, {"exact": found.records})
+    note = f"were not checked in {found.records} of the records: this roboirg has other words."
+    assert found.notes[-1] == f"Words, and why episodes failed, {note}"
+    printed = CliRunner().invoke(app, ["leaderboard", "verify", str(folder)]).output
+    assert printed.endswith("All that was checked holds.\n")
+    forge(folder, FORGERIES["failure to success"][0], random.Random(0))
+    assert not verify_run(folder).holds
+
+
+def test_a_record_of_language_3_with_words_of_another_does_not_hold(
+    honest: Path, tmp_path: Path
+) -> None:
+    def with_words(lines: Lines, _folder: Path, _rng: random.Random) -> Lines:
+        return [{**line, "words": "StopCube/test@0a0a0a0a0a0a"} for line in lines]
+
+    shutil.copytree(honest, tmp_path / "forged")
+    forge(tmp_path / "forged", with_words, random.Random(0))
+    (check, _) = verify_run(tmp_path / "forged", sample=0.0).checks
+    assert check.findings[0].startswith("words: the record says 'StopCube/test@0a0a0a0a0a0a'")
 
 
 def test_a_record_from_before_attempts_were_watched_for_holds(honest: Path, tmp_path: Path) -> None:

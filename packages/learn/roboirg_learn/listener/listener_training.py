@@ -14,9 +14,9 @@ from pydantic import NonNegativeInt, PositiveInt
 
 from roboirg.extension.episodes import (
     ENVIRONMENT_VERSION,
-    LANGUAGE_VERSIONS,
     Episode,
     episodes_of,
+    language_label,
 )
 from roboirg.extension.sight import LabeledView
 from roboirg_learn.labeled_views import draw_missing, look, read_views
@@ -88,7 +88,7 @@ class TrainingPlan(NamedTuple):
         """All that a listener depends on, as plain data."""
         about = self._asdict() | {"tasks": list(self.tasks), "settings": list(self.settings)}
         del about["seeds"], about["language"]
-        about["language_version"] = LANGUAGE_VERSIONS[self.language]
+        about["language_version"] = language_label(self.tasks, self.words, self.language)
         about["environment_version"] = ENVIRONMENT_VERSION
         return about
 

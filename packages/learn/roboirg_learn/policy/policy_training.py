@@ -21,7 +21,12 @@ from roboirg.extension.commands import (
     short_hash,
     write_atomically,
 )
-from roboirg.extension.episodes import ENVIRONMENT_VERSION, LANGUAGE_VERSIONS, Episode, episodes_of
+from roboirg.extension.episodes import (
+    ENVIRONMENT_VERSION,
+    Episode,
+    episodes_of,
+    language_label,
+)
 from roboirg.extension.sight import ExpertRecording, decode_png, points_of, record_expert
 from roboirg_learn.listener.encoders import ENCODERS
 from roboirg_learn.listener.listener_net import ListenerNet
@@ -150,7 +155,7 @@ def about_policy(plan: PolicyPlan) -> dict[str, Any]:
         "tasks": list(plan.tasks),
         "settings": list(plan.settings),
         "words": plan.words if plan.settings else WORDLESS,
-        "language_version": LANGUAGE_VERSIONS[plan.language],
+        "language_version": language_label(plan.tasks, plan.words, plan.language),
     }
 
 

@@ -14,7 +14,7 @@ from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, load_facts
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.version import __version__
 from roboirg.core.word_pools import pool_of
-from roboirg.language import LANGUAGE_VERSIONS
+from roboirg.language.scenarios.identity import language_label
 from roboirg.util.media import CONTROL_RATE
 
 _STORED = {
@@ -72,8 +72,8 @@ def card_text(
 
 
 def _head_line(plan: ExportPlan) -> str:
-    language = LANGUAGE_VERSIONS[plan.options.language]
     pool = pool_of(plan.split, plan.options.wordings)
+    language = language_label(plan.tasks, pool, plan.options.language)
     rate = f"{CONTROL_RATE} frames per second, one per control step."
     if plan.actions == "waypoint":
         rate = f"A frame per waypoint; time stamps count frames, {CONTROL_RATE} to the second."

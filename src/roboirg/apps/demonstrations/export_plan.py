@@ -18,9 +18,9 @@ from roboirg.core.field_types import check_whole
 from roboirg.core.instruction_options import InstructionOptions, identifying
 from roboirg.core.observations import CAMERAS, check_cameras
 from roboirg.core.word_pools import pool_of
-from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.language.generator import instruct_with
 from roboirg.language.instruction_row import row
+from roboirg.language.scenarios.identity import language_label
 from roboirg.language.settings import all_settings
 from roboirg.language.variants import instructions
 from roboirg.tasks.splits.splits import get_episode
@@ -143,7 +143,9 @@ class ExportPlan:
     def fingerprint(self) -> str:
         """Return a hash of everything that determines the dataset."""
         versions = [
-            LANGUAGE_VERSIONS[self.options.language],
+            language_label(
+                self.tasks, pool_of(self.split, self.options.wordings), self.options.language
+            ),
             ENVIRONMENT_VERSION,
             TRAJECTORY_VERSION,
         ]

@@ -9,12 +9,14 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from roboirg.core.arms import OTHER_GOAL, TOLD
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import Observation
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.evaluation.episode_errors import EpisodeError
 from roboirg.evaluation.play.call_guard import CallGuard
 from roboirg.evaluation.play.episode_record import begin_record
-from roboirg.evaluation.play.job_instruction import PreparedJob
+from roboirg.evaluation.play.job_instruction import PreparedJob, has_other_words
 from roboirg.evaluation.play.rollout import play_with
 from roboirg.evaluation.records.action_log import ActionLog
 from roboirg.evaluation.records.record import Job, Record
@@ -53,11 +55,6 @@ class ReplayPolicy:
         return answer
 
 
-def unplayed(record: Record) -> Record:
-    """Return the record of the same job before anything is played."""
-    return begin_record(PreparedJob(job_of(record)))
-
-
 def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
     """Play the actions of a record; return the record that they lead to, and its own actions.
 
@@ -89,5 +86,13 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
 
 
 def job_of(record: Record) -> Job:
-    """Return what was played, without the address of the policy."""
-    return msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)
+    """Return what was played, without the address of the policy.
+
+    The explicit command of the goal stands for words that are not installed: no action depends on
+    what is said, and the installed words may not be able to say it.
+    """
+    job = msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)
+    if has_other_words(record):
+        arm = OTHER_GOAL if job.arm == OTHER_GOAL else TOLD
+        return msgspec.structs.replace(job, options=InstructionOptions(), arm=arm)
+    return job

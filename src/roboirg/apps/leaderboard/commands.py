@@ -117,7 +117,9 @@ def _print(found: Verification) -> None:
         typer.echo(f"… and {counted(len(found.checks) - _MOST_SHOWN, 'more record')}.")
     wrong = len(found.checks) + len(found.missing)
     fails = f"{counted(wrong, 'thing')} {verb_for(wrong, 'do')} not hold."
-    all_hold = "Everything holds." if played == found.records else "All that was checked holds."
+    all_hold = "All that was checked holds."
+    if played == found.records and not found.notes:
+        all_hold = "Everything holds."
     typer.echo(all_hold if found.holds else fails)
 
 

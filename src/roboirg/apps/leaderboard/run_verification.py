@@ -18,6 +18,7 @@ from roboirg.apps.leaderboard.record_check import (
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
 from roboirg.evaluation.plan.stored_plans import read_plans
+from roboirg.evaluation.play.job_instruction import has_other_words
 from roboirg.evaluation.records.record import Summary
 from roboirg.evaluation.records.record_codec import identity_key, read_summary
 from roboirg.evaluation.records.store import StoredRun
@@ -102,6 +103,11 @@ def verify_run(
         notes.append(
             f"Of those that do not hold, {moved:,} were played on another kind of processor, where "
             "contacts can end differently: verify them on a machine of that kind."
+        )
+    if unread := sum(map(has_other_words, run.newest)):
+        notes.append(
+            f"Words, and why episodes failed, were not checked in {unread} of the records: this "
+            "roboirg has other words."
         )
     return Verification(
         records=len(run.newest),

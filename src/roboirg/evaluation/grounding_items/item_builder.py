@@ -10,7 +10,7 @@ from typing import Any, cast
 
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.word_pools import POOLS
+from roboirg.core.word_pools import POOLS, pool_of
 from roboirg.evaluation.grounding_items.goal_choices import draw_choices
 from roboirg.evaluation.grounding_items.grounding_item import LETTERS, GroundingItem
 from roboirg.evaluation.grounding_items.media_store import EpisodeMedia
@@ -18,6 +18,7 @@ from roboirg.evaluation.grounding_items.referents import is_ordered, noun, point
 from roboirg.language import instruct_with
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction import command_expressions
+from roboirg.language.scenarios.identity import language_label
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.templates import LANGUAGE_VERSIONS
 from roboirg.policies.vlm.goal_schema import goal_schema
@@ -81,7 +82,12 @@ def make_items(
 def item_id(episode: Episode, options: InstructionOptions) -> str:
     """Return the name of an item. It is a hash, which gives nothing away about the answer."""
     *words, language = astuple(options)
-    content = (episode.key, *words, LANGUAGE_VERSIONS[language], ENVIRONMENT_VERSION)
+    content = (
+        episode.key,
+        *words,
+        language_label([episode.task], pool_of(episode.split, options.wordings), language),
+        ENVIRONMENT_VERSION,
+    )
     return "g" + hashlib.sha256(repr(content).encode()).hexdigest()[:ID_DIGITS]
 
 

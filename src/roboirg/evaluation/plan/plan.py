@@ -6,6 +6,7 @@ import contextlib
 import functools
 import itertools
 import math
+import operator
 import os
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -208,6 +209,8 @@ class Plan(BaseModel):
         WorkerNeeds(),
         "What a worker reserves on a machine of a Ray cluster, and what it gets from this one.",
     )
+    # Which words each task has, as in records: no option, but what `checked` finds installed.
+    words: Names = Field(default=(), exclude_if=operator.not_)
 
     @model_validator(mode="before")
     @classmethod
@@ -333,8 +336,8 @@ class Plan(BaseModel):
             for setting in () if self._has_groups else self.setting_names:
                 get_setting(setting, tasks.get_task(task))
         jobs = list(self._instruction_jobs())
-        for job in jobs:
-            instruct_job(job)  # raises if the options cannot express the episode
+        # Raises if the options cannot express an episode.
+        words = {str(instruct_job(job).metadata.get("words", "")) for job in jobs} - {""}
         if not jobs:
             raise InvalidValueError(
                 f"There is nothing to play: {', '.join(self.settings)} cannot express any of "
@@ -344,7 +347,7 @@ class Plan(BaseModel):
         limit = self.hosting.policy_timeout_s
         settings = replace(self.hosting, policy_process="own").settings
         opened = [open_policy(policy, limit, settings) for policy in self.policies]
-        return self.model_copy(update={"policies": tuple(opened)})
+        return self.model_copy(update={"policies": tuple(opened), "words": tuple(sorted(words))})
 
     def jobs(self, played: Iterable[Summary] = ()) -> tuple[Job, ...]:
         """Return every job, ordered by policy, task, episode, setting, form, stages and seed.
@@ -528,9 +531,11 @@ class PlanOption(NamedTuple):
 def plan_options() -> Iterator[PlanOption]:
     """Yield all options, those of sections that stand alone in the place of the section."""
     for name, one in Plan.model_fields.items():
+        if one.description is None:  # nothing to choose
+            continue
         if name not in FLAT.values():
             default = None if one.is_required() or name in SECTIONS else one.default
-            yield PlanOption(name, None, default, str(one.description))
+            yield PlanOption(name, None, default, one.description)
             continue
         for option in fields(SECTIONS[name]):
             if option.name in FLAT:

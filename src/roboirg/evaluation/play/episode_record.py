@@ -12,6 +12,7 @@ from itertools import zip_longest
 from pathlib import Path
 
 import msgspec
+from msgspec import UNSET
 
 from roboirg import language
 from roboirg.core.delivery import TURNS
@@ -45,6 +46,8 @@ def begin_record(prepared: PreparedJob) -> Record:
     """
     job, words = prepared.job, prepared.words
     policy = job.ref or unknown_policy(job.policy)
+    # Exactly what a reader of the file gets.
+    metadata = json.loads(json.dumps(dict(words.instruction.metadata)))
     return Record(
         **{**msgspec.structs.asdict(job), "ref": replace(policy, needs=None, problem=None)},
         seed=words.episode.seed,
@@ -56,9 +59,9 @@ def begin_record(prepared: PreparedJob) -> Record:
         mentions=tuple(MentionSpan(**asdict(one)) for one in words.instruction.mentions),
         command=words.command,
         goal=dict(words.episode.goal.as_mapping()),
-        # Exactly what a reader of the file gets.
-        metadata=json.loads(json.dumps(dict(words.instruction.metadata))),
-        language_version=str(words.instruction.metadata["language_version"]),
+        metadata=metadata,
+        language_version=metadata["language_version"],
+        words=metadata.get("words", UNSET),
         environment_version=ENVIRONMENT_VERSION,
         package_version=__version__,
         code=code_fingerprint(),
@@ -162,10 +165,11 @@ def utc_now() -> str:
 
 @functools.cache
 def code_fingerprint() -> str:
-    """Return a shortened SHA-256 of the names and bytes of the package's Python files."""
+    """Return a shortened SHA-256 of the names and bytes of the package's files, data included."""
     digest = hashlib.sha256()
     root = Path(__file__).parents[2]
-    for path in sorted(root.rglob("*.py")):
-        digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
-        digest.update(path.read_bytes() + b"\0")
+    for path in sorted(root.rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
+            digest.update(path.read_bytes() + b"\0")
     return digest.hexdigest()[:DIGITS]

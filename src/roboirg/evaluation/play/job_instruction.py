@@ -8,11 +8,13 @@ from functools import cached_property
 
 from roboirg.core.arms import AGAIN, TOLD
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
-from roboirg.core.versions import Mismatch, Versions
+from roboirg.core.versions import WORDS, Mismatch, Versions
+from roboirg.core.word_pools import pool_of
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.language.arms import TrialWords, arm_episode, say_arm, word_trial
 from roboirg.language.instruction import Instruction
+from roboirg.language.scenarios.identity import words_of
 from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.tasks.splits import splits
 
@@ -57,13 +59,24 @@ def _open_wordings(job: Job) -> None:
 
 
 def other_versions(record: Summary) -> list[Mismatch]:
-    """Return where a record's language or environment is not of the installed version."""
-    language = LANGUAGE_VERSIONS.get(record.options.language, "unknown")
-    installed = Versions(language_version=language, environment_version=ENVIRONMENT_VERSION)
+    """Return where a record's language, words or environment are not the installed ones."""
+    pool = pool_of(record.split, record.options.wordings)
+    installed = Versions(
+        environment_version=ENVIRONMENT_VERSION,
+        language_version=LANGUAGE_VERSIONS.get(record.options.language, "unknown"),
+        words_version=words_of(record.task, pool, record.options.language) or None,
+    )
     recorded = Versions(
-        language_version=record.language_version, environment_version=record.environment_version
+        environment_version=record.environment_version,
+        language_version=record.language_version,
+        words_version=record.words or None,
     )
     return recorded.differences(installed)
+
+
+def has_other_words(record: Summary) -> bool:
+    """Return whether a record's words are not those that this package has for its job."""
+    return WORDS in [mismatch.what for mismatch in other_versions(record)]
 
 
 def episode_policy_seed(policy_seed: int, episode_seed: int, arm: str = TOLD) -> int:

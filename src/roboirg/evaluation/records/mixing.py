@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import operator
 from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any, NamedTuple
@@ -20,12 +21,14 @@ class Trait(NamedTuple):
         plural: what several values are called.
         meaning: of several values.
         text: returns a value in words, or None if it fits all others.
+        owner: returns, of that text, what has the value; only its values should be the same.
     """
 
     path: str
     plural: str
     meaning: str
     text: Callable[[Any], str | None] = str
+    owner: Callable[[str], str] = lambda _: ""
 
 
 _UNFAIR = "They are kept apart and cannot be compared."
@@ -39,6 +42,12 @@ FAIRNESS = (
     Trait("arm", "arms", _UNFAIR),
     Trait("language_version", "versions of the language", _UNFAIR),
     Trait("environment_version", "versions of the environment", _UNFAIR),
+    Trait(
+        "words",
+        "words of a task and pool",
+        "They cannot be compared, and rates average over them.",
+        owner=lambda words: words.partition("@")[0],
+    ),
 )
 """What must be equal in a comparison of policies."""
 
@@ -77,6 +86,7 @@ def differing(
     """Yield a sentence for each of some traits of which results have several values."""
     for trait in traits:
         values = {*map(trait.text, {*map(operator.attrgetter(trait.path), results)})} - {None}
-        if len(values) > 1:
-            listed = ", ".join(sorted(map(str, values)))
-            yield f"Mixed {trait.plural}{owner}: {listed}. {trait.meaning}"
+        for _, texts in itertools.groupby(sorted(map(str, values)), trait.owner):
+            listed = list(texts)
+            if len(listed) > 1:
+                yield f"Mixed {trait.plural}{owner}: {', '.join(listed)}. {trait.meaning}"

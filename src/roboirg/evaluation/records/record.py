@@ -15,6 +15,7 @@ from dataclasses import replace
 from typing import Annotated, Any, Literal, Self, get_args
 
 import msgspec
+from msgspec import UNSET, UnsetType
 
 from roboirg.core.arms import TOLD
 from roboirg.core.delivery import PromptVerdict
@@ -304,6 +305,8 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
         server_version: that the policy's server reported; None if there is no server, if it
             reported none, or if the episode ended before.
         language_version: version of the instruction generator.
+        words: which words of the task and pool were said, such as ``PickXtimes/test@1a2b3c4d5e6f``;
+            unset in a language whose words are code, and then not in the line either.
         environment_version: version of scenes, rules and physics.
         package_version: version of roboirg.
         code: fingerprint of the package's files.
@@ -337,6 +340,7 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
     ref: PolicyRef
     server_version: Name | None = None
     language_version: Name
+    words: Name | UnsetType = UNSET
     environment_version: Whole
     package_version: Name
     code: Name = "unknown"

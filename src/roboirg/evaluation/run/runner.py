@@ -190,7 +190,9 @@ class _RunLoop:
                     waiting.insert(0 if record.error == "infrastructure" else len(waiting), job)
 
     def _store_record(self, job: Job, record: Record) -> None:
-        _check_record_version(record)
+        _refuse_other_versions(
+            record, f"A worker returned {record.slug} with", "the record was not stored"
+        )
         # Only code in the world's process can write this, such as a policy that patches the judge.
         if record.outcome == "success" and record.cause is not None:
             cause = format_cause("policy", f"a success came with a cause ({record.cause})")
@@ -224,13 +226,10 @@ class _RunLoop:
         return True
 
 
-def _check_record_version(record: Record) -> None:
-    """Refuse what a worker with another version of language or environment has played."""
+def _refuse_other_versions(record: Summary, found: str, end: str) -> None:
+    """Refuse a record of another language, of other words or of another environment."""
     for what, version, ours in other_versions(record):
-        raise StoreError(
-            f"A worker returned {record.slug} with {what} {version}, but this roboirg has "
-            f"version {ours}; the record was not stored."
-        )
+        raise StoreError(f"{found} {what} {version}, but this roboirg has version {ours}; {end}.")
 
 
 def _report_torn_line(store: RecordStore, reporter: Reporter) -> None:
@@ -256,11 +255,7 @@ def _warn_of_untrained(plan: Plan, reporter: Reporter) -> None:
 def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> None:
     """Refuse records of other versions of words, scenes or policies: rates must not mix them."""
     for record in records:
-        for what, version, ours in other_versions(record):
-            raise StoreError(
-                f"{folder} holds episodes of {what} {version}, but this roboirg has "
-                f"version {ours}; choose another --out."
-            )
+        _refuse_other_versions(record, f"{folder} holds episodes of", "choose another --out")
     for task, split, episode, seed in {
         (record.task, record.split, record.episode, record.seed) for record in records
     }:

@@ -18,6 +18,7 @@ settings; explicit is the command alone; the resolved form has the values in the
 ``choice``       what is said: derivation, then class of expression, then scenario
 ``introduced``   the values that the words name
 ``spoken``       the words
+``identity``     which words they are, by a digest
 ===============  =================================================================================
 """
 

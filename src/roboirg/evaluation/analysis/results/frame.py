@@ -136,6 +136,13 @@ COLUMNS: Mapping[str, FrameColumn] = {
         _field("duration_s", "decimal", "wall-clock time, seconds"),
         _field("started_at", "text", "ISO 8601, UTC"),
         _field("language_version", "text", "version of the words"),
+        FrameColumn(
+            "words",
+            "text",
+            "which words of the task and pool were said",
+            "a language whose words are code",
+            lambda one: one.words or None,
+        ),
         _field("environment_version", "number", "version of scenes, rules and physics"),
         _field("package_version", "text", "version of roboirg"),
         _field("render_device", "text", "what drew the pictures", "nothing was drawn"),
