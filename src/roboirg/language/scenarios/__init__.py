@@ -15,7 +15,7 @@ settings; explicit is the command alone; the resolved form has the values in the
 ``markup``       the marks in a sentence
 ``scenario``     the fields of the files; ``scenario_file`` reads and checks them
 ``derived``      how the goal of an episode can follow from something else
-``choice``       what is said: derivation, then class of expression, then scenario
+``choice``       what is said: derivation, then scenario
 ``introduced``   the values that the words name
 ``spoken``       the words
 ``identity``     which words they are, by a digest

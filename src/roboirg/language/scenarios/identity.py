@@ -39,11 +39,16 @@ def words_digest(task: str, pool: PoolName) -> str:
     words = task_scenarios(task)
     if words is None:
         return "none"
-    said: dict[str, object] = {f"{general().people} {general().distractors[pool]}": words.stated}
-    for (its_pool, fields), commands in words.commands.items():
-        if its_pool == pool:
-            said[f"{sorted(fields)}"] = commands
-    for scenario in words.scenarios:
-        if scenario.fields.pool == pool:
-            said[f"{scenario.fields} {scenario.said}"] = scenario.texts
+    commands = [
+        [sorted(fields), texts]
+        for (its_pool, fields), texts in words.commands.items()
+        if its_pool == pool
+    ]
+    scenarios = [
+        [repr(scenario.fields), scenario.texts]
+        for scenario in words.scenarios
+        if scenario.fields.pool == pool
+    ]
+    shared = [general().people, general().distractors[pool], words.stated]
+    said = [shared, sorted(commands), sorted(scenarios, key=repr)]
     return short_hash(json.dumps(said, sort_keys=True))
