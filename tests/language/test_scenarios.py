@@ -57,10 +57,11 @@ pool = "train"
 setting = "reasoning"
 derive.pattern = "number deduction"
 derive.relations = ["two fewer"]
-introduction = "{person} needs it done {reference:times}, and I did {step}."
-say.repeats = ["<them reference: until I have them all>"]
+introduction = "{person} needs {reference:photo}, and I took {step}."
+say.repeats = ["<each reference: [repeats: for the photo|once for each photo]>"]
 """
-OF_THEM = "each reference: once for each of them"
+PHOTOS = "[repeats: for the photo|once for each photo]"
+YEARS = "[repeats: for that year|once for each year]"
 
 
 def spoken(task, language=4):
@@ -88,9 +89,9 @@ def spoken(task, language=4):
             "<them color: it> of the class 'them'; in pointers.toml the words 'it' have the class",
         ),
         (
-            "<each repeats: once for every year>",
-            "<it repeats: once for every year>",
-            "the words 'once for every year' have the class 'each' for a number.",
+            f"<each repeats: {YEARS}>",
+            f"<it repeats: {YEARS}>",
+            f"the words {YEARS!r} have the class 'each' for a number.",
         ),
         ("<it color: it>.", "<it color it>.", "has a bracket that is no mark"),
         ("\ncue = ", "\nclue = ", "has the field 'clue'; the fields are competing, cue,"),
@@ -154,9 +155,9 @@ def test_every_mistake_of_a_file_is_named_by_scenario_and_field():
         (DIRECT, "{rival color} one", "{rival color} one {list}", "no competing remark"),
         (RIVAL, "Not <former list.0: the", "Not <latter list.1: the", "the class 'former' for a"),
         (RIVAL, "Do <former list.0: the former>", "Do <latter list.1: the latter>", "first point"),
-        (FEWER, "them reference: until I have them all", OF_THEM, "say.repeats: means"),
-        (FEWER, " {reference:times}", "", "says the same of another goal"),
-        (FEWER, "until", "unless", "is not in pointers"),
+        (FEWER, PHOTOS, "once for each of them", "say.repeats: means"),
+        (FEWER, " {reference:photo}", "", "says the same of another goal"),
+        (FEWER, "once for each", "once per", "is not in pointers"),
         *((DIRECT, "The cake", f"{words}, the cake", f"names {words.lower()}")
           for words in ("Twice", "On the left", "Once", "Four")),
     ],
