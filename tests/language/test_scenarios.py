@@ -18,7 +18,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS
 from roboirg.language import instruct, instruct_with, open_wordings
 from roboirg.language.arms import say_arm
-from roboirg.language.generator import find_refusal, request_of
+from roboirg.language.generator import find_refusal, request_of, spoken_instruction
 from roboirg.language.scenarios.choice import choose
 from roboirg.language.scenarios.scenario_file import (
     FOLDER,
@@ -26,6 +26,7 @@ from roboirg.language.scenarios.scenario_file import (
     read_task_scenarios,
     task_scenarios,
 )
+from roboirg.language.scenarios.spoken import say_chosen
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.variants import expressible_options
 from roboirg.tasks import all_tasks
@@ -380,14 +381,17 @@ def test_no_introduction_of_a_test_is_one_of_training_with_other_nouns():
 
 
 def test_nobody_says_that_many_times_of_one():
-    found = set()
-    for index, pool in itertools.product(range(150), POOLS):
-        episode = get_episode("PickXtimes", "random", index)
-        options = InstructionOptions("direct", language=4, wordings=pool)
-        said = instruct_with(episode, options).command
-        if "that many times" in said:
-            found.add(episode.goal["repeats"])
-    assert found == {2, 3, 4, 5}
+    words, found = task_scenarios("PickXtimes"), defaultdict(set)
+    for episode, scenario in itertools.product(scenes_of("PickXtimes", 0), words.scenarios):
+        if "that many times" in str(scenario.texts):
+            pool = scenario.fields.pool
+            options = InstructionOptions("direct", language=4, wordings=pool)
+            request = request_of(episode, options)
+            chosen = choose(request, "direct", [scenario])
+            said = spoken_instruction(request, say_chosen(request, words, chosen)).command
+            if "that many times" in said:
+                found[pool].add(episode.goal["repeats"])
+    assert found == {pool: {2, 3, 4, 5} for pool in POOLS}
 
 
 def test_any_of_the_asides_of_a_scenario_can_be_said_before_the_others():
