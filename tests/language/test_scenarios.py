@@ -18,7 +18,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS
 from roboirg.language import instruct, instruct_with, open_wordings
 from roboirg.language.arms import say_arm
-from roboirg.language.generator import find_refusal, request_of
+from roboirg.language.generator import find_refusal, request_of, spoken_instruction
 from roboirg.language.scenarios.choice import choose
 from roboirg.language.scenarios.scenario_file import (
     FOLDER,
@@ -26,6 +26,7 @@ from roboirg.language.scenarios.scenario_file import (
     read_task_scenarios,
     task_scenarios,
 )
+from roboirg.language.scenarios.spoken import say_chosen
 from roboirg.language.settings import all_settings, settings_of
 from roboirg.language.variants import expressible_options
 from roboirg.tasks import all_tasks
@@ -57,10 +58,11 @@ pool = "train"
 setting = "reasoning"
 derive.pattern = "number deduction"
 derive.relations = ["two fewer"]
-introduction = "{person} needs it done {reference:times}, and I did {step}."
-say.repeats = ["<them reference: until I have them all>"]
+introduction = "{person} needs {reference:photo}, and I took {step}."
+say.repeats = ["<each reference: [repeats: for the photo|once for each photo]>"]
 """
-OF_THEM = "each reference: once for each of them"
+PHOTOS = "[repeats: for the photo|once for each photo]"
+YEARS = "[repeats: for that year|once for each year]"
 
 
 def spoken(task, language=4):
@@ -88,9 +90,9 @@ def spoken(task, language=4):
             "<them color: it> of the class 'them'; in pointers.toml the words 'it' have the class",
         ),
         (
-            "<each repeats: once for every year>",
-            "<it repeats: once for every year>",
-            "the words 'once for every year' have the class 'each' for a number.",
+            f"<each repeats: {YEARS}>",
+            f"<it repeats: {YEARS}>",
+            f"the words {YEARS!r} have the class 'each' for a number.",
         ),
         ("<it color: it>.", "<it color it>.", "has a bracket that is no mark"),
         ("\ncue = ", "\nclue = ", "has the field 'clue'; the fields are competing, cue,"),
@@ -154,9 +156,9 @@ def test_every_mistake_of_a_file_is_named_by_scenario_and_field():
         (DIRECT, "{rival color} one", "{rival color} one {list}", "no competing remark"),
         (RIVAL, "Not <former list.0: the", "Not <latter list.1: the", "the class 'former' for a"),
         (RIVAL, "Do <former list.0: the former>", "Do <latter list.1: the latter>", "first point"),
-        (FEWER, "them reference: until I have them all", OF_THEM, "say.repeats: means"),
-        (FEWER, " {reference:times}", "", "says the same of another goal"),
-        (FEWER, "until", "unless", "is not in pointers"),
+        (FEWER, PHOTOS, "once for each of them", "say.repeats: means"),
+        (FEWER, " {reference:photo}", "", "says the same of another goal"),
+        (FEWER, "once for each", "once per", "is not in pointers"),
         *((DIRECT, "The cake", f"{words}, the cake", f"names {words.lower()}")
           for words in ("Twice", "On the left", "Once", "Four")),
     ],
@@ -379,14 +381,17 @@ def test_no_introduction_of_a_test_is_one_of_training_with_other_nouns():
 
 
 def test_nobody_says_that_many_times_of_one():
-    found = set()
-    for index, pool in itertools.product(range(150), POOLS):
-        episode = get_episode("PickXtimes", "random", index)
-        options = InstructionOptions("direct", language=4, wordings=pool)
-        said = instruct_with(episode, options).command
-        if "that many times" in said:
-            found.add(episode.goal["repeats"])
-    assert found == {2, 3, 4, 5}
+    words, found = task_scenarios("PickXtimes"), defaultdict(set)
+    for episode, scenario in itertools.product(scenes_of("PickXtimes", 0), words.scenarios):
+        if "that many times" in str(scenario.texts):
+            pool = scenario.fields.pool
+            options = InstructionOptions("direct", language=4, wordings=pool)
+            request = request_of(episode, options)
+            chosen = choose(request, "direct", [scenario])
+            said = spoken_instruction(request, say_chosen(request, words, chosen)).command
+            if "that many times" in said:
+                found[pool].add(episode.goal["repeats"])
+    assert found == {pool: {2, 3, 4, 5} for pool in POOLS}
 
 
 def test_any_of_the_asides_of_a_scenario_can_be_said_before_the_others():
