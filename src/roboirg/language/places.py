@@ -231,8 +231,9 @@ def _in_directions(things: Things, frame: Frame) -> Iterator[SpokenPlace]:
         alone = _only(things, ranking, start)
         yield from _said(PlaceClass.EXTREME, alone, words.alone, words.spot)
         for rank, ordinal in ORDINALS.items():
-            # The last one in a row is the first from the other end.
-            if words.row and rank < len(things) - 1:
+            # The last one in a row is the first from the other end. No one says "third closest".
+            is_said = rank == 1 or words.row != words.most
+            if words.row and is_said and rank < len(things) - 1:
                 thing = ranking.select(things, rank)
                 yield from _said(PlaceClass.RANK, thing, f"{ordinal} {words.row}")
 
@@ -286,13 +287,18 @@ def _way_between(first: SceneObject, second: SceneObject) -> Ranking:
 
 
 def _in_middle(things: Things) -> Iterator[SpokenPlace]:
-    """Yield the thing in the middle of an odd row, or the only one around the center."""
+    """Yield the only thing around the center; of an odd row, only if it is its middle, too."""
     words = "in the middle"
     near = nearness(_center_of(things).position)
-    yield from _said(PlaceClass.MIDDLE, _only(things, near, -_AROUND), words, words)
+    around = _only(things, near, -_AROUND)
+    if len(things) % 2 == 0:
+        yield from _said(PlaceClass.MIDDLE, around, words, words)
+        return
     row = directions("robot")[0].ranking
     middle = row.select(things, len(things) // 2)
-    if len(things) % 2 and middle is near.select(things, 0):
+    if middle is around:
+        yield from _said(PlaceClass.MIDDLE, middle, words, words)
+    elif middle is near.select(things, 0):
         yield from _said(PlaceClass.MIDDLE, middle, words)
 
 

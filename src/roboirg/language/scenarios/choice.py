@@ -172,22 +172,26 @@ def _direct(request: InstructionRequest) -> Iterator[Offer]:
 
 
 def _spatial(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield a place after a noun, and a spot, if there are such words for a thing of the goal."""
+    """Yield a spot of a thing of the goal; if none has any, a place after a noun."""
     colors = request.color_values
-    for form in (None, "spot"):
+    form: str | None = "spot"
+    drawn = _drawn_places(request, form)
+    if not drawn:
+        form = None
         drawn = _drawn_places(request, form)
-        if drawn:
-            # Of two things only that with the shorter words has a place.
-            at, place = min(drawn.items(), key=lambda item: len(item[1].said(form)))
-            words = place.said(form)
-            value = (IntroducedValue(colors[at].slot, "place", colors[at].value, words, form),)
-            notes: dict[str, object] = {
-                "landmarks": [words],
-                "landmark_classes": [int(place.kind)],
-                "frame": request.frame,
-            }
-            fields = [color.field for color in colors]
-            yield Offer(fields, {"place": value, f"place.{at}": value}, notes)
+    if not drawn:
+        return
+    # Of two things only that with the shorter words has a place.
+    at, place = min(drawn.items(), key=lambda item: len(item[1].said(form)))
+    words = place.said(form)
+    value = (IntroducedValue(colors[at].slot, "place", colors[at].value, words, form),)
+    notes: dict[str, object] = {
+        "landmarks": [words],
+        "landmark_classes": [int(place.kind)],
+        "frame": request.frame,
+    }
+    fields = [color.field for color in colors]
+    yield Offer(fields, {"place": value, f"place.{at}": value}, notes)
 
 
 def _drawn_places(request: InstructionRequest, form: str | None) -> dict[int, SpokenPlace]:
