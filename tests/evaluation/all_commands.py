@@ -30,7 +30,7 @@ WORDS = {
     "tasks": "",
     "show": "PickXtimes 0 --out {folder}/sheet.png",
     "language sample": "--out {folder}/rating --tasks StopCube --settings direct --anchors 1",
-    "language check-scenarios": "{scenarios} --scenario wish --seeds 0",
+    "language check-scenarios": "{scenarios} --scenario students --seeds 0",
     "language stats": "--tasks PickXtimes --split val",
     "language validate": "--tasks PickXtimes --split val",
     "language shortcuts": "--tasks StopCube --settings direct --learned",
