@@ -109,7 +109,11 @@ def test_logs_are_copied_with_the_records_that_are_kept(tmp_path: Path) -> None:
     [
         ("language_version", "0.9", "language version of language 3 is 0.9 in the first"),
         ("environment_version", 7, "environment version is 7 in the first"),
-        ("words", "PickXtimes/test@0a", "words version of PickXtimes/test is PickXtimes/test@0a"),
+        (
+            "words",
+            "PickXtimes/test@0a",
+            "words version of PickXtimes/test in language 3 is PickXtimes/test@0a",
+        ),
         ("policy_version", "old", "policy version of random is old in the first"),
         (
             "server_version",

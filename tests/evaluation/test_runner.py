@@ -252,6 +252,9 @@ def test_other_words_of_the_same_version_are_neither_resumed_nor_stored(tmp_path
     path.write_text(path.read_text().replace(f'"words":"{words}"', f'"words":"{other}"'))
     with pytest.raises(StoreError, match=f"holds episodes of {sentence}choose another --out"):
         run_plan(plan, tmp_path, FakePlay(), InProcess())
+    path.write_text(path.read_text().replace(f'"words":"{other}",', ""))
+    with pytest.raises(StoreError, match="holds episodes of words version none, but"):
+        run_plan(plan, tmp_path, FakePlay(), InProcess())
 
 
 def test_plans_and_records_of_language_3_have_no_words() -> None:

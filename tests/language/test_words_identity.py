@@ -84,6 +84,20 @@ def test_each_change_of_what_is_said_is_other_words_of_its_pool_only(
     assert digest(monkeypatch, elsewhere, "test") != digest(monkeypatch, FILE, "test")
 
 
+def test_the_order_in_which_people_are_drawn_is_part_of_the_words(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    usual = digest(monkeypatch, FILE)
+    people = dict(reversed(general().people.items()))
+    assert digest(monkeypatch, FILE, people=people) != usual
+
+
+def test_a_word_is_not_taken_for_the_slot_of_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    word = FILE.replace('"{repeats:times}"', '"repeats"')
+    slot = FILE.replace('"{repeats:times}"', '"{repeats}"')
+    assert digest(monkeypatch, word) != digest(monkeypatch, slot)
+
+
 def test_words_have_the_digest_of_their_task_and_pool_and_those_of_language_3_have_none() -> None:
     assert not words_of("PickXtimes", "test", 3)
     assert language_label(["PickXtimes"], "test", 3) == LANGUAGE_VERSIONS[3]

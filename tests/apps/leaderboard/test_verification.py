@@ -104,6 +104,24 @@ def test_words_that_are_not_installed_are_not_checked_and_the_verdict_is(
     assert not verify_run(folder).holds
 
 
+@pytest.mark.parametrize("words", ["StopCube/train@0a0a0a0a0a0a", "anything", "none"])
+def test_words_of_another_pool_or_of_no_name_do_not_excuse_from_checking(
+    honest: Path, tmp_path: Path, words: str
+) -> None:
+    def forged(lines: Lines, _folder: Path, _rng: random.Random) -> Lines:
+        for line in lines:
+            line["options"]["language"] = 4
+            line.update(language_version=LANGUAGE_VERSIONS[4], words=words)
+        return lines
+
+    shutil.copytree(honest, tmp_path / "forged")
+    (tmp_path / "forged" / PLAN_FILE).unlink()
+    forge(tmp_path / "forged", forged, random.Random(0))
+    found = verify_run(tmp_path / "forged")
+    assert not found.holds
+    assert f"words: the record says '{words}', which are no words of" in str(found.checks)
+
+
 def test_a_record_of_language_3_with_words_of_another_does_not_hold(
     honest: Path, tmp_path: Path
 ) -> None:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 from roboirg.core.arms import AGAIN, TOLD
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
-from roboirg.core.versions import WORDS, Mismatch, Versions
+from roboirg.core.versions import NO_VERSION, WORDS, Mismatch, Versions
 from roboirg.core.word_pools import pool_of
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.language import LANGUAGE_VERSIONS
@@ -60,18 +60,23 @@ def _open_wordings(job: Job) -> None:
 
 def other_versions(record: Summary) -> list[Mismatch]:
     """Return where a record's language, words or environment are not the installed ones."""
-    pool = pool_of(record.split, record.options.wordings)
     installed = Versions(
         environment_version=ENVIRONMENT_VERSION,
         language_version=LANGUAGE_VERSIONS.get(record.options.language, "unknown"),
-        words_version=words_of(record.task, pool, record.options.language) or None,
+        words_version=installed_words(record) or NO_VERSION,
     )
     recorded = Versions(
         environment_version=record.environment_version,
         language_version=record.language_version,
-        words_version=record.words or None,
+        words_version=record.words_version,
     )
     return recorded.differences(installed)
+
+
+def installed_words(job: Job) -> str:
+    """Return which words this package has for a job; empty if they are code."""
+    pool = pool_of(job.split, job.options.wordings)
+    return words_of(job.task, pool, job.options.language)
 
 
 def has_other_words(record: Summary) -> bool:

@@ -123,9 +123,7 @@ def _check_versions(runs: Sequence[tuple[Path, Iterable[Summary]]]) -> None:
                 f" of language {result.options.language}": Versions(
                     language_version=result.language_version
                 ),
-                f" of {(result.words or '').partition('@')[0]}": Versions(
-                    words_version=result.words or None
-                ),
+                f" of {result.words_owner}": Versions(words_version=result.words_version),
                 f" of {result.policy}": result.policy_versions,
                 f" of {result.task} {result.split} {result.episode}": Versions(seed=result.seed),
             }

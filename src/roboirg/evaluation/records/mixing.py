@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import operator
 from collections.abc import Callable, Collection, Iterable, Iterator
 from typing import Any, NamedTuple
@@ -21,14 +20,14 @@ class Trait(NamedTuple):
         plural: what several values are called.
         meaning: of several values.
         text: returns a value in words, or None if it fits all others.
-        owner: returns, of that text, what has the value; only its values should be the same.
+        owner: returns what of a result has the value; only its values should be the same.
     """
 
     path: str
     plural: str
     meaning: str
     text: Callable[[Any], str | None] = str
-    owner: Callable[[str], str] = lambda _: ""
+    owner: Callable[[Any], str] = lambda _: ""
 
 
 _UNFAIR = "They are kept apart and cannot be compared."
@@ -43,10 +42,10 @@ FAIRNESS = (
     Trait("language_version", "versions of the language", _UNFAIR),
     Trait("environment_version", "versions of the environment", _UNFAIR),
     Trait(
-        "words",
+        "words_version",
         "words of a task and pool",
         "They cannot be compared, and rates average over them.",
-        owner=lambda words: words.partition("@")[0],
+        owner=operator.attrgetter("words_owner"),
     ),
 )
 """What must be equal in a comparison of policies."""
@@ -85,8 +84,13 @@ def differing(
 ) -> Iterator[str]:
     """Yield a sentence for each of some traits of which results have several values."""
     for trait in traits:
-        values = {*map(trait.text, {*map(operator.attrgetter(trait.path), results)})} - {None}
-        for _, texts in itertools.groupby(sorted(map(str, values)), trait.owner):
-            listed = list(texts)
-            if len(listed) > 1:
-                yield f"Mixed {trait.plural}{owner}: {', '.join(listed)}. {trait.meaning}"
+        value_of = operator.attrgetter(trait.path)
+        texts: dict[str, set[str]] = {}
+        for its_owner, value in {(trait.owner(result), value_of(result)) for result in results}:
+            text = trait.text(value)
+            if text is not None:
+                texts.setdefault(its_owner, set()).add(str(text))
+        for its_owner in sorted(texts):
+            if len(texts[its_owner]) > 1:
+                listed = ", ".join(sorted(texts[its_owner]))
+                yield f"Mixed {trait.plural}{owner}: {listed}. {trait.meaning}"

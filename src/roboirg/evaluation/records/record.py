@@ -28,6 +28,7 @@ from roboirg.core.observations import DemonstrationSource
 from roboirg.core.plain_text import clip_text
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.versions import NO_VERSION, Versions
+from roboirg.core.word_pools import pool_of
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
 from roboirg.util.short_hash import short_hash
 
@@ -377,6 +378,17 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
         """What the policy is, with its server's version unless an error came before that."""
         missing = None if self.outcome == "error" else NO_VERSION
         return self.ref.versions._replace(server_version=self.server_version or missing)
+
+    @property
+    def words_version(self) -> str:
+        """Which words were said; `NO_VERSION` where the record does not have it."""
+        return self.words or NO_VERSION
+
+    @property
+    def words_owner(self) -> str:
+        """What has these words: only those of one task, pool and language should be the same."""
+        pool = pool_of(self.split, self.options.wordings)
+        return f"{self.task}/{pool} in language {self.options.language}"
 
     @property
     def identity(self) -> Job:

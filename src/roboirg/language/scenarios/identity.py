@@ -45,10 +45,11 @@ def words_digest(task: str, pool: PoolName) -> str:
         if its_pool == pool
     ]
     scenarios = [
-        [repr(scenario.fields), scenario.texts]
+        [repr(scenario.fields), repr(sorted(scenario.texts.items()))]
         for scenario in words.scenarios
         if scenario.fields.pool == pool
     ]
-    shared = [general().people, general().distractors[pool], words.stated]
-    said = [shared, sorted(commands), sorted(scenarios, key=repr)]
-    return short_hash(json.dumps(said, sort_keys=True))
+    people = list(general().people.items())  # in their order, by which they are drawn
+    stated = repr(sorted(words.stated.items()))
+    said = [people, general().distractors[pool], stated, sorted(commands), sorted(scenarios)]
+    return short_hash(json.dumps(said))

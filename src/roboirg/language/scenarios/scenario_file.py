@@ -127,7 +127,7 @@ def _scenario(
         several = value if isinstance(value, list) else [value]
         at = f"{where}, {name}"
         texts[name] = tuple(_sentence(one, listed, stated, at, mistakes) for one in several)
-    said = tuple(name.removeprefix("say.") for name in texts if name.startswith("say."))
+    said = tuple(sorted(name.removeprefix("say.") for name in texts if name.startswith("say.")))
     if fields is not None:
         mistakes += [f"{where} {one}." for one in _unmet(fields, texts, said, stated)]
     if fields is None or mistakes:

@@ -137,7 +137,7 @@ COLUMNS: Mapping[str, FrameColumn] = {
         _field("started_at", "text", "ISO 8601, UTC"),
         _field("language_version", "text", "version of the words"),
         FrameColumn(
-            "words",
+            "words_version",
             "text",
             "which words of the task and pool were said",
             "a language whose words are code",
