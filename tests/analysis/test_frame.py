@@ -173,3 +173,7 @@ def test_a_run_is_opened_once_for_all_that_is_wanted_of_it(
         assert [(str(one.path), one.policies) for one in found] == [
             ("a", None), ("b", ("y", "z:Z")), ("c:d", ("e",)), ("c", ("e",)),
         ]  # fmt: skip
+
+
+def test_no_column_of_the_words_hides_one_of_the_records():
+    assert not COLUMNS.keys() & WORD_COLUMNS.keys()
