@@ -20,7 +20,7 @@ UNFAIR = [
     ({"language_version": "2"}, "Mixed versions of the language: 1, 2."),
     ({"environment_version": 99}, "Mixed versions of the environment: 1, 99."),
 ]
-WORDS = "PickXtimes/test@0a", "PickXtimes/test@1b", "StopCube/test@2c", "PickXtimes/train@3d"
+WORDS = "PickXtimes/test@0a", "PickXtimes/test@1b"
 APART = [
     ({"policy_version": "new"}, "Mixed versions of {}: new, unknown."),
     (
@@ -62,15 +62,18 @@ def test_each_difference_is_one_sentence(result, policy, fields, sentence) -> No
 
 
 def test_other_words_are_refused_where_task_and_pool_are_the_same_and_split_no_rows(result) -> None:
-    first, same_task, other_task, other_pool = (result(words=words) for words in WORDS)
+    first, same_task = (result(words=words, language=4) for words in WORDS)
+    other_task = result(words="StopCube/test@2c", task="StopCube", language=4)
     no_words = result(episode=1)  # a language whose words are code
-    assert not mixtures([first, other_task, other_pool, no_words])
+    assert not mixtures([first, other_task, no_words])
+    unnamed = result(language=4, episode=1)
+    assert mixtures([first, unnamed])[0].startswith("Mixed words of a task and pool: PickX")
     (sentence,) = mixtures([first, other_task, same_task])
     assert sentence == (
         "Mixed words of a task and pool: PickXtimes/test@0a, PickXtimes/test@1b. They cannot be "
         "compared, and rates average over them."
     )
-    both = [("a", [first, other_task]), ("b", [result(words=WORDS[1], episode=1)])]
+    both = [("a", [first, other_task]), ("b", [result(words=WORDS[1], language=4, episode=1)])]
     assert len(make_frame(both).names) == 1
     frames = [make_frame([("a", [one])]) for one in (first, same_task)]
     with pytest.raises(InvalidValueError, match=sentence[:60]):
