@@ -81,19 +81,25 @@ def test_what_was_altered_does_not_hold(name: str, honest: Path, tmp_path: Path)
     assert words in "\n".join(found.findings)
 
 
+def in_words(words: str) -> Forgery:
+    """Return a change that makes records of language 4 of them, with a name of words."""
+
+    def change(lines: Lines, _folder: Path, _rng: random.Random) -> Lines:
+        for line in lines:
+            line["options"]["language"] = 4
+            line.update(language_version=LANGUAGE_VERSIONS[4], words=words)
+        return lines
+
+    return change
+
+
 def test_words_that_are_not_installed_are_not_checked_and_the_verdict_is(
     honest: Path, tmp_path: Path
 ) -> None:
-    def other_words(lines: Lines, _folder: Path, _rng: random.Random) -> Lines:
-        for line in lines:
-            line["options"]["language"] = 4
-            line.update(language_version=LANGUAGE_VERSIONS[4], words="StopCube/test@0a0a0a0a0a0a")
-        return lines
-
     folder = tmp_path / "other"
     shutil.copytree(honest, folder)
     (folder / PLAN_FILE).unlink()
-    forge(folder, other_words, random.Random(0))
+    forge(folder, in_words("StopCube/test@0a0a0a0a0a0a"), random.Random(0))
     found = verify_run(folder)
     assert (found.holds, found.verdicts) == (True, {"exact": found.records})
     note = f"were not checked in {found.records} of the records: this roboirg has other words."
@@ -108,30 +114,25 @@ def test_words_that_are_not_installed_are_not_checked_and_the_verdict_is(
 def test_words_of_another_pool_or_of_no_name_do_not_excuse_from_checking(
     honest: Path, tmp_path: Path, words: str
 ) -> None:
-    def forged(lines: Lines, _folder: Path, _rng: random.Random) -> Lines:
-        for line in lines:
-            line["options"]["language"] = 4
-            line.update(language_version=LANGUAGE_VERSIONS[4], words=words)
-        return lines
-
     shutil.copytree(honest, tmp_path / "forged")
     (tmp_path / "forged" / PLAN_FILE).unlink()
-    forge(tmp_path / "forged", forged, random.Random(0))
+    forge(tmp_path / "forged", in_words(words), random.Random(0))
     found = verify_run(tmp_path / "forged")
     assert not found.holds
     assert f"words: the record says '{words}', which are no words of" in str(found.checks)
 
 
+@pytest.mark.parametrize("words", ["StopCube/test@0a0a0a0a0a0a", "@0a0a0a0a0a0a"])
 def test_a_record_of_language_3_with_words_of_another_does_not_hold(
-    honest: Path, tmp_path: Path
+    honest: Path, tmp_path: Path, words: str
 ) -> None:
     def with_words(lines: Lines, _folder: Path, _rng: random.Random) -> Lines:
-        return [{**line, "words": "StopCube/test@0a0a0a0a0a0a"} for line in lines]
+        return [{**line, "words": words} for line in lines]
 
     shutil.copytree(honest, tmp_path / "forged")
     forge(tmp_path / "forged", with_words, random.Random(0))
     (check, _) = verify_run(tmp_path / "forged", sample=0.0).checks
-    assert check.findings[0].startswith("words: the record says 'StopCube/test@0a0a0a0a0a0a'")
+    assert check.findings[0].startswith(f"words: the record says {words!r}")
 
 
 def test_a_record_from_before_attempts_were_watched_for_holds(honest: Path, tmp_path: Path) -> None:

@@ -13,8 +13,6 @@ from roboirg.apps.demonstrations.picture_coding import LOSSY_QUALITY
 from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, load_facts
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.version import __version__
-from roboirg.core.word_pools import pool_of
-from roboirg.language.scenarios.identity import language_label
 from roboirg.util.media import CONTROL_RATE
 
 _STORED = {
@@ -72,15 +70,13 @@ def card_text(
 
 
 def _head_line(plan: ExportPlan) -> str:
-    pool = pool_of(plan.split, plan.options.wordings)
-    language = language_label(plan.tasks, pool, plan.options.language)
     rate = f"{CONTROL_RATE} frames per second, one per control step."
     if plan.actions == "waypoint":
         rate = f"A frame per waypoint; time stamps count frames, {CONTROL_RATE} to the second."
     return (
         f"Split {plan.split}, format {plan.format}, written by roboirg {__version__} (environment "
-        f"{ENVIRONMENT_VERSION}, language {language}, wordings of the pool {pool!r}). "
-        f"{rate}"
+        f"{ENVIRONMENT_VERSION}, language {plan.language_label}, wordings of the pool "
+        f"{plan.pool!r}). {rate}"
     )
 
 

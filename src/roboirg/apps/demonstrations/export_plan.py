@@ -17,7 +17,7 @@ from roboirg.core.errors import InvalidValueError, known_name
 from roboirg.core.field_types import check_whole
 from roboirg.core.instruction_options import InstructionOptions, identifying
 from roboirg.core.observations import CAMERAS, check_cameras
-from roboirg.core.word_pools import pool_of
+from roboirg.core.word_pools import PoolName, pool_of
 from roboirg.language.generator import instruct_with
 from roboirg.language.instruction_row import row
 from roboirg.language.scenarios.identity import language_label
@@ -140,15 +140,19 @@ class ExportPlan:
             self.disturbed,
         )  # fmt: skip
 
+    @property
+    def pool(self) -> PoolName:
+        """The pool that its words are taken from."""
+        return pool_of(self.split, self.options.wordings)
+
+    @property
+    def language_label(self) -> str:
+        """The version of its language, and which words of each task it has."""
+        return language_label(self.tasks, self.pool, self.options.language)
+
     def fingerprint(self) -> str:
         """Return a hash of everything that determines the dataset."""
-        versions = [
-            language_label(
-                self.tasks, pool_of(self.split, self.options.wordings), self.options.language
-            ),
-            ENVIRONMENT_VERSION,
-            TRAJECTORY_VERSION,
-        ]
+        versions = [self.language_label, ENVIRONMENT_VERSION, TRAJECTORY_VERSION]
         written = {**asdict(self), "options": identifying(self.options)}
         return hashlib.sha256(json.dumps([written, versions]).encode()).hexdigest()
 

@@ -97,12 +97,29 @@ def check_line(one: LineToCheck, folder: Path) -> RecordCheck:
         return RecordCheck(record.slug, (str(error),))
 
 
+def _names_words(record: Record) -> bool:
+    """Return whether a record names words of its task and pool, of whatever version.
+
+    Only these excuse from checking what was said; a language whose words are code has none.
+    """
+    if not installed_words(record):
+        return False
+    name = rf"{re.escape(record.task)}/{record.pool}@[0-9a-f]+"
+    return re.fullmatch(name, record.words_version) is not None
+
+
 def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
     findings = [
         f"{what.replace(' ', '_')}: the record says {recorded}; this roboirg checks {installed}."
         for what, recorded, installed in other_versions(record)
         if what != WORDS
     ]
+    other_words = has_other_words(record)
+    if other_words and not _names_words(record):
+        findings.append(
+            f"words: the record says {record.words_version!r}, which are no words of "
+            f"{record.words_owner}."
+        )
     if findings:
         return RecordCheck(record.slug, tuple(findings))
     log = None if record.action_log is None else read_actions(folder, record.action_log)
@@ -111,13 +128,7 @@ def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
     else:
         again = begin_record(PreparedJob(job_of(record)))
         played = None
-    if has_other_words(record):
-        # Only a name of words of this task and pool excuses from checking what was said.
-        of, _, _ = installed_words(record).partition("@")
-        if not re.fullmatch(rf"{re.escape(of)}@[0-9a-f]+", record.words_version):
-            said = repr(record.words_version)
-            finding = f"words: the record says {said}, which are no words of {record.words_owner}."
-            return RecordCheck(record.slug, (finding,))
+    if other_words:
         for name in _HEARD_FIELDS:
             setattr(record, name, getattr(again, name))
     findings = list(_differences(record, again, WORD_FIELDS))

@@ -9,7 +9,6 @@ from functools import cached_property
 from roboirg.core.arms import AGAIN, TOLD
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.versions import NO_VERSION, WORDS, Mismatch, Versions
-from roboirg.core.word_pools import pool_of
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.language.arms import TrialWords, arm_episode, say_arm, word_trial
@@ -75,8 +74,7 @@ def other_versions(record: Summary) -> list[Mismatch]:
 
 def installed_words(job: Job) -> str:
     """Return which words this package has for a job; empty if they are code."""
-    pool = pool_of(job.split, job.options.wordings)
-    return words_of(job.task, pool, job.options.language)
+    return words_of(job.task, job.pool, job.options.language)
 
 
 def has_other_words(record: Summary) -> bool:

@@ -28,7 +28,7 @@ from roboirg.core.observations import DemonstrationSource
 from roboirg.core.plain_text import clip_text
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.core.versions import NO_VERSION, Versions
-from roboirg.core.word_pools import pool_of
+from roboirg.core.word_pools import PoolName, pool_of
 from roboirg.evaluation.records.run_files import RELATIVE_PATH
 from roboirg.util.short_hash import short_hash
 
@@ -99,6 +99,11 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
     arm: Label = TOLD
     wordings_file: str | None = None
     ref: PolicyRef | None = None
+
+    @property
+    def pool(self) -> PoolName:
+        """The pool that its words are taken from."""
+        return pool_of(self.split, self.options.wordings)
 
     @property
     def setting(self) -> str:
@@ -387,8 +392,7 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
     @property
     def words_owner(self) -> str:
         """What has these words: only those of one task, pool and language should be the same."""
-        pool = pool_of(self.split, self.options.wordings)
-        return f"{self.task}/{pool} in language {self.options.language}"
+        return f"{self.task}/{self.pool} in language {self.options.language}"
 
     @property
     def identity(self) -> Job:
