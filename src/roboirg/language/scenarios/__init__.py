@@ -9,7 +9,7 @@ back take the place of values. The command is drawn for the episode, so it is th
 settings; explicit is the command alone; the resolved form has the values in the command.
 
 ===============  =================================================================================
-``TASK.toml``    commands and scenarios of a task
+other ``.toml``  commands and scenarios of the tasks that name the file: `Task.words`
 ``pointers``     the closed table of all expressions that point back
 ``general``      people, and remarks about anything
 ``markup``       the marks in a sentence

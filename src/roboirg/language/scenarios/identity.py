@@ -6,6 +6,8 @@ import functools
 import json
 from collections.abc import Iterable
 
+from msgspec.structs import replace
+
 from roboirg.core.instruction_options import DEFAULT_LANGUAGE
 from roboirg.core.word_pools import PoolName
 from roboirg.language.scenarios.scenario_file import general, task_scenarios
@@ -44,11 +46,12 @@ def words_digest(task: str, pool: PoolName) -> str:
         for (its_pool, fields), texts in words.commands.items()
         if its_pool == pool
     ]
-    scenarios = [
-        [repr(scenario.fields), scenario.texts]
-        for scenario in words.scenarios
-        if scenario.fields.pool == pool
-    ]
+    scenarios: list[object] = []
+    for scenario in words.scenarios:
+        if scenario.fields.pool == pool:
+            # Which other tasks say it, too, does not matter.
+            needs = replace(scenario.fields.needs, tasks=())
+            scenarios.append([repr(replace(scenario.fields, needs=needs)), scenario.texts])
     shared = [general().people, general().distractors[pool], words.stated]
     said = [shared, sorted(commands), sorted(scenarios, key=repr)]
     return short_hash(json.dumps(said, sort_keys=True))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import re
 from collections.abc import Collection, Iterator, Mapping
 from importlib.resources import files
@@ -12,25 +11,28 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
-from roboirg.core.word_pools import PoolName
+from roboirg.core.word_pools import POOLS, PoolName
 from roboirg.language.phrases import TaggedText
 from roboirg.language.scenarios.markup import Pointer, Text, parse, slots_in
 from roboirg.language.scenarios.scenario import (
     PEOPLE,
     REMARKS,
+    FileFields,
     General,
     PointerRow,
     Scenario,
     ScenarioFields,
-    TaskFields,
     TaskScenarios,
     Texts,
 )
+from roboirg.tasks import every_task
 
 FOLDER = files("roboirg.language.scenarios")
 Stored = TypeVar("Stored")
+ALL = "all"
+"""Instead of a task: for all tasks of a file."""
 PRONOUNS = {"he": ("he", "him", "his", "his"), "she": ("she", "her", "her", "hers")}
 GIVEN = frozenset(
     {"list", "list.0", "list.1", "list.2", "rank", "reference", "step", "taken"}
@@ -62,29 +64,37 @@ def _shared(kind: type[Stored], name: str) -> Stored:
 
 @functools.cache
 def task_scenarios(task: str) -> TaskScenarios | None:
-    """Return the words of a task; None if none have been written."""
-    path = FOLDER.joinpath(f"{task}.toml")
-    return read_scenario_file(path) if path.is_file() else None
+    """Return the words of a task, from the file that it names; None if none have been written."""
+    if task not in every_task() or not every_task()[task].words:
+        return None
+    path = every_task()[task].words
+    if isinstance(path, str):
+        path = FOLDER.joinpath(path)
+    return read_scenario_file(path, is_own=True).get(task)
 
 
-def read_task_scenarios(text: str, where: str) -> TaskScenarios:
-    """Return the content of a file; `where` names it in complaints.
+def read_task_scenarios(
+    text: str, where: str, *, is_own: bool = False
+) -> Mapping[str, TaskScenarios]:
+    """Return the words of each task that a file serves.
 
-    A file of scenarios alone takes the commands of the task's own file.
+    Args:
+        text: its content.
+        where: its name, for complaints.
+        is_own: whether tasks name the file as theirs; any other one may lack commands, and has
+            those of the files that its tasks name.
 
     Raises:
         InvalidValueError: it is not as `docs/add-scenario.md` says; a line for each mistake.
     """
-    head = _as(TaskFields, text, where)
-    own = None if head.commands else task_scenarios(head.task)
-    if own is None and not head.commands:
-        raise InvalidValueError(
-            f"{where} has no commands, and there is no {head.task}.toml to take them from."
-        )
+    head = _as(FileFields, text, where)
+    check_names(f"task of {where} named", head.tasks, every_task())
+    check_names(f"task of {where} named", {**head.commands, **head.stated}, (*head.tasks, ALL))
     mistakes: list[str] = []
-    stated = own.stated if own else {
-        name: _parsed(one, f"{where}, stated", mistakes) for name, one in head.stated.items()
-    }  # fmt: skip
+    words = {task: _command_words(head, task, where, is_own, mistakes) for task in head.tasks}
+    stated = dict[str, Text]()
+    for of_task in words.values():
+        stated |= of_task.stated
     scenarios = [
         _scenario(one, stated, f"{where}, scenario {one.get('frame', number)!r}", mistakes)
         for number, one in enumerate(head.scenario, 1)
@@ -95,21 +105,41 @@ def read_task_scenarios(text: str, where: str) -> TaskScenarios:
         for at, name in enumerate(names)
         if name in names[:at] and None not in name
     ]
-    commands = own.commands if own else _commands(head, where, mistakes)
     if mistakes:
         raise InvalidValueError("\n".join(mistakes))
-    return TaskScenarios(head.task, commands, stated, tuple(filter(None, scenarios)))
+    for scenario in filter(None, scenarios):
+        needed = scenario.fields.needs.tasks
+        kind = f"task of {where}, scenario {scenario.fields.frame!r}, needs.tasks, named"
+        check_names(kind, needed, head.tasks)
+        for task in needed or head.tasks:
+            words[task].scenarios.append(scenario)
+    return words
 
 
-def _commands(
-    head: TaskFields, where: str, mistakes: list[str]
-) -> dict[tuple[PoolName, frozenset[str]], Texts]:
-    found: dict[tuple[PoolName, frozenset[str]], Texts] = {}
-    for pool, texts in head.commands.items():
-        for command in texts:
-            of = (pool, frozenset(slots_in(_parsed(command, f"{where}, commands", mistakes))))
-            found[of] = (*found.get(of, ()), command)
-    return found
+def _command_words(
+    head: FileFields, task: str, where: str, is_own: bool, mistakes: list[str]
+) -> TaskScenarios:
+    """Return what a file says of a task without scenarios: its commands, and values stated."""
+    written = {**head.commands.get(ALL, {}), **head.commands.get(task, {})}
+    if not written:
+        usual = None if is_own else task_scenarios(task)
+        if usual is None:
+            raise InvalidValueError(f"{where} has no commands of {task}; add [commands.{task}].")
+        return msgspec.structs.replace(usual, scenarios=[])
+    texts = {**head.stated.get(ALL, {}), **head.stated.get(task, {})}
+    stated = {
+        name: _sentence(text, "", texts, f"{where}, stated", mistakes)
+        for name, text in texts.items()
+    }
+    commands: dict[tuple[PoolName, frozenset[str]], list[str]] = {}
+    for pool in POOLS:
+        at = f"{where}, commands of {task}, {pool},"
+        if pool not in written:
+            mistakes.append(f"{at} are lacking.")
+        for command in written.get(pool, ()):
+            fields = frozenset(slots_in(_sentence(command, "", texts, at, mistakes)))
+            commands.setdefault((pool, fields), []).append(command)
+    return TaskScenarios(commands, stated, [])
 
 
 def _scenario(
@@ -189,8 +219,9 @@ def _unmet(
             any(name.startswith("rival ") for name in slots_in(one))
             for one in texts.get("competing", ())
         ),
-        "has a single person; another one must be possible": fields.people is not None
-        and len(list(itertools.chain(*fields.people.values()))) == 1,
+        "has a single person; another one must be possible": (
+            sum(map(len, (fields.people or {}).values())) == 1
+        ),
         f"has a list of {fields.list!r}; the slots are {', '.join(sorted(_slots(stated)))}": (
             fields.list and fields.list not in _slots(stated)
         ),
@@ -294,10 +325,11 @@ def _as(kind: type[Stored], text: str, where: str) -> Stored:
         raise InvalidValueError(f"{where}: {error}.") from error
 
 
-def read_scenario_file(path: Traversable) -> TaskScenarios:
-    """Read a file of scenarios from anywhere."""
+@functools.cache
+def read_scenario_file(path: Traversable, *, is_own: bool = False) -> Mapping[str, TaskScenarios]:
+    """Read a file of scenarios from anywhere, like `read_task_scenarios`."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
         raise InvalidValueError(f"The file {str(path)!r} cannot be read: {error}.") from error
-    return read_task_scenarios(text, path.name)
+    return read_task_scenarios(text, path.name, is_own=is_own)

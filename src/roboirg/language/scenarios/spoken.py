@@ -92,8 +92,11 @@ def _choose(request: InstructionRequest) -> _Choice:
 
 def refusal(request: InstructionRequest) -> str | None:
     """Return why a setting cannot express an episode; None if it can."""
-    if task_scenarios(request.task.name) is None:
-        return f"language 4 has no scenarios of {request.task.name} yet"
+    task = request.task
+    if task_scenarios(task.name) is None:
+        if task.words:
+            return f"{task.name} is none of the tasks of {task.words}, the file that it names"
+        return f"language 4 has no scenarios of {task.name} yet"
     return None if request.options.setting == _EXPLICIT else _choose(request).refusal
 
 
