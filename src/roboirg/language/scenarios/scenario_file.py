@@ -5,8 +5,7 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Collection, Iterator, Mapping
-from importlib.resources import files
-from importlib.resources.abc import Traversable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
@@ -29,7 +28,7 @@ from roboirg.language.scenarios.scenario import (
 )
 from roboirg.tasks import every_task
 
-FOLDER = files("roboirg.language.scenarios")
+FOLDER = Path(__file__).parent
 Stored = TypeVar("Stored")
 ALL = "all"
 """Instead of a task: for all tasks of a file."""
@@ -59,30 +58,28 @@ def general() -> General:
 
 
 def _shared(kind: type[Stored], name: str) -> Stored:
-    return _as(kind, FOLDER.joinpath(name).read_text(encoding="utf-8"), name)
+    return _as(kind, (FOLDER / name).read_text(encoding="utf-8"), name)
 
 
 @functools.cache
 def task_scenarios(task: str) -> TaskScenarios | None:
-    """Return the words of a task, from the file that it names; None if none have been written."""
-    if task not in every_task() or not every_task()[task].words:
+    """Return the words of a task; None if none have been written."""
+    path = own_file(task)
+    return read_scenario_file(path).get(task) if path else None
+
+
+def own_file(task: str) -> Path | None:
+    """Return the file that a task names for its words; None if it names none."""
+    found = every_task().get(task)
+    if found is None or not found.words:
         return None
-    path = every_task()[task].words
-    if isinstance(path, str):
-        path = FOLDER.joinpath(path)
-    return read_scenario_file(path, is_own=True).get(task)
+    return FOLDER / found.words  # a whole path stays as it is
 
 
-def read_task_scenarios(
-    text: str, where: str, *, is_own: bool = False
-) -> Mapping[str, TaskScenarios]:
-    """Return the words of each task that a file serves.
+def read_task_scenarios(text: str, where: str) -> Mapping[str, TaskScenarios]:
+    """Return the words of each task that a file serves; `where` names the file in complaints.
 
-    Args:
-        text: its content.
-        where: its name, for complaints.
-        is_own: whether tasks name the file as theirs; any other one may lack commands, and has
-            those of the files that its tasks name.
+    A file without commands of a task takes those of the task's own file.
 
     Raises:
         InvalidValueError: it is not as `docs/add-scenario.md` says; a line for each mistake.
@@ -91,7 +88,7 @@ def read_task_scenarios(
     check_names(f"task of {where} named", head.tasks, every_task())
     check_names(f"task of {where} named", {**head.commands, **head.stated}, (*head.tasks, ALL))
     mistakes: list[str] = []
-    words = {task: _command_words(head, task, where, is_own, mistakes) for task in head.tasks}
+    words = {task: _command_words(head, task, where, mistakes) for task in head.tasks}
     stated = dict[str, Text]()
     for of_task in words.values():
         stated |= of_task.stated
@@ -116,29 +113,24 @@ def read_task_scenarios(
     return words
 
 
-def _command_words(
-    head: FileFields, task: str, where: str, is_own: bool, mistakes: list[str]
-) -> TaskScenarios:
-    """Return what a file says of a task without scenarios: its commands, and values stated."""
-    written = {**head.commands.get(ALL, {}), **head.commands.get(task, {})}
-    if not written:
-        usual = None if is_own else task_scenarios(task)
-        if usual is None:
-            raise InvalidValueError(f"{where} has no commands of {task}; add [commands.{task}].")
-        return msgspec.structs.replace(usual, scenarios=[])
+def _command_words(head: FileFields, task: str, where: str, mistakes: list[str]) -> TaskScenarios:
+    """Return the words of a task without scenarios: its commands, and the values they state."""
+    path = own_file(task)
+    if path and not {ALL, task} & head.commands.keys():
+        head = _as(FileFields, _text_of(path), path.name)
     texts = {**head.stated.get(ALL, {}), **head.stated.get(task, {})}
     stated = {
         name: _sentence(text, "", texts, f"{where}, stated", mistakes)
         for name, text in texts.items()
     }
+    written = {**head.commands.get(ALL, {}), **head.commands.get(task, {})}
     commands: dict[tuple[PoolName, frozenset[str]], list[str]] = {}
     for pool in POOLS:
-        at = f"{where}, commands of {task}, {pool},"
-        if pool not in written:
-            mistakes.append(f"{at} are lacking.")
+        if not written.get(pool):
+            mistakes.append(f"{where} has no commands of {task} in the pool {pool}.")
         for command in written.get(pool, ()):
-            fields = frozenset(slots_in(_sentence(command, "", texts, at, mistakes)))
-            commands.setdefault((pool, fields), []).append(command)
+            parts = _sentence(command, "", texts, f"{where}, commands of {task}", mistakes)
+            commands.setdefault((pool, frozenset(slots_in(parts))), []).append(command)
     return TaskScenarios(commands, stated, [])
 
 
@@ -254,20 +246,20 @@ def _sentence(
     )
 
 
-def has_words(row: PointerRow, text: str, *, whole: bool = False) -> bool:
-    """Return whether a text has the words of a row, with any noun for ``*``, or is just them."""
+def _is_said(row: PointerRow, words: str, sentence: str) -> bool:
+    """Return whether a row of the table is for the words of a pointer, with any noun for ``*``."""
     pattern = re.escape(row.words).replace(r"\*", "[a-z]+")
-    found = re.fullmatch(pattern, text) if whole else re.search(pattern, text)
-    return found is not None
+    if "<" in row.words:  # with the words around them
+        return f"<{words}>" in row.words and re.search(pattern, sentence) is not None
+    return re.fullmatch(pattern, words) is not None
 
 
 def _pointing(pointer: Pointer, said: str, kind: str, where: str, mistakes: list[str]) -> Pointer:
     """Return a pointer with what its row says."""
     words = pointer.words
     of_kind = [row for row in pointer_table() if kind in row.of]
-    # First those that are said with the words around them.
-    rows = [row for row in of_kind if f"<{words}>" in row.words and has_words(row, said)]
-    rows += [row for row in of_kind if "<" not in row.words and has_words(row, words, whole=True)]
+    rows = [row for row in of_kind if _is_said(row, words, said)]
+    rows.sort(key=lambda row: "<" not in row.words)  # with the words around them first
     row = next((row for row in rows if row.kind == pointer.expression), None)
     if row is None:
         found = f"{where} has the pointer <{pointer.expression} {pointer.of}: {words}>"
@@ -325,11 +317,13 @@ def _as(kind: type[Stored], text: str, where: str) -> Stored:
         raise InvalidValueError(f"{where}: {error}.") from error
 
 
-@functools.cache
-def read_scenario_file(path: Traversable, *, is_own: bool = False) -> Mapping[str, TaskScenarios]:
-    """Read a file of scenarios from anywhere, like `read_task_scenarios`."""
+def _text_of(path: Path) -> str:
     try:
-        text = path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
         raise InvalidValueError(f"The file {str(path)!r} cannot be read: {error}.") from error
-    return read_task_scenarios(text, path.name, is_own=is_own)
+
+
+def read_scenario_file(path: Path) -> Mapping[str, TaskScenarios]:
+    """Read a file of scenarios from anywhere, like `read_task_scenarios`."""
+    return read_task_scenarios(_text_of(path), path.name)
