@@ -55,6 +55,8 @@ def test_validation_finds_what_words_from_outside_break(tmp_path: Path, snapshot
     result = CliRunner().invoke(cli.app, words, env={"COLUMNS": "150"})
     assert isinstance(result.exception, RoboIRGError)
     assert f"{result.stdout}{result.exception}" == snapshot
+    result = CliRunner().invoke(cli.app, [*words, "--scenario", "fear"])
+    assert str(result.exception) == "There is no scenario 'fear'; known: far. Did you mean 'far'?"
 
 
 def test_the_same_bytes_every_time_and_only_what_is_asked_for(tmp_path: Path):
@@ -112,10 +114,11 @@ def test_stats_of_all_splits_leave_out_empty_tables():
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_an_author_sees_texts_and_the_broken_rule(tmp_path: Path, snapshot):
+def test_an_author_sees_texts_and_the_broken_rule_in_each_task(tmp_path: Path, snapshot):
     file = tmp_path / "mine.toml"
     file.write_text(
-        'task = "PickXtimes"\n[[scenario]]\nframe = "far"\npool = "train"\nsetting = "spatial"\n'
+        'tasks = ["PickXtimes", "SwingXtimes"]\n'
+        '[[scenario]]\nframe = "far"\npool = "train"\nsetting = "spatial"\n'
         'introduction = "Look at the cube {place}."\n'
         'say.color = ["the cube <there place: there>"]\n'
     )
