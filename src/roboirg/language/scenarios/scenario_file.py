@@ -86,7 +86,7 @@ def read_task_scenarios(text: str, where: str) -> Mapping[str, TaskScenarios]:
     """
     head = _as(FileFields, text, where)
     check_names(f"task of {where} named", head.tasks, every_task())
-    check_names(f"task of {where} named", {**head.commands, **head.stated}, (*head.tasks, ALL))
+    check_names(f"task of {where} named", [*head.commands, *head.stated], (*head.tasks, ALL))
     mistakes: list[str] = []
     words = {task: _command_words(head, task, where, mistakes) for task in head.tasks}
     stated = dict[str, Text]()
@@ -117,7 +117,8 @@ def _command_words(head: FileFields, task: str, where: str, mistakes: list[str])
     """Return the words of a task without scenarios: its commands, and the values they state."""
     path = own_file(task)
     if path and not {ALL, task} & head.commands.keys():
-        head = _as(FileFields, _text_of(path), path.name)
+        where = path.name
+        head = _as(FileFields, _text_of(path), where)
     texts = {**head.stated.get(ALL, {}), **head.stated.get(task, {})}
     stated = {
         name: _sentence(text, "", texts, f"{where}, stated", mistakes)
