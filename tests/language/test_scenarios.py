@@ -379,11 +379,9 @@ say.color = ["the cube <there place: there>"]
 
 def test_a_file_serves_several_tasks_each_with_its_own_commands_and_scenarios():
     pick, swing = read(TWO_TASKS), read(TWO_TASKS, "SwingXtimes")
-    fields = frozenset({"color", "repeats"})
-    train, test = (("train", fields), ("test", fields))
-    assert pick.commands[train] == swing.commands[train] == ["Move {color} {repeats}."]
-    assert pick.commands[test] == ["Take {color} {repeats}."]
-    assert swing.commands[test] == ["Swing {color} {repeats}."]
+    assert pick.commands["train"] == swing.commands["train"] == ("Move {color} {repeats}.",)
+    assert pick.commands["test"] == ("Take {color} {repeats}.",)
+    assert swing.commands["test"] == ("Swing {color} {repeats}.",)
     assert pick.stated["color"] == swing.stated["color"]
     assert pick.stated["repeats"] != swing.stated["repeats"]
     assert [one.fields.frame for one in pick.scenarios] == ["here"]
@@ -425,10 +423,14 @@ def test_a_task_of_another_package_has_the_words_of_its_own_file(outside):
     ("text", "complaint"),
     [
         ('tasks = ["LabPick"]', r"theirs\.toml has no commands of LabPick in the pool train\."),
+        (
+            TWO_TASKS.replace("SwingXtimes", "LabPick").replace("Swing {color} {repeats}", "Go"),
+            r"^LabPick has no command with the fields color, repeats\.$",
+        ),
         (TWO_TASKS, r"LabPick is none of the tasks of \S*theirs\.toml, the file that it names\."),
     ],
 )
-def test_a_task_whose_own_file_does_not_serve_it_is_refused_in_a_sentence(outside, text, complaint):
+def test_a_task_whose_own_file_lacks_its_words_is_refused_in_a_sentence(outside, text, complaint):
     path, episode = outside
     path.write_text(text)
     with pytest.raises(InvalidValueError, match=complaint):

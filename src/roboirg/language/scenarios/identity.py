@@ -41,11 +41,6 @@ def words_digest(task: str, pool: PoolName) -> str:
     words = task_scenarios(task)
     if words is None:
         return "none"
-    commands = [
-        [sorted(fields), texts]
-        for (its_pool, fields), texts in words.commands.items()
-        if its_pool == pool
-    ]
     scenarios: list[object] = []
     for scenario in words.scenarios:
         if scenario.fields.pool == pool:
@@ -53,5 +48,5 @@ def words_digest(task: str, pool: PoolName) -> str:
             needs = replace(scenario.fields.needs, tasks=())
             scenarios.append([repr(replace(scenario.fields, needs=needs)), scenario.texts])
     shared = [general().people, general().distractors[pool], words.stated]
-    said = [shared, sorted(commands), sorted(scenarios, key=repr)]
+    said = [shared, words.commands[pool], sorted(scenarios, key=repr)]
     return short_hash(json.dumps(said, sort_keys=True))

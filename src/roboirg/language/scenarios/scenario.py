@@ -123,11 +123,11 @@ class TaskScenarios(msgspec.Struct, frozen=True):
     """The words of a task.
 
     Attributes:
-        commands: skeletons, by pool and fields.
+        commands: skeletons, of any fields that a goal can have, by pool.
         stated: the words that state a field's value.
         scenarios: all that are said of it.
     """
 
-    commands: Mapping[tuple[PoolName, frozenset[str]], list[str]]
+    commands: Mapping[PoolName, Texts]
     stated: Mapping[str, Text]
     scenarios: list[Scenario]

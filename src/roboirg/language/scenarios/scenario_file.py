@@ -12,7 +12,7 @@ import msgspec
 
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
-from roboirg.core.word_pools import POOLS, PoolName
+from roboirg.core.word_pools import POOLS
 from roboirg.language.phrases import TaggedText
 from roboirg.language.scenarios.markup import Pointer, Text, parse, slots_in
 from roboirg.language.scenarios.scenario import (
@@ -58,7 +58,7 @@ def general() -> General:
 
 
 def _shared(kind: type[Stored], name: str) -> Stored:
-    return _as(kind, (FOLDER / name).read_text(encoding="utf-8"), name)
+    return _as(kind, _text_of(FOLDER / name), name)
 
 
 @functools.cache
@@ -125,14 +125,12 @@ def _command_words(head: FileFields, task: str, where: str, mistakes: list[str])
         for name, text in texts.items()
     }
     written = {**head.commands.get(ALL, {}), **head.commands.get(task, {})}
-    commands: dict[tuple[PoolName, frozenset[str]], list[str]] = {}
     for pool in POOLS:
         if not written.get(pool):
             mistakes.append(f"{where} has no commands of {task} in the pool {pool}.")
         for command in written.get(pool, ()):
-            parts = _sentence(command, "", texts, f"{where}, commands of {task}", mistakes)
-            commands.setdefault((pool, frozenset(slots_in(parts))), []).append(command)
-    return TaskScenarios(commands, stated, [])
+            _sentence(command, "", texts, f"{where}, commands of {task}", mistakes)
+    return TaskScenarios(written, stated, [])
 
 
 def _scenario(
@@ -201,6 +199,7 @@ def _unmet(
         needed += [f"remarks.{name}" for name in REMARKS]
     lacking = [name for name in needed if not any(texts.get(name, ()))]
     unknown = sorted(set(said) - set(stated))
+    slots = _slots(stated)
     wrong = {
         "has no say; give words for the fields that the command leaves open": not said,
         f"has say.{', say.'.join(unknown)}; the fields are {', '.join(stated)}": unknown,
@@ -215,8 +214,8 @@ def _unmet(
         "has a single person; another one must be possible": (
             sum(map(len, (fields.people or {}).values())) == 1
         ),
-        f"has a list of {fields.list!r}; the slots are {', '.join(sorted(_slots(stated)))}": (
-            fields.list and fields.list not in _slots(stated)
+        f"has a list of {fields.list!r}; the slots are {', '.join(sorted(slots))}": (
+            fields.list and fields.list not in slots
         ),
     }
     return [complaint for complaint, holds in wrong.items() if holds]
