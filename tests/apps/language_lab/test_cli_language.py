@@ -130,7 +130,7 @@ def test_an_author_sees_texts_and_the_broken_rule_in_each_task(tmp_path: Path, s
 
 @pytest.mark.usefixtures("in_this_process")
 def test_raters_get_the_texts_of_the_key_in_other_orders_and_their_table(tmp_path: Path):
-    out, tasks = tmp_path / "rating", "PickXtimes"
+    out, tasks = tmp_path / "rating", "PickXtimes,SwingXtimes"  # which share frames
     settings = ("--settings", "direct,reasoning", "--anchors", "3")
     call("language", "sample", "--out", out, "--tasks", tasks, *settings)
     read = [list(csv.reader(path.open())) for path in sorted(out.glob("sheet-*.csv"))]
