@@ -25,14 +25,14 @@ from roboirg.language.scenarios.scenario_file import read_task_scenarios
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 
-WRITTEN = ("PickXtimes", "StopCube", "VideoUnmask")
+WRITTEN = ("PickXtimes", "SwingXtimes", "StopCube", "VideoUnmask")
 SPATIAL = ("PickXtimes", "VideoUnmask")
 GRID = st.integers(-17, 17).map(lambda step: step / 100)
 PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=7, unique=True)
 """Centimeter grid: ties, exact margins and collinear rows are common."""
 MOST_WORDS = 12
 WOBBLY = """
-task = "PickXtimes"
+tasks = ["PickXtimes"]
 [[scenario]]
 frame = "wobbly"
 pool = "train"
@@ -260,7 +260,7 @@ def test_a_clue_leads_to_one_thing(task):
 
 
 def test_a_scenario_with_a_spot_fits_only_what_has_one():
-    (scenario,) = read_task_scenarios(WOBBLY, "mine.toml").scenarios
+    (scenario,) = read_task_scenarios(WOBBLY, "mine.toml")["PickXtimes"].scenarios
     options = InstructionOptions("spatial", language=4, wordings="train")
     fitting = 0
     for index in range(40):

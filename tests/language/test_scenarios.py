@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from roboirg import tasks
 from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
 from roboirg.apps.language_lab.scenarios.scenario_report import report_lines
 from roboirg.apps.language_lab.scenarios.sentence_rules import blanked, literal
@@ -19,7 +20,9 @@ from roboirg.core.word_pools import POOLS
 from roboirg.language import instruct, instruct_with, open_wordings
 from roboirg.language.arms import say_arm
 from roboirg.language.generator import find_refusal, request_of, spoken_instruction
+from roboirg.language.scenarios import scenario_file
 from roboirg.language.scenarios.choice import choose
+from roboirg.language.scenarios.identity import words_digest
 from roboirg.language.scenarios.scenario_file import (
     FOLDER,
     pointer_table,
@@ -37,7 +40,7 @@ PAGE = Path(__file__).parents[2] / "docs/add-scenario.md"
 DIRECT = PAGE.read_text().partition("```toml\n")[2].partition("```")[0]
 """The page's example."""
 RIVAL = """
-task = "PickXtimes"
+tasks = ["PickXtimes"]
 [[scenario]]
 frame = "two"
 pool = "test"
@@ -51,7 +54,7 @@ remarks.not_former = "Not <former list.0: the former>: "
 remarks.not_latter = "Not <latter list.1: the latter>: "
 """
 FEWER = """
-task = "PickXtimes"
+tasks = ["PickXtimes"]
 [[scenario]]
 frame = "fewer"
 pool = "train"
@@ -63,6 +66,11 @@ say.repeats = ["<each reference: [repeats: for the photo|once for each photo]>"]
 """
 PHOTOS = "[repeats: for the photo|once for each photo]"
 YEARS = "[repeats: once for that year|once for each year]"
+
+
+def read(text, task="PickXtimes"):
+    """Return what a file says of a task."""
+    return read_task_scenarios(text, "mine.toml")[task]
 
 
 def spoken(task, language=4):
@@ -112,13 +120,35 @@ def spoken(task, language=4):
         ),
         ('"{he}', '"\u2019{he}', "must be printable ASCII"),
         ("[[scenario]]", "[[scenario", "(at line 3, column 11)"),
-        ('task = "PickXtimes"', 'task = "Juggle"', "there is no Juggle.toml"),
+        ('["PickXtimes"]', "[]", "Expected `array` of length >= 1"),
+        ('["PickXtimes"]', '["Juggle"]', "named 'Juggle'; known: "),
+        ('["PickXtimes"]', '["BinFill"]', "has no commands of BinFill in the pool train."),
+        (
+            "[[scenario]]",
+            '[commands.StopCube]\ntrain = ["Go."]\n[[scenario]]',
+            "'StopCube'; known: PickXtimes, all.",
+        ),
+        (
+            "[[scenario]]",
+            '[commands.all]\ntrain = ["Go."]\n[[scenario]]',
+            "has no commands of PickXtimes in the pool test.",
+        ),
+        (
+            "[[scenario]]",
+            '[commands.all]\ntrain = ["Put {colour} {repeats}."]\n[[scenario]]',
+            "commands of PickXtimes has the slot 'colour'",
+        ),
+        (
+            'pool = "train"\n',
+            'pool = "train"\nneeds.tasks = ["StopCube"]\n',
+            "'birthday', needs.tasks, named 'StopCube'; known: PickXtimes.",
+        ),
     ],
 )
 def test_a_file_with_a_mistake_is_refused_by_file_scenario_and_field(before, after, complaint):
     assert before in DIRECT
-    with pytest.raises(InvalidValueError, match=r"^mine\.toml") as found:
-        read_task_scenarios(DIRECT.replace(before, after), "mine.toml")
+    with pytest.raises(InvalidValueError, match=r"^(?:There is no task of )?mine\.toml") as found:
+        read(DIRECT.replace(before, after))
     assert complaint in str(found.value)
 
 
@@ -165,10 +195,10 @@ def test_every_mistake_of_a_file_is_named_by_scenario_and_field():
 )  # fmt: skip
 def test_the_checker_names_the_rule_that_a_scenario_breaks(text, before, after, rule):
     scenes = scenes_of("PickXtimes", 0)[::20]
-    assert not check_scenarios(read_task_scenarios(text, "mine.toml"), None, scenes)[0].broken
+    assert not check_scenarios(read(text), None, scenes)[0].broken
     assert before in text
     try:
-        words = read_task_scenarios(text.replace(before, after), "mine.toml")
+        words = read(text.replace(before, after))
         broken = list(check_scenarios(words, None, scenes)[0].broken)
     except InvalidValueError as error:  # said no expression of the table
         broken = [str(error)]
@@ -177,7 +207,7 @@ def test_the_checker_names_the_rule_that_a_scenario_breaks(text, before, after, 
 
 @pytest.mark.parametrize(("text", "setting"), [(DIRECT, "direct"), (FEWER, "reasoning")])
 def test_one_more_scenario_moves_no_text_but_those_that_say_it(text, setting):
-    (added,) = read_task_scenarios(text, "mine.toml").scenarios
+    (added,) = read(text).scenarios
     ours = [one for one in task_scenarios("PickXtimes").scenarios if one.fields.setting == setting]
     known = [one for one in ours if one.fields.pool == "train"]
     told = 0
@@ -192,8 +222,8 @@ def test_one_more_scenario_moves_no_text_but_those_that_say_it(text, setting):
 def test_authors_see_a_competing_remark_where_a_setting_has_one():
     scenes = scenes_of("PickXtimes", 0)[::20]
     for text, number in ((DIRECT, 1), (RIVAL, 0)):
-        (report,) = check_scenarios(read_task_scenarios(text, "mine.toml"), None, scenes)
-        (*texts, _, _) = report_lines(report)
+        (report,) = check_scenarios(read(text), None, scenes)
+        (*texts, _, _) = report_lines(report, "PickXtimes")
         shown = [one for one in texts if one.startswith("  With a competing remark: ")]
         assert len(shown) == number
         assert all(" one. Let's surprise" in one for one in shown)
@@ -206,7 +236,7 @@ def test_words_that_only_look_like_a_value_may_be_said_and_people_only_in_passin
     text = DIRECT.replace("The cake", words).replace("{person} turns", "My cat turns")
     text = text.replace("{he}", "it").replace("surprise {him}", "surprise it")
     scenes = scenes_of("PickXtimes", 0)[::20]
-    (report,) = check_scenarios(read_task_scenarios(text, "mine.toml"), None, scenes)
+    (report,) = check_scenarios(read(text), None, scenes)
     assert not set(report.broken) - {f"needs {report.longest[0]} tokens; at most 64 are heard"}
 
 
@@ -319,6 +349,94 @@ def test_language_4_is_refused_in_a_sentence_where_it_has_no_words():
         instruct(get_episode("PickXtimes", "test", 0), language=5)
 
 
+TWO_TASKS = """
+tasks = ["PickXtimes", "SwingXtimes"]
+[commands.all]
+train = ["Move {color} {repeats}."]
+test = ["Take {color} {repeats}."]
+[commands.SwingXtimes]
+test = ["Swing {color} {repeats}."]
+[stated.all]
+color = "the {color} cube"
+repeats = "{repeats:times}"
+[stated.SwingXtimes]
+repeats = "for {repeats:lap}"
+[[scenario]]
+frame = "here"
+pool = "test"
+setting = "spatial"
+introduction = "Dust it {place:spot}."
+say.color = ["the cube <there place: there>"]
+[[scenario]]
+frame = "there"
+pool = "test"
+setting = "spatial"
+needs.tasks = ["SwingXtimes"]
+introduction = "Sand it {place:spot}."
+say.color = ["the cube <there place: there>"]
+"""
+
+
+def test_a_file_serves_several_tasks_each_with_its_own_commands_and_scenarios():
+    pick, swing = read(TWO_TASKS), read(TWO_TASKS, "SwingXtimes")
+    assert pick.commands["train"] == swing.commands["train"] == ("Move {color} {repeats}.",)
+    assert pick.commands["test"] == ("Take {color} {repeats}.",)
+    assert swing.commands["test"] == ("Swing {color} {repeats}.",)
+    assert pick.stated["color"] == swing.stated["color"]
+    assert pick.stated["repeats"] != swing.stated["repeats"]
+    assert [one.fields.frame for one in pick.scenarios] == ["here"]
+    assert [one.fields.frame for one in swing.scenarios] == ["here", "there"]
+
+
+def test_a_file_without_commands_has_those_of_each_task():
+    text = TWO_TASKS.partition("[commands.all]")[0] + DIRECT.partition("\n")[2]
+    for task in ("PickXtimes", "SwingXtimes"):
+        own = task_scenarios(task)
+        assert read(text, task).commands == own.commands
+        (scenario,) = read(text, task).scenarios
+        assert scenario not in own.scenarios
+
+
+@pytest.fixture
+def outside(monkeypatch, tmp_path):
+    """Yield a file, and a task of another package that names it."""
+    path = tmp_path / "theirs.toml"
+    task = replace(all_tasks()["PickXtimes"], name="LabPick", suite="lab", words=str(path))
+    monkeypatch.setattr(tasks, "every_task", lambda: {**all_tasks(), "LabPick": task})
+    monkeypatch.setattr(scenario_file, "every_task", tasks.every_task)
+    for cached in (task_scenarios, words_digest):
+        cached.cache_clear()
+    yield path, replace(get_episode("PickXtimes", "test", 0), task="LabPick")
+    for cached in (task_scenarios, words_digest):
+        cached.cache_clear()
+
+
+def test_a_task_of_another_package_has_the_words_of_its_own_file(outside):
+    path, episode = outside
+    path.write_text(TWO_TASKS.replace("SwingXtimes", "LabPick"))
+    said = instruct(episode, "explicit", language=4)
+    assert re.fullmatch(r"Swing the \w+ cube for \w+ laps?\.", said.text)
+    assert words_digest("LabPick", "test") != "none"
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ('tasks = ["LabPick"]', r"theirs\.toml has no commands of LabPick in the pool train\."),
+        (
+            TWO_TASKS.replace("SwingXtimes", "LabPick").replace("Swing {color} {repeats}", "Go"),
+            r"^LabPick has no command with the fields color, repeats\.$",
+        ),
+        (TWO_TASKS, r"LabPick is none of the tasks of \S*theirs\.toml, the file that it names\."),
+    ],
+)
+def test_a_task_whose_own_file_lacks_its_words_is_refused_in_a_sentence(outside, text, complaint):
+    path, episode = outside
+    path.write_text(text)
+    with pytest.raises(InvalidValueError, match=complaint):
+        instruct(episode, "explicit", language=4)
+
+
 WAITING = {"amount"}
 """Types of values that no task with scenarios has yet."""
 SIMILAR = 0.7
@@ -326,12 +444,14 @@ SIMILAR = 0.7
 
 
 def scenarios_of(pool):
-    return [
-        (task, scenario)
+    """Return the scenarios of a pool, each once, though several tasks may say it."""
+    by_name = {
+        (all_tasks()[task].words, scenario.fields.setting, scenario.fields.frame): scenario
         for task in WRITTEN
         for scenario in task_scenarios(task).scenarios
         if scenario.fields.pool == pool
-    ]
+    }
+    return list(by_name.values())
 
 
 def is_said(row, text):
@@ -344,8 +464,8 @@ def is_said(row, text):
 def test_every_pointer_is_said_in_both_pools():
     """A pointer that one pool lacks would be new to whoever learned from the other one."""
     said = dict.fromkeys(POOLS, "")
-    for task in WRITTEN:
-        written = tomllib.loads(FOLDER.joinpath(f"{task}.toml").read_text())["scenario"]
+    for file in {all_tasks()[task].words for task in WRITTEN}:
+        written = tomllib.loads((FOLDER / file).read_text())["scenario"]
         for scenario in written:
             text = str(scenario).replace('"', "'")
             said[scenario["pool"]] += re.sub(r"<[a-z]+ [^:<>]+: ", "<", text)
@@ -360,11 +480,11 @@ def test_every_pointer_is_said_in_both_pools():
 
 def test_no_frame_or_sentence_is_in_both_pools_of_any_tasks():
     train, test = (
-        {sentence for _, scenario in scenarios_of(pool) for sentence in blanked(scenario)}
+        {sentence for scenario in scenarios_of(pool) for sentence in blanked(scenario)}
         for pool in POOLS
     )
     assert not train & test
-    frames = [scenario.fields.frame for pool in POOLS for _, scenario in scenarios_of(pool)]
+    frames = [scenario.fields.frame for pool in POOLS for scenario in scenarios_of(pool)]
     assert len(frames) == len(set(frames))
 
 
@@ -372,8 +492,8 @@ def test_no_introduction_of_a_test_is_one_of_training_with_other_nouns():
     def words_of(scenario):
         return re.findall(r"[\w']+", literal(scenario.text("introduction")).lower())
 
-    known = [words_of(scenario) for _, scenario in scenarios_of("train")]
-    for _, scenario in scenarios_of("test"):
+    known = [words_of(scenario) for scenario in scenarios_of("train")]
+    for scenario in scenarios_of("test"):
         words = words_of(scenario)
         for other in known:
             alike = difflib.SequenceMatcher(None, words, other, autojunk=False).ratio()
@@ -414,7 +534,7 @@ def test_a_list_and_a_position_in_it_before_the_command_give_the_value():
 def test_a_person_stands_for_what_he_or_she_wants():
     text = RIVAL.replace("We have", "{person} wants").replace("and the", "and {person.2} the")
     text = text.replace("<former list.0: the former>", "<former list.0: {hers}>")
-    words = read_task_scenarios(text, "mine.toml")
+    words = read(text)
     (report,) = check_scenarios(words, None, scenes_of("PickXtimes", 0)[::7])
     assert not report.broken
     assert any(re.search(r" (?:his|hers): ", one) for one in report.renderings)

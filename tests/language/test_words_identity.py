@@ -14,11 +14,11 @@ from roboirg.language.scenarios.scenario_file import general, read_task_scenario
 from roboirg.tasks.splits.splits import get_episode
 
 HEAD = """
-task = "PickXtimes"
-[commands]
+tasks = ["PickXtimes"]
+[commands.all]
 train = ["Pick up {color} {repeats}.", "Lift {color} {repeats}."]
 test = ["Take {color} {repeats}."]
-[stated]
+[stated.all]
 color = "the {color} cube"
 repeats = "{repeats:times}"
 """
@@ -31,6 +31,15 @@ introduction = "Look %s."
 say.color = ["<it color: it>", "<one color: the one I mentioned>"]
 """
 NEAR, FAR = SPATIAL % ("near", "{place:spot}"), SPATIAL % ("far", "{place}")
+OTHER_TASK = (
+    """
+[commands.SwingXtimes]
+train = ["Swing {color} {repeats}."]
+[stated.SwingXtimes]
+color = "that {color} cube"
+"""
+    + (SPATIAL + 'needs.tasks = ["SwingXtimes"]\n') % ("over there", "{place}")
+)
 OTHER_POOL = SPATIAL.replace('"train"', '"test"') % ("other", "here, {place:spot}")
 FILE = HEAD + NEAR + FAR + OTHER_POOL
 
@@ -39,7 +48,7 @@ def digest(
     monkeypatch: pytest.MonkeyPatch, text: str, pool: PoolName = "train", **shared: object
 ) -> str:
     """Return the digest of a file's words, with other people or remarks of all tasks."""
-    words = read_task_scenarios(text, "mine.toml")
+    words = read_task_scenarios(text, "mine.toml")["PickXtimes"]
     fields = {"people": general().people, "distractors": general().distractors, **shared}
     monkeypatch.setattr(identity, "task_scenarios", lambda _: words)
     monkeypatch.setattr(identity, "general", lambda: General(**fields))  # type: ignore[arg-type]
@@ -53,9 +62,11 @@ def test_comments_and_the_order_of_scenarios_and_fields_are_no_other_words(
     lines = NEAR.strip().splitlines()
     turned = "\n".join([lines[0], *reversed(lines[1:])])
     for text in (
-        FILE.replace("[commands]", "# Commands.\n[commands]"),
+        FILE.replace("[commands.all]", "# Commands.\n[commands.all]"),
         HEAD + OTHER_POOL + FAR + NEAR,
         HEAD + turned + FAR + OTHER_POOL,
+        FILE.replace('["PickXtimes"]', '["PickXtimes", "SwingXtimes"]', 1) + OTHER_TASK,
+        FILE.replace("\nsetting", '\nneeds.tasks = ["PickXtimes"]\nsetting'),
     ):
         assert digest(monkeypatch, text) == usual
 

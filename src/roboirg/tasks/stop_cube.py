@@ -152,4 +152,5 @@ TASK = Task(
     goals=goals,
     stages=stages,
     commands=COMMANDS,
+    words="StopCube.toml",
 )

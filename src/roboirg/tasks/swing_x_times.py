@@ -158,4 +158,5 @@ TASK = Task(
     goals=partial(counted_goals, kind="cube", most=MAX_REPEATS),
     stages=stages,
     commands=COMMANDS,
+    words="color_and_number.toml",
 )

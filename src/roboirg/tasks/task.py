@@ -98,6 +98,8 @@ class Task:
         stages: what must happen, in order, for a goal in a scene.
         commands: the wordings of its instruction.
         demonstration: stages that the oracle plays before the policy's turn.
+        words: the file with its words in language 4, by its name in `language/scenarios` or by its
+            whole path, such as ``str(Path(__file__).with_name("words.toml"))``; empty without any.
     """
 
     name: str
@@ -109,3 +111,4 @@ class Task:
     stages: Callable[[Scene, Goal], tuple[Stage, ...]]
     commands: Commands
     demonstration: Callable[[Scene], tuple[Stage, ...]] = _no_stages
+    words: str = ""

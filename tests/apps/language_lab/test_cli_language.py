@@ -112,10 +112,11 @@ def test_stats_of_all_splits_leave_out_empty_tables():
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_an_author_sees_texts_and_the_broken_rule(tmp_path: Path, snapshot):
+def test_an_author_sees_texts_and_the_broken_rule_in_each_task(tmp_path: Path, snapshot):
     file = tmp_path / "mine.toml"
     file.write_text(
-        'task = "PickXtimes"\n[[scenario]]\nframe = "far"\npool = "train"\nsetting = "spatial"\n'
+        'tasks = ["PickXtimes", "SwingXtimes"]\n'
+        '[[scenario]]\nframe = "far"\npool = "train"\nsetting = "spatial"\n'
         'introduction = "Look at the cube {place}."\n'
         'say.color = ["the cube <there place: there>"]\n'
     )
@@ -123,11 +124,13 @@ def test_an_author_sees_texts_and_the_broken_rule(tmp_path: Path, snapshot):
     result = CliRunner().invoke(cli.app, words)
     assert isinstance(result.exception, RoboIRGError)
     assert f"{result.stdout}{result.exception}" == snapshot
+    result = CliRunner().invoke(cli.app, [*words, "--scenario", "fear"])
+    assert str(result.exception) == "There is no scenario 'fear'; known: far. Did you mean 'far'?"
 
 
 @pytest.mark.usefixtures("in_this_process")
 def test_raters_get_the_texts_of_the_key_in_other_orders_and_their_table(tmp_path: Path):
-    out, tasks = tmp_path / "rating", "PickXtimes"
+    out, tasks = tmp_path / "rating", "PickXtimes,SwingXtimes"  # which share frames
     settings = ("--settings", "direct,reasoning", "--anchors", "3")
     call("language", "sample", "--out", out, "--tasks", tasks, *settings)
     read = [list(csv.reader(path.open())) for path in sorted(out.glob("sheet-*.csv"))]

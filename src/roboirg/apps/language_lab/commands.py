@@ -200,7 +200,9 @@ def check_scenario_file(
         int, typer.Option(min=0, help="Random scenes for each scenario, beyond the splits.")
     ] = 200,
 ) -> None:
-    """Check scenarios of language 4, and print texts of each; exit code 2 if a rule breaks.
+    """Check scenarios of language 4 in each task that their file serves, and print texts of them.
+
+    The exit code is 2 if a rule breaks.
 
     Example: roboirg language check-scenarios mine.toml --scenario "school trip"
     """
@@ -208,11 +210,17 @@ def check_scenario_file(
     from roboirg.apps.language_lab.scenarios.scenario_report import report_lines
     from roboirg.language.scenarios.scenario_file import read_scenario_file
 
-    words = read_scenario_file(path)
-    reports = check_scenarios(words, scenario, scenes_of(words.task, seeds))
-    for report in reports:
-        typer.echo("\n".join(report_lines(report)))
-    broken = sum(len(report.broken) for report in reports)
+    by_task = read_scenario_file(path)
+    if scenario is not None:
+        frames: set[str] = set()
+        for words in by_task.values():
+            frames.update(written.fields.frame for written in words.scenarios)
+        known_name("scenario", scenario, sorted(frames))
+    broken = 0
+    for task, words in by_task.items():
+        for report in check_scenarios(words, scenario, scenes_of(task, seeds)):
+            typer.echo("\n".join(report_lines(report, task)))
+            broken += len(report.broken)
     if broken:
         raise RoboIRGError(f"Found {counted(broken, 'broken rule')} in {path.name}.")
 

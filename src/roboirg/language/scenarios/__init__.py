@@ -9,9 +9,9 @@ back take the place of values. The command is drawn for the episode, so it is th
 settings; explicit is the command alone; the resolved form has the values in the command.
 
 ===============  =================================================================================
-``TASK.toml``    commands and scenarios of a task
 ``pointers``     the closed table of all expressions that point back
 ``general``      people, and remarks about anything
+other ``.toml``  commands and scenarios of the tasks that name the file as their `words`
 ``markup``       the marks in a sentence
 ``scenario``     the fields of the files; ``scenario_file`` reads and checks them
 ``derived``      how the goal of an episode can follow from something else

@@ -6,6 +6,8 @@ import functools
 import json
 from collections.abc import Iterable
 
+from msgspec.structs import replace
+
 from roboirg.core.instruction_options import DEFAULT_LANGUAGE
 from roboirg.core.word_pools import PoolName
 from roboirg.language.scenarios.scenario_file import general, task_scenarios
@@ -39,17 +41,15 @@ def words_digest(task: str, pool: PoolName) -> str:
     words = task_scenarios(task)
     if words is None:
         return "none"
-    commands = [
-        [sorted(fields), texts]
-        for (its_pool, fields), texts in words.commands.items()
-        if its_pool == pool
-    ]
-    scenarios = [
-        [repr(scenario.fields), repr(sorted(scenario.texts.items()))]
-        for scenario in words.scenarios
-        if scenario.fields.pool == pool
-    ]
+    scenarios: list[list[str]] = []
+    for scenario in words.scenarios:
+        if scenario.fields.pool == pool:
+            # Which other tasks say it, too, does not matter.
+            needs = replace(scenario.fields.needs, tasks=())
+            fields = replace(scenario.fields, needs=needs)
+            scenarios.append([repr(fields), repr(sorted(scenario.texts.items()))])
     people = list(general().people.items())  # in their order, by which they are drawn
     stated = repr(sorted(words.stated.items()))
-    said = [people, general().distractors[pool], stated, sorted(commands), sorted(scenarios)]
+    commands = words.commands[pool]
+    said = [people, general().distractors[pool], stated, commands, sorted(scenarios)]
     return short_hash(json.dumps(said))

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -51,11 +51,13 @@ class Needs(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         colors: possible numbers of colors in the goal.
         shown: possible numbers of colors in the scene that a goal can ask for.
         list: possible lengths of the list.
+        tasks: in which its sentences are true; empty for all tasks of its file.
     """
 
     colors: tuple[int, ...] = ()
     shown: tuple[int, ...] = ()
     list: tuple[int, ...] = ()
+    tasks: Texts = ()
 
 
 People = Mapping[Literal["he", "she"], Texts]
@@ -101,26 +103,31 @@ class General(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     distractors: Mapping[PoolName, Texts]
 
 
-class TaskFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A task's file, with its scenarios as they were written."""
+class FileFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A file, with its scenarios as they were written.
 
-    task: str
+    Attributes:
+        tasks: that it serves.
+        scenario: the table of each scenario.
+        commands: of a task, or of `ALL`, by pool.
+        stated: words by field, of a task or of `ALL`.
+    """
+
+    tasks: Annotated[Texts, msgspec.Meta(min_length=1)]
     scenario: tuple[dict[str, Any], ...] = ()
-    commands: Mapping[PoolName, Texts] = {}
-    stated: Mapping[str, str] = {}
+    commands: Mapping[str, Mapping[PoolName, Texts]] = {}
+    stated: Mapping[str, Mapping[str, str]] = {}
 
 
 class TaskScenarios(msgspec.Struct, frozen=True):
     """The words of a task.
 
     Attributes:
-        task: its name.
-        commands: skeletons, by pool and fields.
+        commands: skeletons, of any fields that a goal can have, by pool.
         stated: the words that state a field's value.
-        scenarios: all of them.
+        scenarios: all that are said of it.
     """
 
-    task: str
-    commands: Mapping[tuple[PoolName, frozenset[str]], Texts]
+    commands: Mapping[PoolName, Texts]
     stated: Mapping[str, Text]
-    scenarios: tuple[Scenario, ...]
+    scenarios: list[Scenario]

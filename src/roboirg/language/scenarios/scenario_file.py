@@ -3,34 +3,35 @@
 from __future__ import annotations
 
 import functools
-import itertools
 import re
 from collections.abc import Collection, Iterator, Mapping
-from importlib.resources import files
-from importlib.resources.abc import Traversable
+from pathlib import Path
 from typing import Any, TypeVar
 
 import msgspec
 
-from roboirg.core.errors import InvalidValueError
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
-from roboirg.core.word_pools import PoolName
+from roboirg.core.word_pools import POOLS
 from roboirg.language.phrases import TaggedText
 from roboirg.language.scenarios.markup import Pointer, Text, parse, slots_in
 from roboirg.language.scenarios.scenario import (
     PEOPLE,
     REMARKS,
+    FileFields,
     General,
     PointerRow,
     Scenario,
     ScenarioFields,
-    TaskFields,
     TaskScenarios,
     Texts,
 )
+from roboirg.tasks import every_task
 
-FOLDER = files("roboirg.language.scenarios")
+FOLDER = Path(__file__).parent
 Stored = TypeVar("Stored")
+ALL = "all"
+"""Instead of a task: for all tasks of a file."""
 PRONOUNS = {"he": ("he", "him", "his", "his"), "she": ("she", "her", "her", "hers")}
 GIVEN = frozenset(
     {"list", "list.0", "list.1", "list.2", "rank", "reference", "step", "taken"}
@@ -57,34 +58,40 @@ def general() -> General:
 
 
 def _shared(kind: type[Stored], name: str) -> Stored:
-    return _as(kind, FOLDER.joinpath(name).read_text(encoding="utf-8"), name)
+    return _as(kind, _text_of(FOLDER / name), name)
 
 
 @functools.cache
 def task_scenarios(task: str) -> TaskScenarios | None:
     """Return the words of a task; None if none have been written."""
-    path = FOLDER.joinpath(f"{task}.toml")
-    return read_scenario_file(path) if path.is_file() else None
+    path = own_file(task)
+    return read_scenario_file(path).get(task) if path else None
 
 
-def read_task_scenarios(text: str, where: str) -> TaskScenarios:
-    """Return the content of a file; `where` names it in complaints.
+def own_file(task: str) -> Path | None:
+    """Return the file that a task names for its words; None if it names none."""
+    found = every_task().get(task)
+    if found is None or not found.words:
+        return None
+    return FOLDER / found.words  # a whole path stays as it is
 
-    A file of scenarios alone takes the commands of the task's own file.
+
+def read_task_scenarios(text: str, where: str) -> Mapping[str, TaskScenarios]:
+    """Return the words of each task that a file serves; `where` names the file in complaints.
+
+    A file without commands of a task takes those of the task's own file.
 
     Raises:
         InvalidValueError: it is not as `docs/add-scenario.md` says; a line for each mistake.
     """
-    head = _as(TaskFields, text, where)
-    own = None if head.commands else task_scenarios(head.task)
-    if own is None and not head.commands:
-        raise InvalidValueError(
-            f"{where} has no commands, and there is no {head.task}.toml to take them from."
-        )
+    head = _as(FileFields, text, where)
+    check_names(f"task of {where} named", head.tasks, every_task())
+    check_names(f"task of {where} named", [*head.commands, *head.stated], (*head.tasks, ALL))
     mistakes: list[str] = []
-    stated = own.stated if own else {
-        name: _parsed(one, f"{where}, stated", mistakes) for name, one in head.stated.items()
-    }  # fmt: skip
+    words = {task: _command_words(head, task, where, mistakes) for task in head.tasks}
+    stated = dict[str, Text]()
+    for of_task in words.values():
+        stated |= of_task.stated
     scenarios = [
         _scenario(one, stated, f"{where}, scenario {one.get('frame', number)!r}", mistakes)
         for number, one in enumerate(head.scenario, 1)
@@ -95,21 +102,35 @@ def read_task_scenarios(text: str, where: str) -> TaskScenarios:
         for at, name in enumerate(names)
         if name in names[:at] and None not in name
     ]
-    commands = own.commands if own else _commands(head, where, mistakes)
     if mistakes:
         raise InvalidValueError("\n".join(mistakes))
-    return TaskScenarios(head.task, commands, stated, tuple(filter(None, scenarios)))
+    for scenario in filter(None, scenarios):
+        needed = scenario.fields.needs.tasks
+        kind = f"task of {where}, scenario {scenario.fields.frame!r}, needs.tasks, named"
+        check_names(kind, needed, head.tasks)
+        for task in needed or head.tasks:
+            words[task].scenarios.append(scenario)
+    return words
 
 
-def _commands(
-    head: TaskFields, where: str, mistakes: list[str]
-) -> dict[tuple[PoolName, frozenset[str]], Texts]:
-    found: dict[tuple[PoolName, frozenset[str]], Texts] = {}
-    for pool, texts in head.commands.items():
-        for command in texts:
-            of = (pool, frozenset(slots_in(_parsed(command, f"{where}, commands", mistakes))))
-            found[of] = (*found.get(of, ()), command)
-    return found
+def _command_words(head: FileFields, task: str, where: str, mistakes: list[str]) -> TaskScenarios:
+    """Return the words of a task without scenarios: its commands, and the values they state."""
+    path = own_file(task)
+    if path and not {ALL, task} & head.commands.keys():
+        where = path.name
+        head = _as(FileFields, _text_of(path), where)
+    texts = {**head.stated.get(ALL, {}), **head.stated.get(task, {})}
+    stated = {
+        name: _sentence(text, "", texts, f"{where}, stated", mistakes)
+        for name, text in texts.items()
+    }
+    written = {**head.commands.get(ALL, {}), **head.commands.get(task, {})}
+    for pool in POOLS:
+        if not written.get(pool):
+            mistakes.append(f"{where} has no commands of {task} in the pool {pool}.")
+        for command in written.get(pool, ()):
+            _sentence(command, "", texts, f"{where}, commands of {task}", mistakes)
+    return TaskScenarios(written, stated, [])
 
 
 def _scenario(
@@ -178,6 +199,7 @@ def _unmet(
         needed += [f"remarks.{name}" for name in REMARKS]
     lacking = [name for name in needed if not any(texts.get(name, ()))]
     unknown = sorted(set(said) - set(stated))
+    slots = _slots(stated)
     wrong = {
         "has no say; give words for the fields that the command leaves open": not said,
         f"has say.{', say.'.join(unknown)}; the fields are {', '.join(stated)}": unknown,
@@ -189,10 +211,11 @@ def _unmet(
             any(name.startswith("rival ") for name in slots_in(one))
             for one in texts.get("competing", ())
         ),
-        "has a single person; another one must be possible": fields.people is not None
-        and len(list(itertools.chain(*fields.people.values()))) == 1,
-        f"has a list of {fields.list!r}; the slots are {', '.join(sorted(_slots(stated)))}": (
-            fields.list and fields.list not in _slots(stated)
+        "has a single person; another one must be possible": (
+            sum(map(len, (fields.people or {}).values())) == 1
+        ),
+        f"has a list of {fields.list!r}; the slots are {', '.join(sorted(slots))}": (
+            fields.list and fields.list not in slots
         ),
     }
     return [complaint for complaint, holds in wrong.items() if holds]
@@ -223,20 +246,20 @@ def _sentence(
     )
 
 
-def has_words(row: PointerRow, text: str, *, whole: bool = False) -> bool:
-    """Return whether a text has the words of a row, with any noun for ``*``, or is just them."""
+def _is_said(row: PointerRow, words: str, sentence: str) -> bool:
+    """Return whether a row of the table is for the words of a pointer, with any noun for ``*``."""
     pattern = re.escape(row.words).replace(r"\*", "[a-z]+")
-    found = re.fullmatch(pattern, text) if whole else re.search(pattern, text)
-    return found is not None
+    if "<" in row.words:  # with the words around them
+        return f"<{words}>" in row.words and re.search(pattern, sentence) is not None
+    return re.fullmatch(pattern, words) is not None
 
 
 def _pointing(pointer: Pointer, said: str, kind: str, where: str, mistakes: list[str]) -> Pointer:
     """Return a pointer with what its row says."""
     words = pointer.words
     of_kind = [row for row in pointer_table() if kind in row.of]
-    # First those that are said with the words around them.
-    rows = [row for row in of_kind if f"<{words}>" in row.words and has_words(row, said)]
-    rows += [row for row in of_kind if "<" not in row.words and has_words(row, words, whole=True)]
+    rows = [row for row in of_kind if _is_said(row, words, said)]
+    rows.sort(key=lambda row: "<" not in row.words)  # with the words around them first
     row = next((row for row in rows if row.kind == pointer.expression), None)
     if row is None:
         found = f"{where} has the pointer <{pointer.expression} {pointer.of}: {words}>"
@@ -294,10 +317,13 @@ def _as(kind: type[Stored], text: str, where: str) -> Stored:
         raise InvalidValueError(f"{where}: {error}.") from error
 
 
-def read_scenario_file(path: Traversable) -> TaskScenarios:
-    """Read a file of scenarios from anywhere."""
+def _text_of(path: Path) -> str:
     try:
-        text = path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
         raise InvalidValueError(f"The file {str(path)!r} cannot be read: {error}.") from error
-    return read_task_scenarios(text, path.name)
+
+
+def read_scenario_file(path: Path) -> Mapping[str, TaskScenarios]:
+    """Read a file of scenarios from anywhere, like `read_task_scenarios`."""
+    return read_task_scenarios(_text_of(path), path.name)

@@ -35,7 +35,15 @@ from roboirg.language.scenarios.declared import (
     pointed_term,
 )
 from roboirg.language.scenarios.introduced import Introduced, goal_values
-from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, pointers_in, slots_in
+from roboirg.language.scenarios.markup import (
+    Agreement,
+    Pointer,
+    Slot,
+    Text,
+    parse,
+    pointers_in,
+    slots_in,
+)
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.scenario_file import general, task_scenarios
 from roboirg.language.settings import all_settings, contextual
@@ -92,8 +100,11 @@ def _choose(request: InstructionRequest) -> _Choice:
 
 def refusal(request: InstructionRequest) -> str | None:
     """Return why a setting cannot express an episode; None if it can."""
-    if task_scenarios(request.task.name) is None:
-        return f"language 4 has no scenarios of {request.task.name} yet"
+    task = request.task
+    if task_scenarios(task.name) is None:
+        if task.words:
+            return f"{task.name} is none of the tasks of {task.words}, the file that it names"
+        return f"language 4 has no scenarios of {task.name} yet"
     return None if request.options.setting == _EXPLICIT else _choose(request).refusal
 
 
@@ -273,8 +284,13 @@ class Speech:
         return (*lead, *skeleton)
 
     def _skeleton(self, fields: Mapping[str, Phrase]) -> Phrase:
-        wanted = frozenset(value.field for value in self._request.goal_values)
-        possible = self._words.commands[self._request.pool, wanted]
+        wanted = {value.field for value in self._request.goal_values}
+        commands = self._words.commands[self._request.pool]
+        possible = [command for command in commands if wanted == {*slots_in(parse(command))}]
+        if not possible:
+            fields_wanted = ", ".join(sorted(wanted))
+            task = self._request.task.name
+            raise InvalidValueError(f"{task} has no command with the fields {fields_wanted}.")
         template = self._request.sampler.pick(f"command-{len(wanted)}", possible)
         words = {
             name: fields.get(name) or self.field(name, self._words.stated[name]) for name in wanted

@@ -39,7 +39,9 @@ def draw_sample(
     found, old = list[SampledText](), list[SampledText]()
     for setting in settings:
         every = [one for task in tasks for one in _texts(task, setting, LANGUAGE, seed, TEXTS)]
-        found += shuffled(rng, every)[:TEXTS]
+        # Tasks share frames; explicit has none.
+        of_frames = {text["frame"] or text["text"]: text for text in shuffled(rng, every)}
+        found += list(of_frames.values())[:TEXTS]
         for task in tasks:
             old += _texts(task, setting, DEFAULT_LANGUAGE, seed, anchors)
     found += shuffled(rng, old)[:anchors]

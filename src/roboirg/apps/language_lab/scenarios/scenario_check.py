@@ -88,14 +88,7 @@ def scenes_of(task: str, random: int = RANDOM_SCENES) -> tuple[Episode, ...]:
 def check_scenarios(
     words: TaskScenarios, name: str | None, scenes: Sequence[Episode]
 ) -> list[ScenarioReport]:
-    """Check the scenarios of a file, or only the one of a frame, in scenes.
-
-    Raises:
-        InvalidValueError: there is no scenario of that frame.
-    """
-    frames = list(dict.fromkeys(one.fields.frame for one in words.scenarios))
-    if name is not None and name not in frames:
-        raise InvalidValueError(f"There is no scenario {name!r}; there are {', '.join(frames)}.")
+    """Check the scenarios of a task, or only those of one frame, in scenes."""
     chosen = [one for one in words.scenarios if name in (None, one.fields.frame)]
     return [_checked(one, words, scenes) for one in chosen]
 

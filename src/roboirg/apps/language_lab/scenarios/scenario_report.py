@@ -9,10 +9,10 @@ from roboirg.core.plain_text import counted
 from roboirg.language.token_counts import USUAL_LIMIT
 
 
-def report_lines(report: ScenarioReport) -> Iterator[str]:
-    """Yield what an author wants to know: texts, length, scenes, and every broken rule."""
+def report_lines(report: ScenarioReport, task: str) -> Iterator[str]:
+    """Yield what an author wants to know of a scenario in a task: texts, length, broken rules."""
     fields, fits = report.scenario.fields, report.scenes
-    yield f"{fields.frame} ({fields.setting}, {fields.pool})"
+    yield f"{fields.frame} ({task}, {fields.setting}, {fields.pool})"
     yield from (f"  {text}" for text in report.renderings)
     if report.competing:
         yield f"  With a competing remark: {report.competing}"
