@@ -65,7 +65,10 @@ def test_other_words_are_refused_where_task_and_pool_are_the_same_and_split_no_r
     first, same_task = (result(words=words, language=4) for words in WORDS)
     other_task = result(words="StopCube/test@2c", task="StopCube", language=4)
     no_words = result(episode=1)  # a language whose words are code
-    assert not mixtures([first, other_task, no_words])
+    own_words = result(words="PickXtimes/test/lab@3d", setting="lab", language=4)
+    assert not mixtures([first, other_task, no_words, own_words])
+    (sentence,) = mixtures([own_words, result(words="PickXtimes/test/lab@4e", language=4)])
+    assert sentence.startswith("Mixed words of a task and pool: PickXtimes/test/lab@3d, Pick")
     unnamed = result(language=4, episode=1)
     assert mixtures([first, unnamed])[0].startswith("Mixed words of a task and pool: PickX")
     (sentence,) = mixtures([first, other_task, same_task])

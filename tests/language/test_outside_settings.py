@@ -22,6 +22,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.language import (
     FORMS,
+    LANGUAGE_VERSIONS,
     expressible,
     find_refusals,
     instruct,
@@ -30,9 +31,13 @@ from roboirg.language import (
     settings,
 )
 from roboirg.language.instruction_row import row
+from roboirg.language.phrases import plain
+from roboirg.language.request import InstructionSpec, UtteranceSpec
+from roboirg.language.scenarios.scenario_file import FOLDER, setting_scenarios
 from roboirg.language.settings import all_settings, direct
 from roboirg.language.settings.setting import Setting
 from roboirg.language.variants import all_variants, instructions
+from roboirg.shortcuts.command_chance import understood_goals
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
@@ -137,6 +142,62 @@ def test_statistics_and_export_have_the_setting(register):
     assert len(dummies) == 2 * sum(episode.difficulty != "easy" for episode in episodes)
     said = [one for _, one in found if one.form == "implicit"]
     assert "dummy" in printed(*statistics_tables.overview_tables(said))
+
+
+def test_language_4_leaves_a_setting_that_has_no_scenarios_its_own_words(register):
+    def say(request):
+        words = f"language {request.options.language}"
+        return InstructionSpec((UtteranceSpec("command", plain(words)),))
+
+    register(dataclasses.replace(DUMMY, say=say, reads=frozenset({"language"})))
+    for language in (3, 4):
+        said = instruct(HARD, "dummy", language=language)
+        assert said.text == f"Language {language}"
+        assert said.metadata["language_version"] == LANGUAGE_VERSIONS[language]
+
+
+@pytest.mark.parametrize("name", ["direct", "reasoning", "spatial", "grounded", "direct-rival"])
+def test_a_setting_says_scenarios_of_its_own_in_the_ways_of_one_of_ours(name, register, tmp_path):
+    lab, episode = f"lab-{name}", get_episode("PickXtimes", "test", 6)
+    ours = (FOLDER / "color_and_number.toml").read_text()
+    path = tmp_path / "lab.toml"
+    path.write_text(ours.replace(f'setting = "{name}"', f'setting = "{lab}"'))
+    setting = dataclasses.replace(all_settings()[name], name=lab)
+    register(setting)
+    unwritten = r"\): color_and_number\.toml has no lab-\S+ scenario for it in the pool test\.$"
+    with pytest.raises(InvalidValueError, match=unwritten):
+        instruct(episode, lab, language=4)
+    register(dataclasses.replace(setting, words=str(path)))
+    setting_scenarios.cache_clear()
+    for form in FORMS:
+        said = instruct(episode, lab, form, language=4)
+        assert understood_goals(said, episode) == (episode.goal,)
+        (scenario,) = [
+            one
+            for one in setting_scenarios(lab)["PickXtimes"].scenarios
+            if (one.fields.frame, one.fields.pool) == (said.metadata["scenario"], "test")
+        ]
+        assert scenario.fields.setting == lab
+    states_color = episode.goal.text("color") in said.command
+    assert states_color or name not in ("direct", "direct-rival")
+    setting_scenarios.cache_clear()
+
+
+def test_settings_made_from_explicit_and_contextual_say_what_these_do(register):
+    made = [
+        dataclasses.replace(all_settings()[name], name=f"my-{name}")
+        for name in ("explicit", "contextual")
+    ]
+    register(*made)
+    for setting in made:
+        usual = instruct(HARD, setting.name.removeprefix("my-"), language=4)
+        assert instruct(HARD, setting.name, language=4).turns == usual.turns
+
+
+def test_a_setting_with_scenarios_reads_the_language():
+    sentence = r"^The setting dummy has offers, so 'language' must be in its reads\.$"
+    with pytest.raises(InvalidValueError, match=sentence):
+        dataclasses.replace(DUMMY, offers="direct")
 
 
 def recipe():

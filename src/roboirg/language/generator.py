@@ -112,7 +112,8 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
             # Both forms have a command from outside, or none of them.
             forms = {str(form): _say_outside(request, setting, form) for form in FORMS}
             return spoken_instruction(*forms[options.form])
-    own = replace(request, wordings=None, sampler=sampler_of(episode, variant, options.language))
+    sampler = sampler_of(episode, variant, request.options.language)
+    own = replace(request, wordings=None, sampler=sampler)
     return spoken_instruction(own, setting.say(own))
 
 
@@ -163,11 +164,13 @@ def request_of(
 ) -> InstructionRequest:
     """Return the request to put an episode into words."""
     check_options(options)
-    task = get_task(episode.task)
+    task, setting = get_task(episode.task), all_settings()[options.setting]
+    if "language" not in setting.reads:  # its words are the same in each
+        options = replace(options, language=DEFAULT_LANGUAGE)
     wordings = None
     if options.wordings is not None and options.wordings not in POOLS:
         wordings = find_wordings(options.wordings).tasks.get(task.name, TaskWordings(()))
-        if wordings.own & {options.setting, all_settings()[options.setting].plain}:
+        if wordings.own & {options.setting, setting.plain}:
             wordings = None
     sampler = sampler_of(episode, variant, options.language)
     return InstructionRequest(episode, task, options, sampler, wordings)
@@ -176,7 +179,7 @@ def request_of(
 def _setting_of(episode: Episode, options: InstructionOptions) -> Setting:
     """Return the setting that speaks the language that is asked for."""
     setting = get_setting(options.setting, get_task(episode.task))
-    return setting if options.language == DEFAULT_LANGUAGE else in_language_4(setting.name)
+    return setting if options.language == DEFAULT_LANGUAGE else in_language_4(setting)
 
 
 def _missing(request: InstructionRequest) -> str | None:
@@ -213,8 +216,9 @@ def check_options(options: InstructionOptions) -> None:
 def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruction:
     """Return the instruction that has the words of a request."""
     utterances, mentions = _spoken(spec, as_written=bool(request.filled))
-    notes: dict[str, object] = {"wordings": request.options.wordings, "pool": request.pool}
-    words = words_of(request.task.name, request.pool, request.options.language)
+    options = request.options
+    notes: dict[str, object] = {"wordings": options.wordings, "pool": request.pool}
+    words = words_of(request.task.name, request.pool, options.language, options.setting)
     if words:
         notes["words"] = words
     if request.filled:
@@ -224,7 +228,7 @@ def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> In
     found = Instruction(
         task=request.task.name,
         episode=request.episode.key,
-        setting=request.options.setting,
+        setting=options.setting,
         form="resolved" if request.resolved else "implicit",
         utterances=utterances,
         mentions=mentions,
@@ -232,7 +236,7 @@ def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> In
             **_DEFAULT_METADATA,
             **spec.notes,
             **notes,
-            "language_version": LANGUAGE_VERSIONS[request.options.language],
+            "language_version": LANGUAGE_VERSIONS[options.language],
             "templates": list(request.sampler.log),
         },
         meaning=spec.meaning,

@@ -88,7 +88,9 @@ class TrainingPlan(NamedTuple):
         """All that a listener depends on, as plain data."""
         about = self._asdict() | {"tasks": list(self.tasks), "settings": list(self.settings)}
         del about["seeds"], about["language"]
-        about["language_version"] = language_label(self.tasks, self.words, self.language)
+        about["language_version"] = language_label(
+            self.tasks, self.words, self.language, self.settings
+        )
         about["environment_version"] = ENVIRONMENT_VERSION
         return about
 

@@ -155,7 +155,7 @@ def about_policy(plan: PolicyPlan) -> dict[str, Any]:
         "tasks": list(plan.tasks),
         "settings": list(plan.settings),
         "words": plan.words if plan.settings else WORDLESS,
-        "language_version": language_label(plan.tasks, plan.words, plan.language),
+        "language_version": language_label(plan.tasks, plan.words, plan.language, plan.settings),
     }
 
 

@@ -98,14 +98,15 @@ def check_line(one: LineToCheck, folder: Path) -> RecordCheck:
 
 
 def _names_words(record: Record) -> bool:
-    """Return whether a record names words of its task and pool, of whatever version.
+    """Return whether a record names the words that it should have, of whatever version.
 
     Only these excuse from checking what was said; a language whose words are code has none.
     """
-    if not installed_words(record):
+    installed = installed_words(record)
+    if not installed:
         return False
-    name = rf"{re.escape(record.task)}/{record.pool}@[0-9a-f]+"
-    return re.fullmatch(name, record.words_version) is not None
+    name, _, _ = installed.partition("@")
+    return re.fullmatch(rf"{re.escape(name)}@[0-9a-f]+", record.words_version) is not None
 
 
 def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:

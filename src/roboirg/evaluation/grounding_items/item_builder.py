@@ -82,10 +82,11 @@ def make_items(
 def item_id(episode: Episode, options: InstructionOptions) -> str:
     """Return the name of an item. It is a hash, which gives nothing away about the answer."""
     *words, language = astuple(options)
+    pool = pool_of(episode.split, options.wordings)
     content = (
         episode.key,
         *words,
-        language_label([episode.task], pool_of(episode.split, options.wordings), language),
+        language_label([episode.task], pool, language, [options.setting]),
         ENVIRONMENT_VERSION,
     )
     return "g" + hashlib.sha256(repr(content).encode()).hexdigest()[:ID_DIGITS]

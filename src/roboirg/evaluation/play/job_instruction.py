@@ -74,7 +74,7 @@ def other_versions(record: Summary) -> list[Mismatch]:
 
 def installed_words(job: Job) -> str:
     """Return which words this package has for a job; empty if they are code."""
-    return words_of(job.task, job.pool, job.options.language)
+    return words_of(job.task, job.pool, job.options.language, job.options.setting)
 
 
 def has_other_words(record: Summary) -> bool:

@@ -391,8 +391,15 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
 
     @property
     def words_owner(self) -> str:
-        """What has these words: only those of one task, pool and language should be the same."""
-        return f"{self.task}/{self.pool} in language {self.options.language}"
+        """What has these words: only those of one task, pool and language should be the same.
+
+        A setting with a file of its own has others, as the name of its words says.
+        """
+        usual = f"{self.task}/{self.pool}"
+        owner, _, _ = self.words_version.partition("@")
+        if not owner.startswith(f"{usual}/"):
+            owner = usual
+        return f"{owner} in language {self.options.language}"
 
     @property
     def identity(self) -> Job:

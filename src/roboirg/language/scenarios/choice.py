@@ -9,6 +9,7 @@ import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from roboirg.core.errors import check_names
 from roboirg.language.grounded import Clue
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.places import USUAL, SpokenPlace, spoken_places
@@ -28,6 +29,7 @@ from roboirg.language.scenarios.introduced import (
 )
 from roboirg.language.scenarios.markup import Slot, slots_said
 from roboirg.language.scenarios.scenario import PERSON, Scenario
+from roboirg.language.settings import all_settings
 from roboirg.language.settings.grounded import clues_of
 from roboirg.language.settings.reasoning import in_turn
 
@@ -60,16 +62,19 @@ def choose(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
 ) -> Chosen | None:
     """Return what is said in a setting that does not refuse; None if no scenario fits."""
-    sampler = request.sampler
+    sampler, offers = request.sampler, all_settings()[setting].offers
     fitting = [scenario for scenario in scenarios if _fits(scenario, request)]
     sayable: list[_Sayable] = []
-    for offer in _OFFERS[setting](request):
+    if isinstance(offers, str):
+        check_names(f"way to the goal for the offers of {setting}, named", [offers], _OFFERS)
+    ways = _OFFERS[offers] if isinstance(offers, str) else offers
+    for offer in ways(request):
         saying = [scenario for scenario in fitting if _says(scenario, offer)]
         if saying:
             sayable.append(_Sayable(offer, saying))
     if not sayable:
         return None
-    if setting == "reasoning":
+    if offers == "reasoning":
         sayable = [_in_turn(request, sayable)]
     by_frame = {scenario.fields.frame: scenario for way in sayable for scenario in way.scenarios}
     purpose = setting.removeprefix("direct-")

@@ -10,35 +10,48 @@ from msgspec.structs import replace
 
 from roboirg.core.instruction_options import DEFAULT_LANGUAGE
 from roboirg.core.word_pools import PoolName
-from roboirg.language.scenarios.scenario_file import general, task_scenarios
+from roboirg.language.scenarios.scenario_file import general, setting_scenarios, words_in
+from roboirg.language.settings import EXPLICIT
 from roboirg.language.templates import LANGUAGE_VERSIONS
 from roboirg.util.short_hash import short_hash
 
 
-def words_of(task: str, pool: PoolName, language: int) -> str:
+def words_of(task: str, pool: PoolName, language: int, setting: str = EXPLICIT) -> str:
     """Return which words a task has in a pool, such as ``PickXtimes/test@1a2b3c4d5e6f``.
 
-    Empty in the usual language, whose words are code: its version is enough.
+    ``PickXtimes/test/lab@3c4d5e6f1a2b`` in a setting *lab* whose own file serves the task. Empty
+    in the usual language, whose words are code: its version is enough.
     """
     if language == DEFAULT_LANGUAGE:
         return ""
-    return f"{task}/{pool}@{words_digest(task, pool)}"
+    name = f"{task}/{pool}"
+    if task in setting_scenarios(setting):
+        name += f"/{setting}"
+    return f"{name}@{words_digest(task, pool, setting)}"
 
 
-def language_label(tasks: Iterable[str], pool: PoolName, language: int) -> str:
-    """Return the version of a language, followed by which words of each task it has."""
-    words = [words_of(task, pool, language) for task in tasks]
-    return " ".join([LANGUAGE_VERSIONS[language], *words]).strip()
+def language_label(
+    tasks: Iterable[str], pool: PoolName, language: int, settings: Iterable[str] = ()
+) -> str:
+    """Return the version of a language, followed by which words each task has in settings."""
+    names = (EXPLICIT, *settings)
+    words: list[str] = []
+    for task in tasks:
+        words += [words_of(task, pool, language, setting) for setting in names]
+    return " ".join([LANGUAGE_VERSIONS[language], *dict.fromkeys(words)]).strip()
 
 
 @functools.cache
-def words_digest(task: str, pool: PoolName) -> str:
+def words_digest(task: str, pool: PoolName, setting: str = EXPLICIT) -> str:
     """Return a hash of all that can be said of a task in a pool; ``none`` without words.
+
+    It counts one file: the setting's own, or else the task's. A file that another package brings
+    for tasks of ours changes the digest of no other setting.
 
     Neither comments nor the order of scenarios and of their sentences change it. The order of a
     list does, since its entries are drawn by their numbers.
     """
-    words = task_scenarios(task)
+    words = words_in(setting, task)
     if words is None:
         return "none"
     scenarios: list[list[str]] = []

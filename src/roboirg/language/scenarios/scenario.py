@@ -13,8 +13,6 @@ import msgspec
 from roboirg.core.word_pools import PoolName
 from roboirg.language.scenarios.markup import Operation, Text
 
-ScenarioSetting = Literal["direct", "reasoning", "spatial", "direct-rival", "grounded"]
-"""The settings that scenarios are written for; contextual takes those of direct."""
 Texts = tuple[str, ...]
 PERSON = ("person", "he", "him", "his", "hers")
 """The slots of a person, ``hers`` for *his* or *hers* alone; those of another one end in ``.2``."""
@@ -69,7 +67,7 @@ class ScenarioFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     frame: str
     pool: PoolName
-    setting: ScenarioSetting
+    setting: str
     list: str = ""
     derive: Derive | None = None
     needs: Needs = Needs()
@@ -126,8 +124,10 @@ class TaskScenarios(msgspec.Struct, frozen=True):
         commands: skeletons, of any fields that a goal can have, by pool.
         stated: the words that state a field's value.
         scenarios: all that are said of it.
+        file: the name of the file that has them.
     """
 
     commands: Mapping[PoolName, Texts]
     stated: Mapping[str, Text]
     scenarios: list[Scenario]
+    file: str

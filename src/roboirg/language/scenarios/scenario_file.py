@@ -26,7 +26,9 @@ from roboirg.language.scenarios.scenario import (
     TaskScenarios,
     Texts,
 )
-from roboirg.tasks import every_task
+from roboirg.language.settings import all_settings
+from roboirg.language.settings.setting import Setting
+from roboirg.tasks import Task, every_task
 
 FOLDER = Path(__file__).parent
 Stored = TypeVar("Stored")
@@ -68,12 +70,43 @@ def task_scenarios(task: str) -> TaskScenarios | None:
     return read_scenario_file(path).get(task) if path else None
 
 
+@functools.cache
+def setting_scenarios(setting: str) -> Mapping[str, TaskScenarios]:
+    """Return the words of each task that a setting's own file serves; empty if it names none."""
+    path = _named_file(all_settings().get(setting))
+    return read_scenario_file(path) if path else {}
+
+
+def words_in(setting: str, task: str) -> TaskScenarios | None:
+    """Return the words of a task in a setting; None if none have been written.
+
+    They stand in the setting's own file if it serves the task, and else in the task's file.
+    """
+    return setting_scenarios(setting).get(task) or task_scenarios(task)
+
+
 def own_file(task: str) -> Path | None:
     """Return the file that a task names for its words; None if it names none."""
-    found = every_task().get(task)
-    if found is None or not found.words:
+    return _named_file(every_task().get(task))
+
+
+def _named_file(owner: Task | Setting | None) -> Path | None:
+    """Return the file that a task or setting names for its words; None if it names none."""
+    if owner is None or not owner.words:
         return None
-    return FOLDER / found.words  # a whole path stays as it is
+    path = FOLDER / owner.words  # a whole path stays as it is
+    if not path.is_file():
+        raise InvalidValueError(
+            f"The words of {owner.name} are {str(path)!r}, which is no file; name it by its whole "
+            "path."
+        )
+    return path
+
+
+def scenario_settings() -> Mapping[str, Setting]:
+    """Return the settings that scenarios are written for; contextual says those of direct."""
+    others = ("", "explicit", "contextual")
+    return {one.name: one for one in all_settings().values() if one.offers not in others}
 
 
 def read_task_scenarios(text: str, where: str) -> Mapping[str, TaskScenarios]:
@@ -115,7 +148,7 @@ def read_task_scenarios(text: str, where: str) -> Mapping[str, TaskScenarios]:
 
 def _command_words(head: FileFields, task: str, where: str, mistakes: list[str]) -> TaskScenarios:
     """Return the words of a task without scenarios: its commands, and the values they state."""
-    path = own_file(task)
+    path, file = own_file(task), where
     if path and not {ALL, task} & head.commands.keys():
         where = path.name
         head = _as(FileFields, _text_of(path), where)
@@ -130,7 +163,7 @@ def _command_words(head: FileFields, task: str, where: str, mistakes: list[str])
             mistakes.append(f"{where} has no commands of {task} in the pool {pool}.")
         for command in written.get(pool, ()):
             _sentence(command, "", texts, f"{where}, commands of {task}", mistakes)
-    return TaskScenarios(written, stated, [])
+    return TaskScenarios(written, stated, [], file)
 
 
 def _scenario(
@@ -194,18 +227,22 @@ def _unmet(
     stated: Collection[str],
 ) -> list[str]:
     """Return what the fields of a scenario need of each other and do not have."""
+    settings = scenario_settings()
+    if fields.setting not in settings:
+        return [f"has the setting {fields.setting!r}; the settings are {', '.join(settings)}"]
+    offers = settings[fields.setting].offers
     needed = ["introduction", *(_CONTEXTUAL if fields.setting == "direct" else ())]
-    if fields.setting == "direct-rival":
+    if offers == "direct-rival":
         needed += [f"remarks.{name}" for name in REMARKS]
     lacking = [name for name in needed if not any(texts.get(name, ()))]
     unknown = sorted(set(said) - set(stated))
     slots = _slots(stated)
     wrong = {
-        "has no say; give words for the fields that the command leaves open": not said,
+        f"has no say; write say.{' or say.'.join(stated)}": not said,
         f"has say.{', say.'.join(unknown)}; the fields are {', '.join(stated)}": unknown,
         f"has no {' and no '.join(lacking)}; {fields.setting} needs {', '.join(needed)}": lacking,
         "must have derive if its setting is reasoning, and only then": (
-            (fields.derive is not None) != (fields.setting == "reasoning")
+            (fields.derive is not None) != (offers == "reasoning")
         ),
         "has a competing remark that names no {rival …}": not all(
             any(name.startswith("rival ") for name in slots_in(one))
@@ -233,7 +270,8 @@ def _sentence(
     parts = _parsed(text, where, mistakes)
     known = GIVEN | _slots(stated)
     mistakes += [
-        f"{where} has the slot {name!r}; known: {', '.join(sorted(known))}."
+        f"{where} has the slot {name!r}; known: {', '.join(sorted(known))}. Fields of the command "
+        "have their words in stated."
         for name in slots_in(parts)
         if name.removeprefix("rival ") not in known
     ]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -45,7 +44,7 @@ from roboirg.language.scenarios.markup import (
     slots_in,
 )
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
-from roboirg.language.scenarios.scenario_file import general, task_scenarios
+from roboirg.language.scenarios.scenario_file import general, words_in
 from roboirg.language.settings import all_settings, contextual
 from roboirg.language.settings.setting import Setting
 
@@ -55,8 +54,8 @@ _STAGES: Mapping[int, UtteranceStage] = {
     contextual.DISTRACTOR: "distractor",
     contextual.CUE: "cue",
 }
-_STATING = ("direct", "direct-rival")
-"""Settings whose resolved form states the value; the others keep how it follows."""
+_FOLLOWING = ("reasoning", "spatial", "grounded")
+"""Ways to the goal that the resolved form keeps; it states the value of others."""
 
 
 class _Choice(NamedTuple):
@@ -75,43 +74,51 @@ _MOST_CHOICES = 256
 
 def _choose(request: InstructionRequest) -> _Choice:
     """Return what a setting says of an episode; no choice if it refuses."""
+    setting = all_settings()[request.options.setting]
     # Contextual says the scenarios of direct.
-    name = request.options.setting.replace(_CONTEXTUAL, _DIRECT)
+    name = _DIRECT if setting.offers == _CONTEXTUAL else setting.name
     sampler, own = request.sampler, request.wordings is None
-    key = (name, sampler.key, request.frame, request.pool, own)
+    key = (name, setting.words, sampler.key, request.frame, request.pool, own)
     found = _CHOICES.get(key)
     if found is None or found.episode != request.episode:
         if len(_CHOICES) >= _MOST_CHOICES:
             _CHOICES.clear()
         log: list[str] = []
-        reason, chosen = all_settings()[name].refusal(request), None
+        reason, chosen = setting.refusal(request), None
         if reason is None:
-            words = cast("TaskScenarios", task_scenarios(request.task.name))
+            words = _words(request)
             wanted = (name, request.pool)
             known = [
                 one for one in words.scenarios if (one.fields.setting, one.fields.pool) == wanted
             ]
             chosen = choose(replace(request, sampler=replace(sampler, log=log)), name, known)
-        if chosen is None:
-            reason = reason or f"language 4 has no scenario for it in the pool {request.pool}"
+            if chosen is None:
+                file = setting.words or words.file
+                reason = f"{file} has no {name} scenario for it in the pool {request.pool}"
         found = _CHOICES[key] = _Choice(request.episode, chosen, log, reason)
     return found
 
 
+def _words(request: InstructionRequest) -> TaskScenarios:
+    """Return the words of a task that has some."""
+    return cast("TaskScenarios", words_in(request.options.setting, request.task.name))
+
+
 def refusal(request: InstructionRequest) -> str | None:
     """Return why a setting cannot express an episode; None if it can."""
-    task = request.task
-    if task_scenarios(task.name) is None:
-        if task.words:
-            return f"{task.name} is none of the tasks of {task.words}, the file that it names"
+    task, setting = request.task, all_settings()[request.options.setting]
+    file = setting.words or task.words
+    if not file:
         return f"language 4 has no scenarios of {task.name} yet"
-    return None if request.options.setting == _EXPLICIT else _choose(request).refusal
+    if words_in(setting.name, task.name) is None:
+        return f"{task.name} is not among the tasks of {file}"
+    return None if setting.offers == _EXPLICIT else _choose(request).refusal
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return the words of an episode in a setting that does not refuse it."""
-    words = cast("TaskScenarios", task_scenarios(request.task.name))
-    if request.options.setting == _EXPLICIT:
+    words = _words(request)
+    if all_settings()[request.options.setting].offers == _EXPLICIT:
         speech = Speech(request, words, Introduced(goal_values(request)))
         command = UtteranceSpec("command", speech.command({}, ()))
         return InstructionSpec((command,), meaning=speech.meaning())
@@ -120,10 +127,9 @@ def say(request: InstructionRequest) -> InstructionSpec:
     return say_chosen(request, words, cast("Chosen", choice.chosen))
 
 
-@functools.cache
-def in_language_4(name: str) -> Setting:
-    """Return a setting that speaks in scenarios."""
-    return replace(all_settings()[name], say=say, refusal=refusal)
+def in_language_4(setting: Setting) -> Setting:
+    """Return a setting that speaks in scenarios; the same if it offers them nothing to say."""
+    return replace(setting, say=say, refusal=refusal) if setting.offers else setting
 
 
 def say_chosen(
@@ -134,7 +140,7 @@ def say_chosen(
     speech = Speech(request, words, chosen.introduced, scenario)
     utterances = [UtteranceSpec("introduction", speech.phrase(scenario.text("introduction")))]
     notes: dict[str, object] = {**chosen.introduced.notes, "scenario": scenario.fields.frame}
-    if options.setting == _CONTEXTUAL:
+    if all_settings()[options.setting].offers == _CONTEXTUAL:
         utterances += _stages(request, speech, scenario)
         notes["stages"] = list(options.stages)
         if contextual.DISTRACTOR in options.stages:
@@ -249,7 +255,7 @@ class Speech:
         """
         scenario = self._scenario
         if self._request.resolved and scenario:
-            states = scenario.fields.setting in _STATING
+            states = all_settings()[scenario.fields.setting].offers not in _FOLLOWING
             usual = self._words.stated[name] if states else words
             words = scenario.texts.get(f"resolved.{name}", (usual,))[0]
         phrase = self.phrase(words, resolved=self._request.resolved)
@@ -288,9 +294,11 @@ class Speech:
         commands = self._words.commands[self._request.pool]
         possible = [command for command in commands if wanted == {*slots_in(parse(command))}]
         if not possible:
-            fields_wanted = ", ".join(sorted(wanted))
-            task = self._request.task.name
-            raise InvalidValueError(f"{task} has no command with the fields {fields_wanted}.")
+            marks = " and ".join(f"{{{name}}}" for name in sorted(wanted))
+            raise InvalidValueError(
+                f"{self._words.file} has no command of {self._request.task.name} with {marks} in "
+                f"the pool {self._request.pool}."
+            )
         template = self._request.sampler.pick(f"command-{len(wanted)}", possible)
         words = {
             name: fields.get(name) or self.field(name, self._words.stated[name]) for name in wanted

@@ -112,4 +112,5 @@ SETTING = Setting(
     ),
     pairing_rules=_pairing_rules,
     example=1,
+    offers="contextual",
 )

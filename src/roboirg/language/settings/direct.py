@@ -55,4 +55,5 @@ SETTING = Setting(
     reads=frozenset({"delivery", "language"}),
     pairing_rules=_pairing_rules,
     example=2,
+    offers="direct",
 )

@@ -31,4 +31,5 @@ SETTING = Setting(
     reads=direct.SETTING.reads,
     example=2,
     plain=direct.SETTING.name,
+    offers="direct-rival",
 )

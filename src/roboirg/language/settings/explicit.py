@@ -20,4 +20,5 @@ SETTING = Setting(
     say=say,
     implicit=False,
     reads=frozenset({"language"}),
+    offers="explicit",
 )

@@ -223,4 +223,5 @@ SETTING = Setting(
     reads=frozenset({"delivery", "language"}),
     example=2,
     plain="direct",
+    offers="grounded",
 )

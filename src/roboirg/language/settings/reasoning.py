@@ -63,4 +63,5 @@ SETTING = Setting(
     say=say,
     reads=frozenset({"delivery", "language"}),
     example=3,
+    offers="reasoning",
 )

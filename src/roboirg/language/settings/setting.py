@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from roboirg.core.errors import check_names
+from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
 from roboirg.language.instruction import Instruction
 from roboirg.language.request import InstructionRequest, InstructionSpec
@@ -14,6 +14,8 @@ from roboirg.tasks import Task
 
 Instruct = Callable[[InstructionOptions], Instruction]
 """Returns an instruction of the episode at hand."""
+Offers = Callable[[InstructionRequest], Iterable[Any]]
+"""Yields each way to the goal that a scenario can say: an `Offer` of `scenarios.introduced`."""
 
 
 def never_refuses(_request: InstructionRequest) -> str | None:
@@ -44,9 +46,17 @@ class Setting:
         example: index of the test episode that shows the setting in the language card.
         plain: name of the setting that this one makes harder; None if it stands by itself. Harder
             settings are played only where they are named: ``all`` leaves them out.
+        offers: the ways to the goal that scenarios of language 4 can say; or the name of a setting
+            of ours that has the same ways: ``"direct"``, or ``"explicit"`` for the command alone,
+            or ``"contextual"`` for the scenarios of direct with what stands between. Empty if
+            `say` has the words of language 4, too.
+        words: the file with its scenarios, by its whole path, such as
+            ``str(Path(__file__).with_name("words.toml"))``; empty if they stand in the files of
+            the tasks.
 
     Raises:
         UnknownNameError: it reads an option that does not exist.
+        InvalidValueError: it has offers, and does not read the language.
     """
 
     name: str
@@ -62,9 +72,15 @@ class Setting:
     pairing_rules: Callable[[Instruct], Iterable[str]] = lambda _instruct: ()
     example: int = 0
     plain: str | None = None
+    offers: Offers | str = ""
+    words: str = ""
 
     def __post_init__(self) -> None:
         check_names("option of instructions", self.reads, OPTION_NAMES)
+        if self.offers and "language" not in self.reads:
+            raise InvalidValueError(
+                f"The setting {self.name} has offers, so 'language' must be in its reads."
+            )
 
     @property
     def may_refuse(self) -> bool:

@@ -168,4 +168,5 @@ SETTING = Setting(
     reads=frozenset({"frame", "delivery", "language"}),
     variants=tuple({"frame": frame} for frame in FRAMES),
     example=6,
+    offers="spatial",
 )

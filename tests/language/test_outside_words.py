@@ -1,0 +1,331 @@
+"""Words of language 4 from another package, in a process where it is installed."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from roboirg.core.word_pools import POOLS
+from roboirg.language.scenarios.identity import words_of
+from roboirg.tasks import all_tasks
+
+DOCS = Path(__file__).parents[2] / "docs"
+FRAME = """
+[[scenario]]
+frame = "%s"
+pool = "%s"
+setting = "%s"
+"""
+SCENARIOS = [
+    (
+        "direct",
+        """
+introduction = "{person} wants a NOUN of the {color} cube."
+reinforcement = "{he} dreams of <it color: it> as a NOUN."
+distractors = ["Every NOUN takes hours.", "A NOUN is expensive.", "My last NOUN was lost."]
+competing = ["{he} already has a NOUN of {his} {rival color} hat."]
+cue = "Okay, the NOUN begins with <it color: it>."
+say.color = ["<it color: it>", "<that color: that cube>"]
+""",
+    ),
+    (
+        "reasoning",
+        """
+derive.pattern = "color exclusion"
+introduction = "I already have a NOUN of the {excluded} [excluded: cube|cubes]."
+say.color = ["<other excluded: the other one>"]
+""",
+    ),
+    (
+        "reasoning",
+        """
+list = "color"
+derive.pattern = "contextual logic"
+introduction = "I need a NOUN of the {list} cubes, but {person} has the {taken} one."
+say.color = ["<other color: the other one>"]
+""",
+    ),
+    (
+        "direct-rival",
+        """
+list = "color"
+introduction = "The NOUN of {person} has the {list.0} cube, and mine has the {list.1} one."
+say.color = ["<it color: it>"]
+remarks.former = "The NOUN is ready for <former list.0: {hers}>: "
+remarks.latter = "The NOUN is ready for <latter list.1: the latter>: "
+remarks.not_former = "The NOUN cannot have <former list.0: {hers}>: "
+remarks.not_latter = "The NOUN cannot have <latter list.1: the latter>: "
+""",
+    ),
+    (
+        "grounded",
+        """
+introduction = "{clue} is missing from the NOUN."
+say.color = ["<it clue: it>"]
+""",
+    ),
+]
+"""Of every setting of the page's task, in other words for each pool."""
+
+
+def blocks(page: str, heading: str) -> list[str]:
+    """Return the blocks of a section of a page, and of its smaller ones, as they stand there."""
+    _, _, section = (DOCS / page).read_text().partition(f"\n## {heading}\n")
+    section = re.split(r"^## ", section, flags=re.MULTILINE)[0]
+    return re.findall(r"```(?:python|toml)\n(.*?)```", section, re.DOTALL)
+
+
+def all_words() -> str:
+    """Return the page's file of words with scenarios of every setting instead of its own."""
+    head, _, _ = TASK_WORDS.partition("[[scenario]]")
+    scenarios = []
+    for pool, noun in zip(POOLS, ("painting", "film"), strict=True):
+        for number, (setting, text) in enumerate(SCENARIOS):
+            scenario = FRAME % (f"{noun} {number}", pool, setting) + text.strip()
+            scenarios.append(scenario.replace("NOUN", noun))
+    return head + "\n".join(scenarios)
+
+
+TASK_PAGE = (DOCS / "add-task.md").read_text()
+TASK, *_ = re.findall(r"```python\n(.*?)```", TASK_PAGE, re.DOTALL)
+TASK_PROJECT, *_ = re.findall(r"```toml\n(.*?)```", TASK_PAGE, re.DOTALL)
+(TASK_WORDS,) = blocks("add-task.md", "Words of language 4")
+OWN_SAY, OWN_SAY_PROJECT = blocks("add-setting.md", "Add a setting")
+COLORED, COLORED_PROJECT, COLORED_WORDS = blocks("add-setting.md", "Let it speak language 4")
+
+
+class Package:
+    """A package as if it were installed.
+
+    Args:
+        folder: where it lies.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.files = folder / "my_package"
+        info = folder / "my_package-1.0.dist-info"
+        for made in (self.files, info):
+            made.mkdir()
+        files = {
+            "__init__.py": "",
+            "place_and_press.py": TASK,
+            "words.toml": TASK_WORDS,
+            "my_setting.py": OWN_SAY,
+            "colored.py": COLORED,
+            "colored.toml": COLORED_WORDS,
+        }
+        for name, text in files.items():
+            (self.files / name).write_text(text)
+        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
+        entries = ""
+        for project in (TASK_PROJECT, OWN_SAY_PROJECT, COLORED_PROJECT):
+            for group, points in tomllib.loads(project)["project"]["entry-points"].items():
+                lines = [f"{name} = {place}" for name, place in points.items()]
+                entries += "\n".join([f"[{group}]", *lines, ""])
+        (info / "entry_points.txt").write_text(_merged(entries))
+
+    def run(self, code: str) -> list:
+        """Return what a program yields with `found`, where the package is installed."""
+        path = os.pathsep.join([str(self.folder), *sys.path])
+        done = subprocess.run(
+            [sys.executable, "-c", PRELUDE + code + "\nprint(json.dumps(found))"],
+            env={**os.environ, "PYTHONPATH": path},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert not done.returncode, done.stderr
+        return json.loads(done.stdout)
+
+
+def _merged(entries: str) -> str:
+    """Return entry points with each group once."""
+    groups: dict[str, list[str]] = {}
+    for line in entries.splitlines():
+        if line.startswith("["):
+            own = groups.setdefault(line, [])
+        else:
+            own.append(line)
+    return "\n".join("\n".join([group, *lines]) for group, lines in groups.items())
+
+
+PRELUDE = """
+import itertools, json
+from dataclasses import replace
+from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import POOLS
+from roboirg.language import FORMS, instruct, instruct_with
+from roboirg.language.arms import say_arm
+from roboirg.language.generator import find_refusal
+from roboirg.language.scenarios.identity import language_label, words_of
+from roboirg.language.scenarios.scenario_file import setting_scenarios, task_scenarios
+from roboirg.language.settings import all_settings, get_setting, settings_of
+from roboirg.shortcuts.command_chance import understood_goals
+from roboirg.tasks import all_tasks, get_task
+from roboirg.tasks.splits.splits import get_episode
+found = []
+
+def refused(task, setting):
+    try:
+        return instruct(get_episode(task, "test", 0), setting, language=4).text
+    except InvalidValueError as error:
+        return str(error)
+"""
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory):
+    return Package(tmp_path_factory.mktemp("package"))
+
+
+def test_the_page_s_setting_says_scenarios_of_its_own_file(package):
+    found = package.run("""
+for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
+    episode = get_episode(task, "test", 1)
+    options = InstructionOptions("colored", language=4, wordings=pool)
+    said = instruct_with(episode, options)
+    stated = instruct_with(episode, replace(options, form="resolved"))
+    explicit = instruct_with(episode, replace(options, setting="explicit"))
+    assert stated.turns == (said.turns[0], explicit.text)
+    assert said.metadata["words"] == words_of(task, pool, 4, "colored")
+    assert understood_goals(said, episode) == (episode.goal,)
+    found.append(said.metadata["scenario"])
+    reports = check_scenarios(setting_scenarios("colored")[task], None, scenes_of(task, 0)[::20])
+    found += [rule for report in reports for rule in report.broken]
+""")
+    assert found == ["new coat", "loan"] * 2
+
+
+def test_its_file_counts_in_the_words_of_that_setting_alone(package):
+    found = package.run("""
+for task, pool, setting in itertools.product(all_tasks(), POOLS, all_settings()):
+    found.append([task, pool, setting, words_of(task, pool, 4, setting)])
+found.append(language_label(["PickXtimes"], "test", 4, ["direct", "colored"]))
+""")
+    label = found.pop()
+    own = [row for row in found if row[-1] != words_of(row[0], row[1], 4)]
+    assert [row[:3] for row in own] == [
+        [task, pool, "colored"] for task in ("PickXtimes", "SwingXtimes") for pool in POOLS
+    ]
+    name = r"PickXtimes/test/colored@[0-9a-f]{12}"
+    assert re.fullmatch(name, own[1][-1])
+    assert label.split()[1:] == [words_of("PickXtimes", "test", 4), own[1][-1]]
+    assert {task for task, *_ in found} == set(all_tasks())
+
+
+def test_a_setting_that_does_not_read_the_language_says_the_same_in_each(package):
+    (usual, new) = package.run("""
+for language in (3, 4):
+    said = instruct(get_episode("BinFill", "test", 1), "interrupted", language=language)
+    found.append([said.text, said.metadata["language_version"], said.metadata.get("words")])
+""")
+    assert usual == new
+    assert usual[2] is None
+
+
+def test_the_page_s_task_speaks_with_the_words_of_its_own_file(package):
+    explicit, introduction, spatial, *rest = package.run("""
+words = task_scenarios("PlaceAndPress")
+found += [refused("PlaceAndPress", "explicit"), refused("PlaceAndPress", "contextual")]
+found += [refused("PlaceAndPress", "reasoning")]
+for report in check_scenarios(words, None, scenes_of("PlaceAndPress", 0)[::20]):
+    found += report.broken
+""")
+    assert re.fullmatch(r"Place the \w+ cube on the target, then push the button\.", explicit)
+    assert re.match(r"\w+ wants a photo of the \w+ cube on the target\. ", introduction)
+    assert spatial.endswith(": words.toml has no reasoning scenario for it in the pool test.")
+    assert not rest
+
+
+def test_a_task_from_outside_has_every_setting_form_and_arm(tmp_path):
+    outside = Package(tmp_path)
+    (outside.files / "words.toml").write_text(all_words())
+    *found, settings = outside.run("""
+task = get_task("PlaceAndPress")
+arms = ("paraphrase-1", "other-goal", "silent", "scrambled", "again")
+for report in check_scenarios(task_scenarios(task.name), None, scenes_of(task.name, 0)[::10]):
+    found += [f"{report.scenario.fields.frame}: {rule}" for rule in report.broken]
+spoken = set()
+for split, index, name in itertools.product(("train", "test"), range(12), settings_of(task)):
+    episode = get_episode(task.name, split, index)
+    options = InstructionOptions(name, language=4)
+    if find_refusal(episode, options) is not None:
+        continue
+    spoken.add((name, split))
+    for form in FORMS:
+        said = instruct_with(episode, replace(options, form=form))
+        if understood_goals(said, episode) != (episode.goal,):
+            found.append(said.text)
+    if name in ("direct", "direct-rival") and episode.goal.text("color") not in said.command:
+        found.append(said.text)
+    for arm in arms if index < 2 else ():
+        try:
+            say_arm(episode, options, arm)
+        except InvalidValueError as error:
+            if "has no paraphrase" not in str(error):
+                raise
+found.append(sorted(spoken))
+""")
+    assert not found
+    names = ("contextual", "direct", "direct-rival", "explicit", "grounded", "reasoning")
+    assert settings == [[name, split] for name in names for split in ("test", "train")]
+
+
+@pytest.mark.parametrize(
+    ("file", "before", "after", "task", "setting", "sentence"),
+    [
+        (
+            "colored.py", '"colored.toml"', '"gone.toml"', "PickXtimes", "colored",
+            "The words of colored are '{}/gone.toml', which is no file; name it by its whole path.",
+        ),
+        (
+            "place_and_press.py", '"words.toml"', '"gone.toml"', "PlaceAndPress", "explicit",
+            "The words of PlaceAndPress are '{}/gone.toml', which is no file; name it by its wh",
+        ),
+        (
+            "colored.toml", '"PickXtimes", ', "", "PickXtimes", "colored",
+            ": {}/colored.toml has no colored scenario for it in the pool test.",
+        ),
+        (
+            "words.toml", "PlaceAndPress", "PickXtimes", "PlaceAndPress", "explicit",
+            ": PlaceAndPress is not among the tasks of {}/words.toml.",
+        ),
+        (
+            "colored.toml", 'setting = "colored"', 'setting = "colorful"', "PickXtimes", "colored",
+            " 'new coat' has the setting 'colorful'; the settings are direct, direct-rival, ",
+        ),
+        (
+            "colored.py", "offers=offers", 'offers="drect"', "PickXtimes", "colored",
+            "There is no way to the goal for the offers of colored, named 'drect'; known: direct, ",
+        ),
+        (
+            "colored.toml", 'say.color = ["<it color: it>"]', "", "PickXtimes", "colored",
+            "colored.toml, scenario 'new coat' has no say; write say.color or say.repeats.",
+        ),
+        (
+            "words.toml", 'color = "the', 'colour = "the', "PlaceAndPress", "explicit",
+            "words.toml, stated has the slot 'color'; known: ",
+        ),
+        (
+            "words.toml", "Place {color} on", "Place it on", "PlaceAndPress", "explicit",
+            "words.toml has no command of PlaceAndPress with {{color}} in the pool test.",
+        ),
+    ],
+)  # fmt: skip
+def test_what_words_from_outside_lack_is_said_in_a_sentence(
+    tmp_path, file, before, after, task, setting, sentence
+):
+    outside = Package(tmp_path)
+    text = (outside.files / file).read_text()
+    assert before in text
+    (outside.files / file).write_text(text.replace(before, after))
+    (printed,) = outside.run(f"found.append(refused({task!r}, {setting!r}))")
+    assert sentence.format(outside.files) in printed
