@@ -112,8 +112,9 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
             # Both forms have a command from outside, or none of them.
             forms = {str(form): _say_outside(request, setting, form) for form in FORMS}
             return spoken_instruction(*forms[options.form])
-    sampler = sampler_of(episode, variant, request.options.language)
-    own = replace(request, wordings=None, sampler=sampler)
+    own = replace(
+        request, wordings=None, sampler=sampler_of(episode, variant, request.options.language)
+    )
     return spoken_instruction(own, setting.say(own))
 
 

@@ -67,7 +67,9 @@ def choose(
     sayable: list[_Sayable] = []
     if isinstance(offers, str):
         check_names(f"way to the goal for the offers of {setting}, named", [offers], _OFFERS)
-    ways = _OFFERS[offers] if isinstance(offers, str) else offers
+        ways = _OFFERS[offers]
+    else:
+        ways = offers
     for offer in ways(request):
         saying = [scenario for scenario in fitting if _says(scenario, offer)]
         if saying:

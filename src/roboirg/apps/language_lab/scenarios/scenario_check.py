@@ -142,7 +142,7 @@ def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episod
         for rule in () if request.resolved else _broken(request, *said):
             report.add(rule, text)
         # What is seen is said again in the resolved form, which nobody has to hear.
-        if not (request.resolved and name == "grounded"):
+        if not (request.resolved and all_settings()[name].offers == "grounded"):
             report.longest = max(report.longest, (tokens_of(text), text))
     implicit, _, *competing = told
     report.competing = report.competing or "".join(one.text for one in competing)
