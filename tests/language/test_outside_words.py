@@ -315,6 +315,10 @@ found.append(sorted(spoken))
             "words.toml, stated has the slot 'color'; known: ",
         ),
         (
+            "words.toml", "train = [", "train = [] # [", "PlaceAndPress", "explicit",
+            "words.toml has no commands of PlaceAndPress in the pool train.",
+        ),
+        (
             "words.toml", "Place {color} on", "Place it on", "PlaceAndPress", "explicit",
             "words.toml has no command of PlaceAndPress with {{color}} in the pool test.",
         ),

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from roboirg import tasks
 from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
 from roboirg.apps.language_lab.scenarios.scenario_report import report_lines
 from roboirg.apps.language_lab.scenarios.sentence_rules import blanked, literal
@@ -20,9 +19,7 @@ from roboirg.core.word_pools import POOLS
 from roboirg.language import instruct, instruct_with, open_wordings
 from roboirg.language.arms import say_arm
 from roboirg.language.generator import find_refusal, request_of, spoken_instruction
-from roboirg.language.scenarios import scenario_file
 from roboirg.language.scenarios.choice import choose
-from roboirg.language.scenarios.identity import words_digest
 from roboirg.language.scenarios.scenario_file import (
     FOLDER,
     pointer_table,
@@ -395,46 +392,6 @@ def test_a_file_without_commands_has_those_of_each_task():
         assert read(text, task).commands == own.commands
         (scenario,) = read(text, task).scenarios
         assert scenario not in own.scenarios
-
-
-@pytest.fixture
-def outside(monkeypatch, tmp_path):
-    """Yield a file, and a task of another package that names it."""
-    path = tmp_path / "theirs.toml"
-    task = replace(all_tasks()["PickXtimes"], name="LabPick", suite="lab", words=str(path))
-    monkeypatch.setattr(tasks, "every_task", lambda: {**all_tasks(), "LabPick": task})
-    monkeypatch.setattr(scenario_file, "every_task", tasks.every_task)
-    for cached in (task_scenarios, words_digest):
-        cached.cache_clear()
-    yield path, replace(get_episode("PickXtimes", "test", 0), task="LabPick")
-    for cached in (task_scenarios, words_digest):
-        cached.cache_clear()
-
-
-def test_a_task_of_another_package_has_the_words_of_its_own_file(outside):
-    path, episode = outside
-    path.write_text(TWO_TASKS.replace("SwingXtimes", "LabPick"))
-    said = instruct(episode, "explicit", language=4)
-    assert re.fullmatch(r"Swing the \w+ cube for \w+ laps?\.", said.text)
-    assert words_digest("LabPick", "test") != "none"
-
-
-@pytest.mark.parametrize(
-    ("text", "complaint"),
-    [
-        ('tasks = ["LabPick"]', r"theirs\.toml has no commands of LabPick in the pool train\."),
-        (
-            TWO_TASKS.replace("SwingXtimes", "LabPick").replace("Swing {color} {repeats}", "Go"),
-            r"^theirs\.toml has no command of LabPick with \{color\} and \{repeats\} in the pool t",
-        ),
-        (TWO_TASKS, r": LabPick is not among the tasks of \S*theirs\.toml\."),
-    ],
-)
-def test_a_task_whose_own_file_lacks_its_words_is_refused_in_a_sentence(outside, text, complaint):
-    path, episode = outside
-    path.write_text(text)
-    with pytest.raises(InvalidValueError, match=complaint):
-        instruct(episode, "explicit", language=4)
 
 
 WAITING = {"amount"}
