@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterator, Mapping
 
 from roboirg.core.episode import ALL_COLORS
 from roboirg.language.number_words import CARDINALS, ORDINALS
-from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, pointers_in
+from roboirg.language.phrases import TaggedText
+from roboirg.language.scenarios.markup import (
+    Agreement,
+    Pointer,
+    Slot,
+    Text,
+    pointers_in,
+    slots_said,
+)
 from roboirg.language.scenarios.scenario import PEOPLE, Scenario
+from roboirg.tasks.task import Commands
 
 NEVER: Mapping[str, str] = {
     r"you(?:'ve| have)? (?:just )?saw|you(?:'ve| have) (?:just )?seen|as you saw": (
@@ -17,13 +27,39 @@ NEVER: Mapping[str, str] = {
     r"look(?:ing)? at": "the thing may be covered or not there yet",
     r"point(?:ing|ed) (?:at|to)": "nobody points",
     r"(?:picture|image|photo|video) shows": "what is shown is not checked",
-    r"you(?:'ve| have)? (?:just )?(?:tried|did|done) (?:this|that|it)": "the robot did nothing yet",
+    r"you(?:'ve| have)? (?:just |already )?(?:tried|did|done) (?:this|that|it)"
+    r"|time for (?:just )?one more|nobody has (?:lifted|touched|moved|picked)": (
+        "nothing was done yet"
+    ),
+    r"(?:he|she|they|_) (?:already|still) (?:has|have) the _ (?:cube|one)"
+    r"|has (?:taken|found) the|found nothing": "the thing is on the table",
+    r"as i (?:just )?said|i (?:just|already) (?:said|told you)|mentioned (?:earlier|before|above)"
+    r"|(?:written|said|see|read) (?:above|below)|(?:this|last|next) (?:sentence|message|prompt)": (
+        "depends on how the words are delivered"
+    ),
     r"there (?:are|is) [^.]*\bon the table": "what is on the table is not checked",
-    r"two times fewer|two fewer times": "heard as half of it; say 'that many times minus two'",
-    r"at the other moment|between the times": "wrong English",
+    r"two times fewer|two fewer times": "heard as half of it; say 'one time fewer' only",
+    r"minus": "people subtract in words; say 'fewer'",
+    r"neither of (?:those|these|them)|not that color": (
+        "one is left; say 'the other one' or 'the one that's left'"
+    ),
+    r"(?:leaves?|tunes? in|ha[sd] to go|have to go|calls?|arrives?) on (?:its|the(?: cube's)?) _"
+    r" (?:visit|pass)": "a visit is no time of day",
+    r"at the other moment|between the times|of the _ (?:one|cube)s? (?:we|i|he|she|they)"
+    r"|so many mails|vote[sd]? about|third from your": "wrong English",
     r"favorite color|favou?rite": "a taste decides nothing; say why it matters today",
+    r"nearest|closest|farthest|leftmost|rightmost|all the way (?:on|in|at|to) (?:the|your)": (
+        "a place is a slot, {place} or {clue}"
+    ),
+    "|".join(ALL_COLORS): "a color is a slot",
 }
 """Words that would be false, ambiguous or wrong, and why."""
+COVERED = re.compile(
+    r"\b(?:look at|watch|keep an eye on|can (?:you )?see|do you see|here's|there's)"
+    r" (?:the _ cube|_? ?(?:it|both)\b)",
+    re.IGNORECASE,
+)
+"""Words for a cube in plain view."""
 _NAMED = "|".join((*ALL_COLORS, *(set(CARDINALS) - {"one"}), *ORDINALS, "twice"))
 _VALUE = re.compile(
     rf"\b(?!first of all\b|(?:at )?first[,.]|second[,.!?])(?:{_NAMED})\b"
@@ -46,12 +82,33 @@ _POINTED_AT = {
 """What a remark of direct-rival points at first."""
 
 
-def broken_sentences(scenario: Scenario) -> Iterator[str]:
-    """Yield what is wrong with the sentences of a scenario."""
+def broken_sentences(scenario: Scenario, commands: Commands) -> Iterator[str]:
+    """Yield what is wrong with the sentences of a scenario of a task with these commands."""
     for name, texts in scenario.texts.items():
         for text in texts:
-            for complaint in _wrong(name, text):
+            for complaint in (*_wrong(name, text), *_misplaced(text, commands)):
                 yield f"{name}: {complaint}"
+    spots = [slot.form == "spot" for slot in slots_said(scenario.text("introduction"))]
+    said = [literal(text) for name in scenario.said for text in scenario.texts[f"say.{name}"]]
+    if any(spots) and any("the one there" in words for words in said):
+        yield "say: 'the one there' after a spot; name the thing"
+
+
+def _misplaced(text: Text, commands: Commands) -> Iterator[str]:
+    """Yield what is said of a place or thing that is not as it is when the words are heard."""
+    nouns = (commands.pointed.removeprefix("hidden_"), "one")
+    begun: Text = (TaggedText(""), *text)
+    for before, part in itertools.pairwise(begun):
+        if not isinstance(part, Slot) or part.form is not None:
+            continue
+        words = literal((before,)).split()
+        is_place = part.name.partition(".")[0] in ("place", "aside")
+        if is_place and (not words or words[-1] not in nouns):
+            yield f"says {{{part.name}}}, which follows {' or '.join(map(repr, nouns))}"
+    if commands.pointed == "container":
+        found = COVERED.search(literal(text))
+        if found:
+            yield f"has the words {found[0]!r}; the cube is under a container"
 
 
 def _wrong(name: str, text: Text) -> Iterator[str]:
@@ -60,6 +117,8 @@ def _wrong(name: str, text: Text) -> Iterator[str]:
         found = re.search(rf"\b(?:{pattern})\b", words, re.IGNORECASE)
         if found:
             yield f"has the words {found[0]!r}; {reason}"
+    if field in ("lead", "remarks") and not words.endswith(" "):
+        yield f"must end with a space: {words!r}"
     if re.search(r"  | [.,;:?!]|^ |,,", words):
         yield f"has a space or comma too many: {words!r}"
     pointers = list(pointers_in(text))
