@@ -19,8 +19,6 @@ def report_lines(report: ScenarioReport, task: str) -> Iterator[str]:
     yield f"  {report.longest[0]} of {USUAL_LIMIT} tokens; fits {counted(fits, 'scene')}."
     if report.open < fits:
         yield f"  In {counted(fits - report.open, 'scene')} the command alone gives the goal."
-    if report.often:
-        yield f"  Often in one text: {', '.join(sorted(report.often))}."
     for rule, number in report.broken.items():
         example = report.examples[rule]
         often = f" (in {counted(number, 'scene')})" if example else ""

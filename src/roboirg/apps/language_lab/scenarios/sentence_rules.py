@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Iterator, Mapping
 
 from roboirg.core.episode import ALL_COLORS
 from roboirg.language.number_words import CARDINALS, ORDINALS
-from roboirg.language.phrases import TaggedText
-from roboirg.language.scenarios.markup import (
-    Agreement,
-    Pointer,
-    Slot,
-    Text,
-    pointers_in,
-    slots_said,
-)
+from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, pointers_in
 from roboirg.language.scenarios.scenario import PEOPLE, Scenario
-from roboirg.tasks.task import Commands
 
+_SLOT = r"\{[^}]*\}"
 NEVER: Mapping[str, str] = {
     r"you(?:'ve| have)? (?:just )?saw|you(?:'ve| have) (?:just )?seen|as you saw": (
         "what was seen is not checked"
@@ -31,7 +22,7 @@ NEVER: Mapping[str, str] = {
     r"|time for (?:just )?one more|nobody has (?:lifted|touched|moved|picked)": (
         "nothing was done yet"
     ),
-    r"(?:he|she|they|_) (?:already|still) (?:has|have) the _ (?:cube|one)"
+    rf"(?:he|she|they|person:None\}}) (?:already|still) (?:has|have) the {_SLOT} (?:cube|one)"
     r"|has (?:taken|found) the|found nothing": "the thing is on the table",
     r"as i (?:just )?said|i (?:just|already) (?:said|told you)|mentioned (?:earlier|before|above)"
     r"|(?:written|said|see|read) (?:above|below)|(?:this|last|next) (?:sentence|message|prompt)": (
@@ -43,9 +34,9 @@ NEVER: Mapping[str, str] = {
     r"neither of (?:those|these|them)|not that color": (
         "one is left; say 'the other one' or 'the one that's left'"
     ),
-    r"(?:leaves?|tunes? in|ha[sd] to go|have to go|calls?|arrives?) on (?:its|the(?: cube's)?) _"
-    r" (?:visit|pass)": "a visit is no time of day",
-    r"at the other moment|between the times|of the _ (?:one|cube)s? (?:we|i|he|she|they)"
+    r"(?:leaves?|tunes? in|ha[sd] to go|have to go|calls?|arrives?) on (?:its|the(?: cube's)?) "
+    rf"{_SLOT} (?:visit|pass)": "a visit is no time of day",
+    rf"at the other moment|between the times|of the {_SLOT} (?:one|cube)s? (?:we|i|he|she|they)"
     r"|so many mails|vote[sd]? about|third from your": "wrong English",
     r"favorite color|favou?rite": "a taste decides nothing; say why it matters today",
     r"nearest|closest|farthest|leftmost|rightmost|all the way (?:on|in|at|to) (?:the|your)": (
@@ -54,12 +45,13 @@ NEVER: Mapping[str, str] = {
     "|".join(ALL_COLORS): "a color is a slot",
 }
 """Words that would be false, ambiguous or wrong, and why."""
-COVERED = re.compile(
-    r"\b(?:look at|watch|keep an eye on|can (?:you )?see|do you see|here's|there's)"
-    r" (?:the _ cube|_? ?(?:it|both)\b)",
-    re.IGNORECASE,
+COVERED = (
+    r"(?:look at|watch|keep an eye on|(?:can|do) you see|here's|there's) (?:the )?"
+    rf"(?:{_SLOT} cube|it|both)"
 )
 """Words for a cube in plain view."""
+_PLACED = r"(?!{}|one)[a-z]+ \{{(?:place|aside)[.\d]*:None"
+"""Another thing than that which the place is of."""
 _NAMED = "|".join((*ALL_COLORS, *(set(CARDINALS) - {"one"}), *ORDINALS, "twice"))
 _VALUE = re.compile(
     rf"\b(?!first of all\b|(?:at )?first[,.]|second[,.!?])(?:{_NAMED})\b"
@@ -82,45 +74,29 @@ _POINTED_AT = {
 """What a remark of direct-rival points at first."""
 
 
-def broken_sentences(scenario: Scenario, commands: Commands) -> Iterator[str]:
-    """Yield what is wrong with the sentences of a scenario of a task with these commands."""
+def broken_sentences(scenario: Scenario, pointed: str) -> Iterator[str]:
+    """Yield what is wrong with the sentences of a scenario of a task.
+
+    `pointed` is the kind of object that a place distinguishes in the task.
+    """
+    noun = pointed.removeprefix("hidden_")
+    never = {**NEVER, _PLACED.format(noun): f"a place follows {noun!r} or 'one'"}
+    if pointed == "container":
+        never[COVERED] = "the cube is under a container"
     for name, texts in scenario.texts.items():
         for text in texts:
-            for complaint in (*_wrong(name, text), *_misplaced(text, commands)):
+            for complaint in _wrong(name, text, never):
                 yield f"{name}: {complaint}"
-    spots = [slot.form == "spot" for slot in slots_said(scenario.text("introduction"))]
-    said = [literal(text) for name in scenario.said for text in scenario.texts[f"say.{name}"]]
-    if any(spots) and any("the one there" in words for words in said):
-        yield "say: 'the one there' after a spot; name the thing"
 
 
-def _misplaced(text: Text, commands: Commands) -> Iterator[str]:
-    """Yield what is said of a place or thing that is not as it is when the words are heard."""
-    nouns = (commands.pointed.removeprefix("hidden_"), "one")
-    begun: Text = (TaggedText(""), *text)
-    for before, part in itertools.pairwise(begun):
-        if not isinstance(part, Slot) or part.form is not None:
-            continue
-        words = literal((before,)).split()
-        is_place = part.name.partition(".")[0] in ("place", "aside")
-        if is_place and (not words or words[-1] not in nouns):
-            yield f"says {{{part.name}}}, which follows {' or '.join(map(repr, nouns))}"
-    if commands.pointed == "container":
-        found = COVERED.search(literal(text))
-        if found:
-            yield f"has the words {found[0]!r}; the cube is under a container"
-
-
-def _wrong(name: str, text: Text) -> Iterator[str]:
+def _wrong(name: str, text: Text, never: Mapping[str, str]) -> Iterator[str]:
     field, words = name.partition(".")[0], literal(text)
-    for pattern, reason in NEVER.items():
+    for pattern, reason in never.items():
         found = re.search(rf"\b(?:{pattern})\b", words, re.IGNORECASE)
         if found:
             yield f"has the words {found[0]!r}; {reason}"
     if field in ("lead", "remarks") and not words.endswith(" "):
         yield f"must end with a space: {words!r}"
-    if re.search(r"  | [.,;:?!]|^ |,,", words):
-        yield f"has a space or comma too many: {words!r}"
     pointers = list(pointers_in(text))
     if field in (*_SILENT, *_COMMAND):
         outside = literal(tuple(part for part in text if not isinstance(part, Pointer)))
@@ -145,19 +121,21 @@ def blanked(scenario: Scenario) -> Iterator[str]:
     yield f"frame {scenario.fields.frame}"
     for name, texts in scenario.texts.items():
         if not name.startswith(("say", "resolved")):
-            found = [literal(text).lower().strip() for text in texts]
+            found = [re.sub(_SLOT, "_", literal(text)).lower().strip() for text in texts]
             # "So ..." is no sentence.
             yield from (words for words in found if len(words.split()) > 2)  # noqa: PLR2004
 
 
 def literal(text: Text) -> str:
-    """Return the words that are always said, with a gap for each slot: ``Put it on, _ times.``."""
+    """Return the words with the slots and their forms: ``Put it on {repeats:times}.``."""
     words = []
     for part in text:
         if isinstance(part, Pointer):
             words.append(literal(part.parts))
         elif isinstance(part, Agreement):
             words.append(f"{part.one} {part.many}")
+        elif isinstance(part, Slot):
+            words.append(f"{{{part.name}:{part.form}}}")
         else:
-            words.append("_" if isinstance(part, Slot) else part.text)
+            words.append(part.text)
     return "".join(words)
