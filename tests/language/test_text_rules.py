@@ -8,7 +8,7 @@ from test_scenarios import DIRECT, read
 from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
 from roboirg.apps.language_lab.scenarios.text_rules import GRAMMAR
 from roboirg.core.word_pools import POOLS
-from roboirg.language.scenarios.scenario_file import general
+from roboirg.language.scenarios.scenario_file import general, pointer_table
 
 MORE = "{he} keeps talking about <it color: it>."
 TURNS = "turns {repeats} today"
@@ -166,3 +166,11 @@ def test_remarks_about_anything_keep_the_rules_of_distractors(pool):
     assert not [rule for rule in broken(text, step=5) if not rule.startswith("needs ")]
     (train, test) = (set(general().distractors[pool]) for pool in POOLS)
     assert not train & test
+
+
+def test_no_pointer_says_several_times_of_one():
+    """Sums and doubles are never one."""
+    several = [row for row in pointer_table() if re.search(r"\b(?:many|often|each)\b", row.words)]
+    may_be_one = [row for row in several if row.operation in ("same", "minus", "half")]
+    assert len(may_be_one) > 4
+    assert all(row.words.startswith("[repeats: ") for row in may_be_one)
