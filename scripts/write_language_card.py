@@ -1,4 +1,4 @@
-"""Write docs/language-card.md: an example of every variant, in the generator's own words.
+"""Write docs/language-card.md: an example of every variant, and what language 4 says.
 
 python scripts/write_language_card.py
 """
@@ -8,6 +8,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from pathlib import Path
+
+from scenario_tables import scenario_part
 
 from roboirg.apps.language_lab.corpus_statistics import (
     PAPER_PHRASES,
@@ -36,11 +38,16 @@ _INTRODUCTION = """\
 One episode for each of the {variants} variants: the explicit command, the instruction of the
 variant, and its resolved form, in which the command names the referents of its referring
 expressions. An *antecedent* introduces a value, **an anaphor** points back at it.
-[The language](language.md) explains the settings."""
+[The language](language.md) explains the settings. [Language 4](#language-4) stands at the end."""
+
+
+def whole_page() -> str:
+    """Return the page, in Markdown."""
+    return f"{language_card()}\n{scenario_part()}\n"
 
 
 def language_card() -> str:
-    """Return the whole page, in Markdown."""
+    """Return the page without language 4."""
     variants = all_variants()
     parts = [_INTRODUCTION.format(version=LANGUAGE_VERSION, variants=len(variants))]
     for task in all_tasks().values():
@@ -183,4 +190,4 @@ def _sign(mention: Mention) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(language_card(), encoding="utf-8")
+    PAGE.write_text(whole_page(), encoding="utf-8")

@@ -9,22 +9,24 @@ from dataclasses import dataclass, field, replace
 from importlib.resources import files
 
 from roboirg.apps.language_lab.scenarios.sentence_rules import blanked, broken_sentences
+from roboirg.apps.language_lab.scenarios.text_rules import broken_text
 from roboirg.apps.language_lab.validation.episode_checks import leaking, places_of
 from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import request_of, spoken_instruction
-from roboirg.language.instruction import Instruction, Mention
+from roboirg.language.instruction import FORMS, Instruction, Mention
 from roboirg.language.meaning import field_values, meant_goals
 from roboirg.language.request import InstructionRequest
 from roboirg.language.scenarios.choice import Chosen, choose
 from roboirg.language.scenarios.markup import slots_in
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
+from roboirg.language.scenarios.scenario_file import task_scenarios
 from roboirg.language.scenarios.spoken import say_chosen
 from roboirg.language.settings import all_settings
 from roboirg.language.token_counts import ADDED_TOKENS, USUAL_LIMIT, count_tokens
 from roboirg.shortcuts.command_chance import goals_of_command, is_right
-from roboirg.tasks import goals_of, with_goal
+from roboirg.tasks import all_tasks, get_task, goals_of, with_goal
 from roboirg.tasks.splits.splits import get_episode
 
 RANDOM_SCENES = 200
@@ -93,10 +95,23 @@ def check_scenarios(
     return [_checked(one, words, scenes) for one in chosen]
 
 
-def _in_both_pools(scenario: Scenario, others: Sequence[Scenario]) -> Iterator[str]:
-    """Yield the frame and the sentences that a scenario shares with one of the other pool."""
-    pool = scenario.fields.pool
-    theirs = {words for one in others if one.fields.pool != pool for words in blanked(one)}
+@functools.cache
+def our_scenarios() -> tuple[Scenario, ...]:
+    """Return the scenarios of all tasks; one that several tasks say is there for each of them."""
+    found: list[Scenario] = []
+    for task in all_tasks():
+        words = task_scenarios(task)
+        if words is not None:
+            found += words.scenarios
+    return tuple(found)
+
+
+def _in_both_pools(scenario: Scenario, words: TaskScenarios) -> Iterator[str]:
+    """Yield the frame and the sentences that the other pool has, in its own file or in ours."""
+    theirs: set[str] = set()
+    for other in (*words.scenarios, *our_scenarios()):
+        if other.fields.pool != scenario.fields.pool:
+            theirs.update(blanked(other))
     for shared in sorted(theirs.intersection(blanked(scenario))):
         yield f"the other pool has {shared!r}, too"
 
@@ -105,7 +120,8 @@ def _checked(
     scenario: Scenario, words: TaskScenarios, episodes: Sequence[Episode]
 ) -> ScenarioReport:
     report = ScenarioReport(scenario)
-    for complaint in (*broken_sentences(scenario), *_in_both_pools(scenario, words.scenarios)):
+    pointed = get_task(episodes[0].task).commands.pointed
+    for complaint in (*broken_sentences(scenario, pointed), *_in_both_pools(scenario, words)):
         report.add(complaint, "")
     for episode in episodes:
         _check_episode(report, words, episode)
@@ -120,57 +136,71 @@ def _checked(
 
 
 def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episode) -> None:
-    """Check what a scenario says of an episode, in every form."""
-    fields, number = report.scenario.fields, report.scenes
+    """Check what a scenario says of an episode, in every form and frame."""
+    fields = report.scenario.fields
     name = "contextual" if fields.setting == "direct" else fields.setting
-    options = InstructionOptions(name, language=4, wordings=fields.pool)
-    variants = [options, replace(options, form="resolved")]
-    if fields.setting == "direct":
-        variants.append(replace(options, distractor="competing"))
-    told: list[Instruction] = []
-    for variant in variants:
-        request = request_of(episode, variant)
-        try:
-            said = _said(request, words, report.scenario)
-        except (InvalidValueError, LookupError) as error:
-            report.add(f"cannot be said: {error}", episode.key)
-            return
-        if said is None:
-            return
-        told.append(said[1])
-        text = said[1].text
-        for rule in () if request.resolved else _broken(request, *said):
-            report.add(rule, text)
-        # What is seen is said again in the resolved form, which nobody has to hear.
-        if not (request.resolved and all_settings()[name].offers == "grounded"):
-            report.longest = max(report.longest, (tokens_of(text), text))
-    implicit, _, *competing = told
-    report.competing = report.competing or "".join(one.text for one in competing)
+    usual = InstructionOptions(name, language=4, wordings=fields.pool)
+    try:
+        told = _check_texts(report, words, episode, usual)
+        if fields.setting == "spatial":
+            _check_texts(report, words, episode, replace(usual, frame="camera"))
+    except (InvalidValueError, LookupError) as error:
+        report.add(f"cannot be said: {error}", episode.key)
+        return
+    if not told:
+        return
+    implicit, number = told[0], report.scenes
     if len(report.renderings) < SHOWN and number % 3 == 0:
         report.renderings.append(implicit.text)
     report.scenes += 1
     report.open += not all(is_right(goal, episode) for goal in goals_of_command(implicit, episode))
     others = [goal for goal in goals_of(episode) if goal != episode.goal]
     for goal in others[number % max(1, len(others)) :][:1]:
-        said = _said(request_of(with_goal(episode, goal), options), words, report.scenario)
-        if said and said[1].text == implicit.text:
+        request = request_of(with_goal(episode, goal), usual)
+        chosen = _chosen(request, report.scenario)
+        if chosen and _said(request, words, chosen).text == implicit.text:
             report.add("says the same of another goal", implicit.text)
 
 
-def _said(
-    request: InstructionRequest, words: TaskScenarios, scenario: Scenario
-) -> tuple[Chosen, Instruction] | None:
-    """Return what a scenario says, and how it was chosen; None if it does not fit."""
-    refused = all_settings()[request.options.setting].refusal(request) is not None
-    chosen = None if refused else choose(request, scenario.fields.setting, [scenario])
+def _check_texts(
+    report: ScenarioReport, words: TaskScenarios, episode: Episode, usual: InstructionOptions
+) -> list[Instruction]:
+    """Check and return what a scenario says in every form; nothing if it does not fit."""
+    chosen = _chosen(request_of(episode, usual), report.scenario)
     if chosen is None:
+        return []
+    variants = [replace(usual, form=form) for form in FORMS]
+    if usual.setting == "contextual":
+        variants += [replace(variant, distractor="competing") for variant in variants]
+    told: list[Instruction] = []
+    for options in variants:
+        request = request_of(episode, options)
+        said = _said(request, words, chosen)
+        for rule in _broken(request, chosen, said):
+            report.add(rule, said.text)
+        report.longest = max(report.longest, (tokens_of(said.text), said.text))
+        if options.distractor == "competing":
+            report.competing = report.competing or said.text
+        told.append(said)
+    return told
+
+
+def _chosen(request: InstructionRequest, scenario: Scenario) -> Chosen | None:
+    """Return how a scenario says an episode; None if it does not fit."""
+    if all_settings()[request.options.setting].refusal(request) is not None:
         return None
-    spec = say_chosen(request, words, chosen)
-    return chosen, spoken_instruction(request, spec)
+    return choose(request, scenario.fields.setting, [scenario])
+
+
+def _said(request: InstructionRequest, words: TaskScenarios, chosen: Chosen) -> Instruction:
+    return spoken_instruction(request, say_chosen(request, words, chosen))
 
 
 def _broken(request: InstructionRequest, chosen: Chosen, told: Instruction) -> Iterator[str]:
-    """Yield the rules that a text breaks."""
+    """Yield the rules that a text breaks; a resolved one has to be right as a text only."""
+    yield from broken_text(told, chosen, request)
+    if request.resolved:
+        return
     episode, meaning = request.episode, told.meaning
     if meaning is None:
         yield "declares no meaning"

@@ -10,6 +10,7 @@ from roboirg.language.number_words import CARDINALS, ORDINALS
 from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, pointers_in
 from roboirg.language.scenarios.scenario import PEOPLE, Scenario
 
+_SLOT = r"\{[^}]*\}"
 NEVER: Mapping[str, str] = {
     r"you(?:'ve| have)? (?:just )?saw|you(?:'ve| have) (?:just )?seen|as you saw": (
         "what was seen is not checked"
@@ -17,13 +18,40 @@ NEVER: Mapping[str, str] = {
     r"look(?:ing)? at": "the thing may be covered or not there yet",
     r"point(?:ing|ed) (?:at|to)": "nobody points",
     r"(?:picture|image|photo|video) shows": "what is shown is not checked",
-    r"you(?:'ve| have)? (?:just )?(?:tried|did|done) (?:this|that|it)": "the robot did nothing yet",
+    r"you(?:'ve| have)? (?:just |already )?(?:tried|did|done) (?:this|that|it)"
+    r"|time for (?:just )?one more|nobody has (?:lifted|touched|moved|picked)": (
+        "nothing was done yet"
+    ),
+    rf"(?:he|she|they|person:None\}}) (?:already|still) (?:has|have) the {_SLOT} (?:cube|one)"
+    r"|has (?:taken|found) the|found nothing": "the thing is on the table",
+    r"as i (?:just )?said|i (?:just|already) (?:said|told you)|mentioned (?:earlier|before|above)"
+    r"|(?:written|said|see|read) (?:above|below)|(?:this|last|next) (?:sentence|message|prompt)": (
+        "depends on how the words are delivered"
+    ),
     r"there (?:are|is) [^.]*\bon the table": "what is on the table is not checked",
-    r"two times fewer|two fewer times": "heard as half of it; say 'that many times minus two'",
-    r"at the other moment|between the times": "wrong English",
+    r"two times fewer|two fewer times": "heard as half of it; say 'one time fewer' only",
+    r"minus": "people subtract in words; say 'fewer'",
+    r"neither of (?:those|these|them)|not that color": (
+        "one is left; say 'the other one' or 'the one that's left'"
+    ),
+    r"(?:leaves?|tunes? in|ha[sd] to go|have to go|calls?|arrives?) on (?:its|the(?: cube's)?) "
+    rf"{_SLOT} (?:visit|pass)": "a visit is no time of day",
+    rf"at the other moment|between the times|of the {_SLOT} (?:one|cube)s? (?:we|i|he|she|they)"
+    r"|so many mails|vote[sd]? about|third from your": "wrong English",
     r"favorite color|favou?rite": "a taste decides nothing; say why it matters today",
+    r"nearest|closest|farthest|leftmost|rightmost|all the way (?:on|in|at|to) (?:the|your)": (
+        "a place is a slot, {place} or {clue}"
+    ),
+    "|".join(ALL_COLORS): "a color is a slot",
 }
 """Words that would be false, ambiguous or wrong, and why."""
+COVERED = (
+    r"(?:look at|watch|keep an eye on|(?:can|do) you see|here's|there's) (?:the )?"
+    rf"(?:{_SLOT} cube|it|both)"
+)
+"""Words for a cube in plain view."""
+_PLACED = r"(?!{}|one)[a-z]+ \{{(?:place|aside)[.\d]*:None"
+"""Another thing than that which the place is of."""
 _NAMED = "|".join((*ALL_COLORS, *(set(CARDINALS) - {"one"}), *ORDINALS, "twice"))
 _VALUE = re.compile(
     rf"\b(?!first of all\b|(?:at )?first[,.]|second[,.!?])(?:{_NAMED})\b"
@@ -46,22 +74,29 @@ _POINTED_AT = {
 """What a remark of direct-rival points at first."""
 
 
-def broken_sentences(scenario: Scenario) -> Iterator[str]:
-    """Yield what is wrong with the sentences of a scenario."""
+def broken_sentences(scenario: Scenario, pointed: str) -> Iterator[str]:
+    """Yield what is wrong with the sentences of a scenario of a task.
+
+    `pointed` is the kind of object that a place distinguishes in the task.
+    """
+    noun = pointed.removeprefix("hidden_")
+    never = {**NEVER, _PLACED.format(noun): f"a place follows {noun!r} or 'one'"}
+    if pointed == "container":
+        never[COVERED] = "the cube is under a container"
     for name, texts in scenario.texts.items():
         for text in texts:
-            for complaint in _wrong(name, text):
+            for complaint in _wrong(name, text, never):
                 yield f"{name}: {complaint}"
 
 
-def _wrong(name: str, text: Text) -> Iterator[str]:
+def _wrong(name: str, text: Text, never: Mapping[str, str]) -> Iterator[str]:
     field, words = name.partition(".")[0], literal(text)
-    for pattern, reason in NEVER.items():
+    for pattern, reason in never.items():
         found = re.search(rf"\b(?:{pattern})\b", words, re.IGNORECASE)
         if found:
             yield f"has the words {found[0]!r}; {reason}"
-    if re.search(r"  | [.,;:?!]|^ |,,", words):
-        yield f"has a space or comma too many: {words!r}"
+    if field in ("lead", "remarks") and not words.endswith(" "):
+        yield f"must end with a space: {words!r}"
     pointers = list(pointers_in(text))
     if field in (*_SILENT, *_COMMAND):
         outside = literal(tuple(part for part in text if not isinstance(part, Pointer)))
@@ -86,19 +121,21 @@ def blanked(scenario: Scenario) -> Iterator[str]:
     yield f"frame {scenario.fields.frame}"
     for name, texts in scenario.texts.items():
         if not name.startswith(("say", "resolved")):
-            found = [literal(text).lower().strip() for text in texts]
+            found = [re.sub(_SLOT, "_", literal(text)).lower().strip() for text in texts]
             # "So ..." is no sentence.
             yield from (words for words in found if len(words.split()) > 2)  # noqa: PLR2004
 
 
 def literal(text: Text) -> str:
-    """Return the words that are always said, with a gap for each slot: ``Put it on, _ times.``."""
+    """Return the words with the slots and their forms: ``Put it on {repeats:times}.``."""
     words = []
     for part in text:
         if isinstance(part, Pointer):
             words.append(literal(part.parts))
         elif isinstance(part, Agreement):
             words.append(f"{part.one} {part.many}")
+        elif isinstance(part, Slot):
+            words.append(f"{{{part.name}:{part.form}}}")
         else:
-            words.append("_" if isinstance(part, Slot) else part.text)
+            words.append(part.text)
     return "".join(words)
