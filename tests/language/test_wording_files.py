@@ -24,7 +24,7 @@ from roboirg.language.settings import get_setting
 from roboirg.language.variants import instructions
 from roboirg.language.worded_command import StatedPhrase, TaskWordings, WordedCommand
 from roboirg.language.wordings.wording_file import parse_wordings, read_wordings
-from roboirg.language.wordings.wording_store import find_wordings, open_wordings, register_wordings
+from roboirg.language.scenarios.wording_store import find_wordings, open_wordings, register_wordings
 from roboirg.reader import interpret
 from roboirg.tasks import get_task
 

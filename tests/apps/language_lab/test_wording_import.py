@@ -20,7 +20,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import FORMS, expressible, instruct_with
 from roboirg.language.settings import all_settings
 from roboirg.language.wordings.wording_file import read_wordings
-from roboirg.language.wordings.wording_store import register_wordings
+from roboirg.language.scenarios.wording_store import register_wordings
 from roboirg.tasks import all_tasks
 
 TASKS = tuple(all_tasks())

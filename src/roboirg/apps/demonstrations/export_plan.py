@@ -148,7 +148,7 @@ class ExportPlan:
     @property
     def language_label(self) -> str:
         """The version of its language, and which words of each task it has."""
-        return language_label(self.tasks, self.pool, self.options.language)
+        return language_label(self.tasks, self.pool, self.options.language, self.options.wordings)
 
     def fingerprint(self) -> str:
         """Return a hash of everything that determines the dataset."""

@@ -21,6 +21,7 @@ from roboirg.cli.options import (
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError, known_name
 from roboirg.core.plain_text import counted
+from roboirg.core.word_pools import POOLS
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -101,8 +102,7 @@ def validate_instructions(
     tasks: Tasks = "all",
     split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "all",
     wordings: Annotated[
-        str | None,
-        typer.Option(help="A wording file, or our words for train or test."),
+        str | None, typer.Option(help="train or test: our words of that pool in every split.")
     ] = None,
 ) -> None:
     """Read all instructions back and check their rules; exit code 2 if one is broken.
@@ -114,14 +114,14 @@ def validate_instructions(
     from roboirg.apps.language_lab.validation.validation_tables import validation_tables
     from roboirg.cli.progress_bar import progress_bars
     from roboirg.evaluation.plan.option_parsing import parse_splits
-    from roboirg.language.wordings.wording_store import open_wordings
     from roboirg.util.parallel_map import parallel_map
     from roboirg.util.processor import worker_count
 
-    names = known_tasks(tasks, open_wordings(wordings))
+    names = known_tasks(tasks)
+    pool = None if wordings is None else known_name("pool of words", wordings, POOLS)
     wanted = () if split.strip().lower() == "none" else parse_splits(split)
     places, found = places_of(names, wanted, seeds), ValidationResults()
-    work = functools.partial(check_place, wordings_file=wordings)
+    work = functools.partial(check_place, pool=pool)
     with progress_bars() as show:
         for done, (_, results) in enumerate(parallel_map(work, places, worker_count()), 1):
             found.add(results)
@@ -267,7 +267,7 @@ def import_robomme(
     out: Annotated[Path, typer.Option(help="Wording file to write, TOML.")],
     name: Annotated[str, typer.Option(help="Name of the wordings, for records.")] = "robomme",
 ) -> None:
-    """Make a wording file of RoboMME's sentences, for explicit; implicit settings keep our words.
+    """Make a wording file of RoboMME's sentences, for explicit; implicit settings say our words.
 
     Example: roboirg language import-robomme robomme --out robomme.toml
     """
@@ -278,7 +278,7 @@ def import_robomme(
     text, wordings = make_wordings(path, name)
     write_atomically(out, text)
     for task, found in wordings.tasks.items():
-        typer.echo(f"{task}: {counted(len(found.commands), 'command')}")
+        typer.echo(f"{task}: {counted(len(found.literals), 'sentence')}")
     typer.echo(f"Wrote {wordings.identity}: {out}")
 
 

@@ -85,7 +85,9 @@ def item_id(episode: Episode, options: InstructionOptions) -> str:
     content = (
         episode.key,
         *words,
-        language_label([episode.task], pool_of(episode.split, options.wordings), language),
+        language_label(
+            [episode.task], pool_of(episode.split, options.wordings), language, options.wordings
+        ),
         ENVIRONMENT_VERSION,
     )
     return "g" + hashlib.sha256(repr(content).encode()).hexdigest()[:ID_DIGITS]

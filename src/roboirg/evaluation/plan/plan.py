@@ -54,6 +54,7 @@ from roboirg.evaluation.records.film import VideoMode
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.evaluation.records.record_codec import RecordKey, identity_key
 from roboirg.language.generator import check_options, find_refusal
+from roboirg.language.scenarios.wording_store import open_wordings
 from roboirg.language.settings import (
     EXPLICIT,
     SETTING_GROUPS,
@@ -63,7 +64,6 @@ from roboirg.language.settings import (
     get_setting,
     settings_of,
 )
-from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.by_name.key_variables import check_variables
 from roboirg.policies.contract.option_checking import flags_as_words

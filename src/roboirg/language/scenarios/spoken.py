@@ -10,6 +10,7 @@ from typing import NamedTuple, cast
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.word_pools import outside_words
 from roboirg.language.instruction import REFERENCE, Expression, Meaning, Term, UtteranceStage
 from roboirg.language.phrases import (
     Phrase,
@@ -21,12 +22,7 @@ from roboirg.language.phrases import (
     swap_particles,
     words_of,
 )
-from roboirg.language.request import (
-    InstructionRequest,
-    InstructionSpec,
-    NoCommandError,
-    UtteranceSpec,
-)
+from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.scenarios.choice import Chosen, choose, rival_values
 from roboirg.language.scenarios.declared import (
     ChoosingRemark,
@@ -45,7 +41,8 @@ from roboirg.language.scenarios.markup import (
     slots_in,
 )
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
-from roboirg.language.scenarios.scenario_file import general, task_scenarios
+from roboirg.language.scenarios.scenario_file import general
+from roboirg.language.scenarios.wording_store import task_words
 from roboirg.language.settings import all_settings, contextual
 from roboirg.language.settings.setting import Setting
 
@@ -77,8 +74,9 @@ def _choose(request: InstructionRequest) -> _Choice:
     """Return what a setting says of an episode; no choice if it refuses."""
     # Contextual says the scenarios of direct.
     name = request.options.setting.replace(_CONTEXTUAL, _DIRECT)
-    sampler, own = request.sampler, request.wordings is None
-    key = (name, sampler.key, request.frame, request.pool, own)
+    sampler = request.sampler
+    wordings = outside_words(request.options.wordings)
+    key = (name, sampler.key, request.frame, request.pool, wordings)
     found = _CHOICES.get(key)
     if found is None or found.episode != request.episode:
         if len(_CHOICES) >= _MOST_CHOICES:
@@ -86,10 +84,10 @@ def _choose(request: InstructionRequest) -> _Choice:
         log: list[str] = []
         reason, chosen = all_settings()[name].refusal(request), None
         if reason is None:
-            words = cast("TaskScenarios", task_scenarios(request.task.name))
-            wanted = (name, request.pool)
             known = [
-                one for one in words.scenarios if (one.fields.setting, one.fields.pool) == wanted
+                scenario
+                for scenario in _words_of(request).scenarios
+                if scenario.fields.setting == name and scenario.fields.pool in (None, request.pool)
             ]
             chosen = choose(replace(request, sampler=replace(sampler, log=log)), name, known)
         if chosen is None:
@@ -101,7 +99,8 @@ def _choose(request: InstructionRequest) -> _Choice:
 def refusal(request: InstructionRequest) -> str | None:
     """Return why a setting cannot express an episode; None if it can."""
     task = request.task
-    if task_scenarios(task.name) is None:
+    words = task_words(task.name, request.options.wordings)
+    if words is None or not words.commands:
         if task.words:
             return f"{task.name} is none of the tasks of {task.words}, the file that it names"
         return f"language 4 has no scenarios of {task.name} yet"
@@ -110,14 +109,24 @@ def refusal(request: InstructionRequest) -> str | None:
 
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return the words of an episode in a setting that does not refuse it."""
-    words = cast("TaskScenarios", task_scenarios(request.task.name))
+    words = _words_of(request)
     if request.options.setting == _EXPLICIT:
-        speech = Speech(request, words, Introduced(goal_values(request)))
-        command = UtteranceSpec("command", speech.command({}, ()))
-        return InstructionSpec((command,), meaning=speech.meaning())
+        return say_explicit(request, words)
     choice = _choose(request)
     request.sampler.log.extend(choice.log)
     return say_chosen(request, words, cast("Chosen", choice.chosen))
+
+
+def say_explicit(request: InstructionRequest, words: TaskScenarios) -> InstructionSpec:
+    """Return a command that states the goal."""
+    speech = Speech(request, words, Introduced(goal_values(request)))
+    command = UtteranceSpec("command", speech.command({}, ()))
+    return InstructionSpec((command,), meaning=speech.meaning())
+
+
+def _words_of(request: InstructionRequest) -> TaskScenarios:
+    """Return the words of a task that has some."""
+    return cast("TaskScenarios", task_words(request.task.name, request.options.wordings))
 
 
 @functools.cache
@@ -271,12 +280,7 @@ class Speech:
 
     def command(self, fields: Mapping[str, Phrase], lead: Phrase) -> Phrase:
         """Return the command with the words for some fields; the others state their values."""
-        if self._request.wordings is not None:
-            skeleton = self._request.command(
-                {name: self._outside(name, words) for name, words in fields.items()}
-            )
-        else:
-            skeleton = self._skeleton(fields)
+        skeleton = self._skeleton(fields)
         if lead:
             lead = _begun(lead, str.upper)
             ended = lead[-1].text.endswith((". ", "! ", "? "))
@@ -289,32 +293,15 @@ class Speech:
         possible = [command for command in commands if wanted == {*slots_in(parse(command))}]
         if not possible:
             fields_wanted = ", ".join(sorted(wanted))
-            task = self._request.task.name
-            raise InvalidValueError(f"{task} has no command with the fields {fields_wanted}.")
+            owner = self._request.task.name
+            if (wordings := outside_words(self._request.options.wordings)) is not None:
+                owner += f" in {wordings}"
+            raise InvalidValueError(f"{owner} has no command with the fields {fields_wanted}.")
         template = self._request.sampler.pick(f"command-{len(wanted)}", possible)
         words = {
             name: fields.get(name) or self.field(name, self._words.stated[name]) for name in wanted
         }
         return swap_particles(fill(template, words)) if fields else fill(template, words)
-
-    def _outside(self, name: str, words: Phrase) -> Phrase:
-        """Return words for a field of a command from outside.
-
-        They take the place of its core: *it* that of *the red cube* in *the container over it*.
-        """
-        outside, commands = self._request.outside_phrase(name), self._request.task.commands
-        direct = self._scenario is None or self._scenario.fields.setting == _DIRECT
-        if outside is None or (self._request.resolved and direct):
-            return self._request.outside_stated(name)
-        if name in {one.field for one in self._request.values_of("number")}:
-            return words  # what stays around it is added to numbers later
-        prefix = commands.by_color.removesuffix("{cube}")
-        if prefix and commands.thing not in outside.core:
-            first, *rest = words
-            if not first.text.startswith(prefix):
-                raise NoCommandError
-            words = (first._replace(text=first.text.removeprefix(prefix)), *rest)
-        return self._request.around(name, tuple(piece for piece in words if piece.text))
 
     def neutral(self, scenario: Scenario) -> Iterator[Phrase]:
         """Yield remarks for ever: the scenario's own in any order, then those about anything."""
