@@ -1,14 +1,14 @@
 """Only RoboMME's sentences may be named after it."""
 
 import pytest
-
-from roboirg.core.errors import InvalidValueError
 from roboirg.language.wordings.robomme_sentences import (
     FINGERPRINTS,
     check_robomme_name,
     fingerprint,
 )
 from roboirg.language.wordings.wording_file import parse_wordings, read_wordings
+
+from roboirg.core.errors import InvalidValueError
 from roboirg.tasks.splits.published_episodes import published_goals
 
 TEXT = """name = "{name}"

@@ -95,16 +95,16 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
     Each `variant` draws its words anew; 0 is the usual one.
     """
     setting = _setting_of(episode, options)
-    request = request_of(episode, options, variant)
     missing = _missing(episode, options)
     if missing is not None:
         raise InvalidValueError(f"The {missing}.")
-    reason = setting.refusal(request)
+    reason = setting.refusal(request_of(episode, options, variant))
     if reason is not None:
         raise InvalidValueError(
             f"The {setting.name} setting cannot express episode {episode.key} "
             f"(seed {episode.seed}): {reason}."
         )
+    request = request_of(episode, options, variant)  # without what the refusal noted in its log
     return spoken_instruction(request, setting.say(request))
 
 
@@ -151,7 +151,7 @@ def _setting_of(episode: Episode, options: InstructionOptions) -> Setting:
     if identity is not None and setting.name == EXPLICIT:
         theirs = find_wordings(identity).tasks.get(episode.task)
         if theirs is not None and theirs.literals:
-            return in_literals(theirs.literals, f"the wordings {identity}")
+            return in_literals(theirs.literals, f"the wording file {identity}")
     return setting if options.language == DEFAULT_LANGUAGE else in_language_4(setting.name)
 
 
@@ -162,11 +162,11 @@ def _missing(episode: Episode, options: InstructionOptions) -> str | None:
         return None
     wordings = find_wordings(identity)
     if episode.task not in wordings.tasks:
-        return f"wordings {identity} have no words of {episode.task}"
+        return f"wording file {identity} has no words of {episode.task}"
     if wordings.needs_language_4 and options.language == DEFAULT_LANGUAGE:
         return (
-            f"wordings {identity} have commands or scenarios, which need language: 4 in the plan, "
-            "or --language 4"
+            f"wording file {identity} has commands or scenarios, which need language 4 (--language "
+            "4, or language: 4 in the plan)"
         )
     return None
 

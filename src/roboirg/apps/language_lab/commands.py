@@ -194,23 +194,31 @@ def score_shortcuts(
 
 @language_app.command("check-scenarios")
 def check_scenario_file(
-    path: Annotated[Path, typer.Argument(help="File of scenarios, TOML.")],
+    path: Annotated[Path, typer.Argument(help="File of scenarios, commands or sentences, TOML.")],
     scenario: Annotated[str | None, typer.Option(help="Check this one only, by its frame.")] = None,
     seeds: Annotated[
         int, typer.Option(min=0, help="Random scenes for each scenario, beyond the splits.")
     ] = 200,
 ) -> None:
-    """Check scenarios of language 4 in each task that their file serves, and print texts of them.
+    """Check the words of a file in each task that it serves, and print texts of them.
 
     The exit code is 2 if a rule breaks.
 
     Example: roboirg language check-scenarios mine.toml --scenario "school trip"
     """
-    from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
-    from roboirg.apps.language_lab.scenarios.scenario_report import report_lines
-    from roboirg.language.scenarios.scenario_file import read_scenario_file
+    from roboirg.apps.language_lab.scenarios.explicit_check import (
+        check_explicit,
+        has_explicit_words,
+    )
+    from roboirg.apps.language_lab.scenarios.scenario_check import (
+        check_scenarios,
+        scenes_of,
+        unserved_settings,
+    )
+    from roboirg.apps.language_lab.scenarios.scenario_report import explicit_lines, report_lines
+    from roboirg.language.scenarios.wording_file import read_words
 
-    by_task = read_scenario_file(path)
+    by_task = read_words(path)
     if scenario is not None:
         frames: set[str] = set()
         for words in by_task.values():
@@ -218,9 +226,18 @@ def check_scenario_file(
         known_name("scenario", scenario, sorted(frames))
     broken = 0
     for task, words in by_task.items():
-        for report in check_scenarios(words, scenario, scenes_of(task, seeds)):
+        if scenario is None and has_explicit_words(words, task):
+            explicit = check_explicit(words, scenes_of(task, 0))
+            typer.echo("\n".join(explicit_lines(explicit, task)))
+            broken += len(explicit.broken)
+        scenes = scenes_of(task, seeds)
+        reports = check_scenarios(words, scenario, scenes)
+        for report in reports:
             typer.echo("\n".join(report_lines(report, task)))
             broken += len(report.broken)
+        for complaint in unserved_settings(reports, scenes) if scenario is None else ():
+            typer.echo(f"BROKEN {task}: {complaint}")
+            broken += 1
     if broken:
         raise RoboIRGError(f"Found {counted(broken, 'broken rule')} in {path.name}.")
 

@@ -190,7 +190,7 @@ class Plan(BaseModel):
     )
     wordings: Annotated[ChosenWordings | None, BeforeValidator(_open_wordings)] = _option(
         None,
-        "Wording file whose commands are used; or train or test: our words of that pool in every "
+        "Wording file with words of your own; or train or test: our words of that pool in every "
         "split.",
     )
     instruction: InstructionOptions = _option(

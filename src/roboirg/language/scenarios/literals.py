@@ -74,7 +74,7 @@ def _goal(literal: LiteralFields, where: str) -> Goal:
     for slot, value in slots.items():
         kind: Any = type(value)
         if isinstance(value, tuple):
-            kind = tuple[type(value[0]), ...]  # type: ignore[misc] - it is read at run time
+            kind = tuple[int, ...] if isinstance(value[0], int) else tuple[str, ...]
         values[slot] = converted(literal.when[slot], kind, f"{where}, when.{slot}")
     return Goal.of(**values)
 
@@ -101,7 +101,7 @@ def literal_refusal(request: InstructionRequest, literals: Literals, whose: str)
     goal = request.episode.goal
     if goal in literals:
         return None
-    return f"{whose} have no sentence of {request.task.name} for its goal: {_in_words(goal)}"
+    return f"{whose} has no sentence of {request.task.name} for the goal: {_in_words(goal)}"
 
 
 def _in_words(goal: Goal) -> str:

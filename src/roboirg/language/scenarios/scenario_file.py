@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
@@ -127,12 +128,13 @@ def words_in(head: FileFields, where: str) -> Mapping[str, TaskScenarios]:
         _scenario(usual | one, stated, f"{where}, scenario {one.get('frame', number)!r}", mistakes)
         for number, one in enumerate(head.scenario, 1)
     ]
-    names = [[one.get(part) for part in ("frame", "setting", "pool")] for one in head.scenario]
-    mistakes += [
-        f"{where} has the frame {name[0]!r} twice in the setting {name[1]}, {name[2]}."
-        for at, name in enumerate(names)
-        if name in names[:at] and None not in name
-    ]
+    seen: set[str] = set()
+    for one in head.scenario:
+        frame, setting, pool = one.get("frame"), one.get("setting"), one.get("pool", "both pools")
+        name = f"{where} has the frame {frame!r} twice in the setting {setting}, {pool}."
+        if name in seen and None not in (frame, setting):
+            mistakes.append(name)
+        seen.add(name)
     if mistakes:
         raise InvalidValueError("\n".join(mistakes))
     for scenario in filter(None, scenarios):
@@ -195,6 +197,8 @@ def _scenario(
         texts[name] = tuple(_sentence(one, listed, stated, at, mistakes) for one in several)
     said = tuple(sorted(name.removeprefix("say.") for name in texts if name.startswith("say.")))
     if fields is not None:
+        for name in (fields.frame, *itertools.chain(*(fields.people or {}).values())):
+            _parsed(name, f"{where}, frame or people", mistakes)
         mistakes += [f"{where} {one}." for one in _unmet(fields, texts, said, stated)]
     if fields is None or mistakes:
         return None

@@ -13,6 +13,7 @@ from roboirg.apps.language_lab.validation.episode_checks import leaking, places_
 from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.plain_text import counted
 from roboirg.language.generator import request_of, spoken_instruction
 from roboirg.language.instruction import Instruction, Mention
 from roboirg.language.meaning import field_values, meant_goals
@@ -42,7 +43,7 @@ class ScenarioReport:
         examples: for each broken rule one text.
         renderings: texts, from different scenes.
         competing: a text with a competing remark; empty if the setting has none.
-        scenes: number of scenes that it fits.
+        fitting: the keys of the scenes that it fits.
         open: number of these where its command alone leaves several goals.
         longest: the text with most tokens, after their number.
     """
@@ -52,9 +53,14 @@ class ScenarioReport:
     examples: dict[str, str] = field(default_factory=dict)
     renderings: list[str] = field(default_factory=list)
     competing: str = ""
-    scenes: int = 0
+    fitting: list[str] = field(default_factory=list)
     open: int = 0
     longest: tuple[int, str] = (0, "")
+
+    @property
+    def scenes(self) -> int:
+        """Number of scenes that it fits."""
+        return len(self.fitting)
 
     def add(self, rule: str, text: str) -> None:
         """Count a broken rule."""
@@ -91,6 +97,27 @@ def check_scenarios(
     """Check the scenarios of a task, or only those of one frame, in scenes."""
     chosen = [one for one in words.scenarios if name in (None, one.fields.frame)]
     return [_checked(one, words, scenes) for one in chosen]
+
+
+def unserved_settings(
+    reports: Sequence[ScenarioReport], scenes: Sequence[Episode]
+) -> Iterator[str]:
+    """Yield each setting of a user's file that has no scenario for some scenes."""
+    fitting: dict[str, set[str]] = {}
+    for report in reports:
+        fields = report.scenario.fields
+        if fields.pool is None:  # those of ours are never alone
+            fitting.setdefault(fields.setting, set()).update(report.fitting)
+    for name, keys in fitting.items():
+        options = InstructionOptions(name, language=4)
+        left = [episode for episode in scenes if episode.key not in keys]
+        refusal = all_settings()[name].refusal
+        lacking = [episode for episode in left if refusal(request_of(episode, options)) is None]
+        if lacking:
+            yield (
+                f"{name} has no scenario that fits {counted(len(lacking), 'scene')}, such as "
+                f"{lacking[0].key}"
+            )
 
 
 def _in_both_pools(scenario: Scenario, others: Sequence[Scenario]) -> Iterator[str]:
@@ -148,7 +175,7 @@ def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episod
     report.competing = report.competing or "".join(one.text for one in competing)
     if len(report.renderings) < SHOWN and number % 3 == 0:
         report.renderings.append(implicit.text)
-    report.scenes += 1
+    report.fitting.append(episode.key)
     report.open += not all(is_right(goal, episode) for goal in goals_of_command(implicit, episode))
     others = [goal for goal in goals_of(episode) if goal != episode.goal]
     for goal in others[number % max(1, len(others)) :][:1]:
