@@ -14,16 +14,15 @@ from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
 from roboirg.evaluation.play.job_instruction import instruct_job
 from roboirg.evaluation.records.record_codec import identity_key
-from roboirg.language.wordings import wording_store
+from roboirg.language.scenarios import wording_store
 
-FILE = """\
-name = "test"
-[PickXtimes.phrases]
-color = { red = "the red cube", green = "the green cube", blue = "the blue cube" }
-repeats = { 1 = "once", 2 = "twice", 3 = "three times", 4 = "four times", 5 = "five times" }
-[[PickXtimes.commands]]
-text = "pick up {color} and set it on the target {repeats}, then press the button"
-"""
+FILE = 'name = "test"\ntasks = ["PickXtimes"]\n' + "".join(
+    f'[[literal]]\ntask = "PickXtimes"\nwhen = {{ color = "{color}", repeats = {number} }}\n'
+    f'text = "pick up the {color} cube, {number} in all"\n'
+    for color in ("red", "green", "blue")
+    for number in range(1, 6)
+)
+SPOKEN = 'name = "test"\ntasks = ["PickXtimes"]\n[commands]\nall = ["Do {color} {repeats}."]\n'
 
 
 @pytest.fixture
@@ -98,11 +97,12 @@ def test_a_job_opens_its_file_and_checks_it(
 @pytest.mark.parametrize(
     ("content", "options", "words"),
     [
-        (FILE, {"tasks": "StopCube"}, r"have no commands of StopCube\.$"),
-        (FILE.replace("1 = ", "6 = "), {"episodes": "20"},
-         "have no command of PickXtimes for the goal"),
-        ("name = 3", {}, r"^The wording file '.*test.toml' has the name 3;"),
-        ("name = 'a'\n[PickXtime]", {}, r"^There is no task \(in the wording file '"),
+        (FILE, {"tasks": "StopCube"}, r"has no words of StopCube\.$"),
+        (FILE.replace("repeats = 1 ", "repeats = 6 "), {"episodes": "20"},
+         "has no sentence of PickXtimes for the goal"),
+        (SPOKEN, {}, "has commands or scenarios, which need language 4"),
+        ("tasks = ['PickXtimes']", {}, r"test.toml has the name '';"),
+        ("name = 'a'\ntasks = ['PickXtime']", {}, r"^There is no task of .*test.toml named"),
     ],
 )  # fmt: skip
 def test_what_the_wordings_lack_stops_a_plan(
@@ -111,7 +111,7 @@ def test_what_the_wordings_lack_stops_a_plan(
     wording_file.write_text(content)
     with pytest.raises(InvalidValueError, match=words):
         a_plan(wording_file, **options)
-    with pytest.raises(InvalidValueError, match=r"^The wording file '.*missing.toml' cannot be "):
+    with pytest.raises(InvalidValueError, match=r"^The file '.*missing.toml' cannot be "):
         a_plan(wording_file.with_name("missing.toml"), **options)
 
 

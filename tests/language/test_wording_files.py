@@ -145,7 +145,7 @@ def test_the_words_of_the_page_are_checked_and_said(tmp_path):
             assert understood_goals(said, episode) == (episode.goal,)
             told[said.text] = said.metadata.get("scenario")
     assert set(told.values()) == {None, "fresh paint", "photos"}
-    (shown,) = re.findall(r"\*(We have just painted the red cube\.[^*]*)\*", PAGE)
+    (shown,) = re.findall(r"\*(We have just\spainted the red cube\.[^*]*)\*", PAGE)
     assert told[shown.replace("\n", " ")] == "fresh paint"
 
 
@@ -280,7 +280,8 @@ OLD = '[PickXtimes]\nown = ["direct"]\n[[PickXtimes.commands]]\ntext = "lift {co
         (f"{HEAD}commands.all.train = ['{{color}}']\ncommands.all.test = ['{{colour}}']",
          "commands of PickXtimes has the slot 'colour'"),
         (HEAD + SCENARIO.replace("It's", "It's très"), "'dusty', introduction has the words"),
-        (HEAD + SCENARIO.replace('"spatial"', '"spatail"'), "'dusty', setting: Invalid enum value"),
+        (HEAD + SCENARIO.replace('"spatial"', '"spatail"'),
+         "'dusty', setting is 'spatail'; it must be direct or reasoning or"),
         (HEAD + SCENARIO.replace('"dusty"', '"\\u001b[31m"'), "frame or people has the words"),
         (HEAD + SCENARIO + SCENARIO, "has the frame 'dusty' twice in the setting spatial"),
         (f"{HEAD}literal = 3", "literal: Expected a list, got a number; it is 3"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -21,7 +20,6 @@ from roboirg.cli.options import (
 )
 from roboirg.core.errors import InvalidValueError, RoboIRGError, known_name
 from roboirg.core.plain_text import counted
-from roboirg.core.word_pools import POOLS
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -101,9 +99,6 @@ def validate_instructions(
     ] = 100,
     tasks: Tasks = "all",
     split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "all",
-    wordings: Annotated[
-        str | None, typer.Option(help="train or test: our words of that pool in every split.")
-    ] = None,
 ) -> None:
     """Read all instructions back and check their rules; exit code 2 if one is broken.
 
@@ -118,12 +113,10 @@ def validate_instructions(
     from roboirg.util.processor import worker_count
 
     names = known_tasks(tasks)
-    pool = None if wordings is None else known_name("pool of words", wordings, POOLS)
     wanted = () if split.strip().lower() == "none" else parse_splits(split)
     places, found = places_of(names, wanted, seeds), ValidationResults()
-    work = functools.partial(check_place, pool=pool)
     with progress_bars() as show:
-        for done, (_, results) in enumerate(parallel_map(work, places, worker_count()), 1):
+        for done, (_, results) in enumerate(parallel_map(check_place, places, worker_count()), 1):
             found.add(results)
             show("episodes", done, len(places), "")
     for table in validation_tables(found):

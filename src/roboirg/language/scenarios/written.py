@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar, get_args, get_origin
 
 import msgspec
 
@@ -50,6 +50,11 @@ def data_of(text: str, where: str) -> dict[str, Any]:
 
 def converted(value: object, kind: type[Stored], where: str) -> Stored:
     """Return a value of a file as a type; `where` names its field in complaints."""
+    choices = _choices(kind)
+    if choices and value not in (None, *choices):
+        raise InvalidValueError(
+            f"{where} is {clip_text(repr(value), _MOST_SHOWN)}; it must be {' or '.join(choices)}."
+        )
     try:
         return msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
@@ -57,3 +62,11 @@ def converted(value: object, kind: type[Stored], where: str) -> Stored:
         complaint = re.sub(rf"\b(?:{'|'.join(_NOUNS)})\b", lambda found: _NOUNS[found[0]], words)
         shown = clip_text(repr(value), _MOST_SHOWN)
         raise InvalidValueError(f"{where}: {complaint}; it is {shown}.") from None
+
+
+def _choices(kind: object) -> tuple[str, ...]:
+    """Return the words that a type allows; empty if it is none of words."""
+    for part in (kind, *get_args(kind)):
+        if get_origin(part) is Literal:
+            return get_args(part)
+    return ()
