@@ -8,13 +8,16 @@ import pytest
 from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.versions import WORDS
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
-from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.episode_record import begin_record
+from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job, other_versions
 from roboirg.evaluation.records.record_codec import identity_key
 from roboirg.language.scenarios import wording_store
+from roboirg.language.scenarios.identity import words_of
 
 FILE = 'name = "test"\ntasks = ["PickXtimes"]\n' + "".join(
     f'[[literal]]\ntask = "PickXtimes"\nwhen = {{ color = "{color}", repeats = {number} }}\n'
@@ -122,3 +125,26 @@ def test_a_job_in_our_own_words_opens_no_file(wording_file: Path) -> None:
     assert own.metadata["wordings"] is None
     missing = replace(job, wordings_file="missing.toml")
     assert instruct_job(missing) == own
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_a_records_words_are_those_of_its_file_and_are_compared_where_it_is_there(
+    wording_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A report can be made without the file, and a resumed run finds other words of ours."""
+    wording_file.write_text(SPOKEN)
+    job = a_plan(wording_file, language=4).jobs()[0]
+    record = begin_record(PreparedJob(job))
+    assert record.words == words_of("PickXtimes", job.pool, 4, job.options.wordings)
+    assert record.words != words_of("PickXtimes", job.pool, 4)
+    other = replace(record, words=words_of("PickXtimes", job.pool, 4))
+    assert not other_versions(record)
+    assert [mismatch.what for mismatch in other_versions(other)] == [WORDS]
+    for text in (SPOKEN.replace("Do", "Move"), None):
+        monkeypatch.setattr(wording_store, "_OPEN", {})
+        if text is None:
+            wording_file.unlink()
+        else:
+            wording_file.write_text(text)
+        assert not other_versions(record)
+        assert not other_versions(other)

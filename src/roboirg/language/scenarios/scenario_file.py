@@ -111,7 +111,7 @@ def read_head(text: str, where: str) -> FileFields:
 def words_in(head: FileFields, where: str) -> Mapping[str, TaskScenarios]:
     """Return the words of each task that a file serves, like `read_task_scenarios`.
 
-    What a task's commands and stated values are not given for are those of the task's own file.
+    A task for which it has no commands has those of its own file; so does each stated value.
     """
     check_names(f"task of {where} named", head.tasks, every_task())
     check_names(f"task of {where} named", [*head.commands, *head.stated], (*head.tasks, ALL))
