@@ -8,22 +8,24 @@ import pytest
 from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.versions import WORDS
 from roboirg.evaluation.plan.plan import Plan
 from roboirg.evaluation.plan.plan_file import read_plan_file
 from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.evaluation.plan.stored_plans import read_plan, write_plan
-from roboirg.evaluation.play.job_instruction import instruct_job
+from roboirg.evaluation.play.episode_record import begin_record
+from roboirg.evaluation.play.job_instruction import PreparedJob, instruct_job, other_versions
 from roboirg.evaluation.records.record_codec import identity_key
-from roboirg.language.wordings import wording_store
+from roboirg.language.scenarios import wording_store
+from roboirg.language.scenarios.identity import words_of
 
-FILE = """\
-name = "test"
-[PickXtimes.phrases]
-color = { red = "the red cube", green = "the green cube", blue = "the blue cube" }
-repeats = { 1 = "once", 2 = "twice", 3 = "three times", 4 = "four times", 5 = "five times" }
-[[PickXtimes.commands]]
-text = "pick up {color} and set it on the target {repeats}, then press the button"
-"""
+FILE = 'name = "test"\ntasks = ["PickXtimes"]\n' + "".join(
+    f'[[literal]]\ntask = "PickXtimes"\nwhen = {{ color = "{color}", repeats = {number} }}\n'
+    f'text = "pick up the {color} cube, {number} in all"\n'
+    for color in ("red", "green", "blue")
+    for number in range(1, 6)
+)
+SPOKEN = 'name = "test"\ntasks = ["PickXtimes"]\n[commands]\nall = ["Do {color} {repeats}."]\n'
 
 
 @pytest.fixture
@@ -98,11 +100,12 @@ def test_a_job_opens_its_file_and_checks_it(
 @pytest.mark.parametrize(
     ("content", "options", "words"),
     [
-        (FILE, {"tasks": "StopCube"}, r"have no commands of StopCube\.$"),
-        (FILE.replace("1 = ", "6 = "), {"episodes": "20"},
-         "have no command of PickXtimes for the goal"),
-        ("name = 3", {}, r"^The wording file '.*test.toml' has the name 3;"),
-        ("name = 'a'\n[PickXtime]", {}, r"^There is no task \(in the wording file '"),
+        (FILE, {"tasks": "StopCube"}, r"has no words of StopCube\.$"),
+        (FILE.replace("repeats = 1 ", "repeats = 6 "), {"episodes": "20"},
+         "has no sentence of PickXtimes for the goal"),
+        (SPOKEN, {}, "has commands or scenarios, which need language 4"),
+        ("tasks = ['PickXtimes']", {}, r"test.toml has the name '';"),
+        ("name = 'a'\ntasks = ['PickXtime']", {}, r"^There is no task of .*test.toml named"),
     ],
 )  # fmt: skip
 def test_what_the_wordings_lack_stops_a_plan(
@@ -111,7 +114,7 @@ def test_what_the_wordings_lack_stops_a_plan(
     wording_file.write_text(content)
     with pytest.raises(InvalidValueError, match=words):
         a_plan(wording_file, **options)
-    with pytest.raises(InvalidValueError, match=r"^The wording file '.*missing.toml' cannot be "):
+    with pytest.raises(InvalidValueError, match=r"^The file '.*missing.toml' cannot be "):
         a_plan(wording_file.with_name("missing.toml"), **options)
 
 
@@ -122,3 +125,26 @@ def test_a_job_in_our_own_words_opens_no_file(wording_file: Path) -> None:
     assert own.metadata["wordings"] is None
     missing = replace(job, wordings_file="missing.toml")
     assert instruct_job(missing) == own
+
+
+@pytest.mark.usefixtures("forgetful")
+def test_a_records_words_are_those_of_its_file_and_are_compared_where_it_is_there(
+    wording_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A report can be made without the file, and a resumed run finds other words of ours."""
+    wording_file.write_text(SPOKEN)
+    job = a_plan(wording_file, language=4).jobs()[0]
+    record = begin_record(PreparedJob(job))
+    assert record.words == words_of("PickXtimes", job.pool, 4, wordings=job.options.wordings)
+    assert record.words != words_of("PickXtimes", job.pool, 4)
+    other = replace(record, words=words_of("PickXtimes", job.pool, 4))
+    assert not other_versions(record)
+    assert [mismatch.what for mismatch in other_versions(other)] == [WORDS]
+    for text in (SPOKEN.replace("Do", "Move"), None):
+        monkeypatch.setattr(wording_store, "_OPEN", {})
+        if text is None:
+            wording_file.unlink()
+        else:
+            wording_file.write_text(text)
+        assert not other_versions(record)
+        assert not other_versions(other)

@@ -3,24 +3,18 @@
 import pytest
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.language.wordings.robomme_sentences import (
-    FINGERPRINTS,
-    check_robomme_name,
-    fingerprint,
-)
-from roboirg.language.wordings.wording_file import parse_wordings, read_wordings
+from roboirg.language.scenarios.robomme_sentences import FINGERPRINTS, fingerprint
+from roboirg.language.scenarios.wording_file import parse_wordings
 from roboirg.tasks.splits.published_episodes import published_goals
 
-TEXT = """name = "{name}"
-[StopCube.phrases.visit]
-1 = "the first time"
-2 = "the second time"
-3 = "the third time"
-4 = "the fourth time"
-5 = "the fifth time"
-[[StopCube.commands]]
-text = "Stop it {{visit}}."
-"""
+
+def words(name="robomme", verb="Stop"):
+    """Return the words of a file with a sentence for each visit."""
+    text = f'name = "{name}"\ntasks = ["StopCube"]\n'
+    for visit in range(1, 6):
+        text += f'[[literal]]\ntask = "StopCube"\nwhen.visit = {visit}\n'
+        text += f'text = "{verb} it {visit}."\n'
+    return parse_wordings(text, "file")
 
 
 def test_every_published_task_has_a_fingerprint():
@@ -28,24 +22,15 @@ def test_every_published_task_has_a_fingerprint():
     assert len(set(FINGERPRINTS.values())) == len(FINGERPRINTS) == 11
 
 
-def test_other_sentences_are_refused_under_the_name(tmp_path):
-    file = tmp_path / "words.toml"
-    file.write_text(TEXT.format(name="mine"))
-    assert read_wordings(file).name == "mine"
-    file.write_text(TEXT.format(name="robomme"))
+def test_other_sentences_are_refused_under_the_name():
+    assert words("mine").name == "mine"
     with pytest.raises(InvalidValueError, match="not those of RoboMME's published evaluation"):
-        read_wordings(file)
+        words()
 
 
 def test_the_fingerprint_is_of_what_is_said(monkeypatch):
-    words = parse_wordings(TEXT.format(name="robomme"), "file")
-    own = fingerprint("StopCube", words.tasks["StopCube"])
+    own = fingerprint("StopCube", words("mine").tasks["StopCube"].literals)
     monkeypatch.setitem(FINGERPRINTS, "StopCube", own)
-    check_robomme_name(words, "file")
-    # How the file is written does not matter; a changed word does.
-    again = parse_wordings(TEXT.replace("[StopCube.phrases", "\n[StopCube.phrases")
-                           .format(name="robomme"), "file")  # fmt: skip
-    check_robomme_name(again, "file")
-    changed = parse_wordings(TEXT.format(name="robomme").replace("Stop it", "Halt it"), "file")
+    assert words().name == "robomme"
     with pytest.raises(InvalidValueError, match="StopCube"):
-        check_robomme_name(changed, "file")
+        words(verb="Halt")

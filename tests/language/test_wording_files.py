@@ -1,73 +1,62 @@
-"""Wording files: by hand, bad ones, and their identity."""
+"""Wording files: whole sentences, commands and scenarios of a user's, bad files, and identity."""
 
-import dataclasses
+import contextlib
+import itertools
 import re
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from wording_stand_ins import same_number, train_episodes
+from hypothesis import given
+from hypothesis import strategies as st
+from typer.testing import CliRunner
+from wording_stand_ins import train_episodes
 
-from roboirg.apps.language_lab.validation import episode_checks
-from roboirg.apps.language_lab.validation.episode_checks import check_episode, unpaired
-from roboirg.apps.language_lab.validation.leaks import find_leaks
-from roboirg.core.episode import Goal
-from roboirg.core.errors import InvalidValueError
-from roboirg.core.goal_slots import COLOR_SLOTS
+from roboirg import main as cli
+from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language import FORMS, generator, instruct, instruct_with
+from roboirg.core.word_pools import POOLS
+from roboirg.language import FORMS, instruct, instruct_with, open_wordings
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction_row import row
-from roboirg.language.phrases import plain
-from roboirg.language.request import InstructionSpec, UtteranceSpec
-from roboirg.language.settings import get_setting
-from roboirg.language.variants import instructions
-from roboirg.language.worded_command import StatedPhrase, TaskWordings, WordedCommand
-from roboirg.language.wordings.wording_file import parse_wordings, read_wordings
-from roboirg.language.wordings.wording_store import find_wordings, open_wordings, register_wordings
-from roboirg.reader import interpret
-from roboirg.tasks import get_task
+from roboirg.language.scenarios.identity import words_digest, words_of
+from roboirg.language.scenarios.wording_file import parse_wordings, read_wordings
+from roboirg.language.scenarios.wording_store import find_wordings, register_wordings
+from roboirg.language.settings import settings_of
+from roboirg.shortcuts.command_chance import blind_goals, goals_of_command, understood_goals
+from roboirg.tasks import get_task, goals_of
+from roboirg.tasks.splits.splits import get_episode
 
-HAND = """\
-name = "by-hand"
-source = "A test."
-
-[PickXtimes]
-own = ["reasoning"]
-
-[PickXtimes.phrases]
-color = { red = "the red cube", green = "the green cube", blue = "the blue cube" }
-repeats = { 2 = "twice", 3 = "three times", 4 = "four times", 5 = "five times" }
-
-[[PickXtimes.commands]]
-when = { repeats = 1 }
-text = "Could you put {color} on the target, and press the button?"
-
-[[PickXtimes.commands]]
-text = "Could you put {color} on the target {repeats}, and press the button?"
-
-[VideoUnmask]
-phrases.colors = { red = "the container with [the red cube]" }
-
-[[VideoUnmask.commands]]
-text = "lift {colors.0}"
+PAGE = (Path(__file__).parents[2] / "docs/wording-files.md").read_text()
+SPOKEN, WHOLE = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+"""The page's examples: a command and scenarios; a whole sentence."""
+SENTENCE = "lift the {0} cube to the target, repeat {1}"
+HEAD = 'name = "hand"\ntasks = ["PickXtimes"]\n'
+SCENARIO = """
+[[scenario]]
+frame = "dusty"
+setting = "spatial"
+introduction = "It's dusty {place:spot}."
+say.color = ["the cube <there place: there>"]
 """
-UNMASK = '[VideoUnmask]\n[[VideoUnmask.commands]]\ntext = "lift {colors.0}"\n'
 
 
-def write(folder: Path, text: str = HAND) -> Path:
-    path = folder / "hand.toml"
-    path.write_text(text)
-    return path
+def literal(color, repeats, text=SENTENCE):
+    """Return the table of a sentence."""
+    when = f'when = {{ repeats = {repeats}, color = "{color}" }}'
+    return f'[[literal]]\ntask = "PickXtimes"\n{when}\ntext = "{text.format(color, repeats)}"\n'
 
 
-def opened(tables: str) -> str:
-    """The identity of open wordings with these tables."""
-    return register_wordings(parse_wordings(f"name = 'hand'\n{tables}", "file"))
+LITERALS = HEAD + "".join(literal("red", number) + literal("blue", number) for number in (1, 2, 3))
 
 
-def episode_with(task: str, **slots):
-    """A training episode with such a goal."""
+def opened(text):
+    """Return the identity of open wordings."""
+    return register_wordings(parse_wordings(text, "words.toml"))
+
+
+def episode_with(task, **slots):
+    """Return a training episode with such a goal."""
     return next(
         one
         for one in train_episodes(task, 0, 100)
@@ -75,167 +64,284 @@ def episode_with(task: str, **slots):
     )
 
 
-def pointer(said):
-    """The words of a command that point at a thing."""
-    last = len(said.utterances) - 1
-    return next(
-        said.span(one) for one in said.mentions
-        if one.utterance == last and one.role == "anaphor" and one.slot in COLOR_SLOTS
-    )  # fmt: skip
+def options_of(task, **changes):
+    """Yield options for every setting and form of a task, if it can express the episode."""
+    for setting in settings_of(get_task(task)):
+        for form in FORMS:
+            yield InstructionOptions(setting, form, **changes)
 
 
-def test_a_file_by_hand(tmp_path):
-    identity = open_wordings(write(tmp_path))
-    assert re.fullmatch("by-hand@[0-9a-f]{8}", identity)
-    once = episode_with("PickXtimes", color="red", repeats=1)
-    thrice = episode_with("PickXtimes", color="blue", repeats=3)
-    assert instruct(once, wordings=identity).text == (
-        "Could you put the red cube on the target, and press the button?"
-    )
-    said = instruct(thrice, wordings=identity)
-    assert (
-        said.text == "Could you put the blue cube on the target three times, and press the button?"
-    )
-    assert [(said.span(one), one.slot, one.value) for one in said.mentions] == [
-        ("the blue cube", "color", "blue"),
-        ("three times", "repeats", 3),
-    ]
-    direct = instruct(once, "direct", wordings=identity)
-    assert direct.command == (
-        f"Could you put {pointer(direct)} on the target {same_number(direct)}, "
-        "and press the button?"
-    )
-    assert interpret(direct.text, once.scene, "PickXtimes").goals == (once.goal,)
-    hidden = instruct(episode_with("VideoUnmask", colors=("red",)), "direct", wordings=identity)
-    assert hidden.command == f"lift the container with {pointer(hidden)}"
-
-
-def test_the_example_in_the_docs_is_read_and_valid():
-    page = (Path(__file__).parents[2] / "docs" / "wording-files.md").read_text()
-    (example,) = re.findall(r'```toml\n(name = "workshop".*?)```', page, re.DOTALL)
-    identity = register_wordings(parse_wordings(example, "example"))
-    for task in ("PickXtimes", "VideoUnmask"):
-        for episode in train_episodes(task, 0, 3):
-            assert not check_episode(episode, wordings=identity).failures
-
-
-def test_metadata_and_export_name_the_wording_and_the_command(tmp_path):
-    identity = open_wordings(write(tmp_path))
-    episode = episode_with("PickXtimes", repeats=3)
-    template = "Could you put {color} on the target {repeats}, and press the button?"
-    for setting, command in (("explicit", template), ("direct", template), ("reasoning", "own")):
-        said = instruct(episode, setting, wordings=identity)
-        assert said.metadata["wordings"] == identity
-        assert said.metadata["command"] == command
+@pytest.mark.parametrize("language", [3, 4])
+def test_a_whole_sentence_is_explicit_and_all_other_settings_say_ours(language):
+    identity, episode = opened(LITERALS), episode_with("PickXtimes", color="red", repeats=2)
+    for ours in options_of("PickXtimes", language=language):
+        if find_refusal(episode, ours) is not None:
+            continue
+        said = instruct_with(episode, replace(ours, wordings=identity))
         exported = row(episode, said)
-        assert (exported["wordings"], exported["command_template"]) == (identity, command)
-    own = instruct(episode, "reasoning")
-    assert own.text == instruct(episode, "reasoning", wordings=identity).text
-    assert (own.metadata["wordings"], own.metadata["command"]) == (None, "own")
+        assert (said.metadata["wordings"], exported["wordings"]) == (identity, identity)
+        assert exported["command_template"] == said.metadata["command"]
+        if ours.setting == "explicit":
+            assert said.text == said.metadata["command"] == SENTENCE.format("red", 2)
+            assert said.metadata["hidden_slots"] == 0
+        else:
+            own = instruct_with(episode, ours)
+            assert (said.turns, said.mentions) == (own.turns, own.mentions)
+            assert said.metadata["command"] == "own"
+
+
+@pytest.mark.parametrize("language", [3, 4])
+def test_a_goal_without_its_sentence_is_refused_in_explicit_only(language):
+    identity, episode = opened(LITERALS), episode_with("PickXtimes", color="green", repeats=2)
+    complaint = f"{identity} has no sentence of PickXtimes for the goal: green, twice"
+    with pytest.raises(InvalidValueError, match=complaint):
+        instruct(episode, wordings=identity, language=language)
+    assert instruct(episode, "direct", wordings=identity, language=language).text
+
+
+def test_a_task_without_words_of_ours_can_have_sentences_in_language_4():
+    slots = 'when = { colors = ["red"], counts = [2] }'
+    text = f'name = "a"\ntasks = ["BinFill"]\n[[literal]]\ntask = "BinFill"\n{slots}\ntext = "go"'
+    identity = opened(text)
+    goal = next(iter(find_wordings(identity).tasks["BinFill"].literals))
+    episode = replace(episode_with("BinFill"), goal=goal)
+    assert instruct(episode, wordings=identity, language=4).text == "go"
+    with pytest.raises(InvalidValueError, match="language 4 has no scenarios of BinFill yet"):
+        instruct(episode, "direct", wordings=identity, language=4)
+
+
+@pytest.mark.parametrize("language", [3, 4])
+def test_a_sentence_means_each_goal_for_which_the_file_says_it(language):
+    several = "do the usual with the {0} cube"
+    identity = opened(
+        HEAD + literal("red", 1, several) + literal("red", 2, several) + literal("blue", 1)
+    )
+    episode = episode_with("PickXtimes", color="red", repeats=1)
+    said = instruct(episode, wordings=identity, language=language)
+    wanted = {
+        goal for goal in goals_of(episode) if goal["color"] == "red" and goal["repeats"] in (1, 2)
+    }
+    for goals in (understood_goals, goals_of_command, blind_goals):
+        assert set(goals(said, episode)) == wanted
+
+
+def test_the_words_of_the_page_are_checked_and_said(tmp_path):
+    """Whoever follows the page sees what it promises."""
+    assert len(PAGE.split()) <= 900
+    file = tmp_path / "mine.toml"
+    file.write_text(SPOKEN)
+    checked = CliRunner().invoke(
+        cli.app, ["language", "check-scenarios", str(file), "--seeds", "0"]
+    )
+    assert checked.exit_code == 0, checked.output
+    assert "explicit (PickXtimes)" in checked.output
+    assert "photos (PickXtimes, direct, both pools)" in checked.output
+    identity = open_wordings(file)
+    assert re.fullmatch("workshop@[0-9a-f]{8}", identity)
+    told = {}
+    for episode in train_episodes("PickXtimes", 0, 100):
+        for setting, form in itertools.product(("explicit", "direct", "contextual"), FORMS):
+            said = instruct(episode, setting, form, wordings=identity, language=4)
+            assert understood_goals(said, episode) == (episode.goal,)
+            told[said.text] = said.metadata.get("scenario")
+    assert set(told.values()) == {None, "fresh paint", "photos"}
+    (shown,) = re.findall(r"\*(We have just\spainted the red cube\.[^*]*)\*", PAGE)
+    assert told[shown.replace("\n", " ")] == "fresh paint"
+
+
+def test_the_check_lists_each_goal_without_a_sentence(tmp_path):
+    file = tmp_path / "theirs.toml"
+    file.write_text(WHOLE)
+    checked = CliRunner().invoke(cli.app, ["language", "check-scenarios", str(file)])
+    assert isinstance(checked.exception, RoboIRGError)
+    missing = re.findall(
+        "BROKEN the file has no sentence of StopCube .* visit (\\d)", checked.output
+    )
+    assert missing == ["3", "4", "5"]
+
+
+def test_the_check_finds_a_setting_without_a_scenario_for_some_scenes(tmp_path):
+    """Such an episode is refused in a run."""
+    file = tmp_path / "mine.toml"
+    file.write_text(HEAD + SCENARIO)
+    checked = CliRunner().invoke(cli.app, ["language", "check-scenarios", str(file)])
+    assert isinstance(checked.exception, RoboIRGError)
+    assert re.search(
+        r"BROKEN PickXtimes: spatial has no scenario that fits \d+ scenes, such as Pick",
+        checked.output,
+    )
+
+
+def test_the_check_finds_a_command_that_lacks_a_field_or_hides_its_value(tmp_path):
+    file = tmp_path / "mine.toml"
+    for command, complaint in (
+        ('["Lift {color}."]', "has no command of PickXtimes with {color} and {repeats}"),
+        ('["Lift {color} {repeats}."]\n[stated.all]\ncolor = "a cube"', "and of others or none"),
+        (f'["Lift {{color}} {{repeats}}{" again" * 60}."]', "tokens; at most 64 are heard"),
+    ):
+        file.write_text(f"{HEAD}[commands]\nall = {command}\n")
+        checked = CliRunner().invoke(cli.app, ["language", "check-scenarios", str(file)])
+        assert complaint in checked.output
+
+
+@pytest.mark.parametrize("pool", POOLS)
+def test_scenarios_of_ones_own_replace_ours_setting_by_setting_and_move_no_draw(pool):
+    identity = opened(HEAD + SCENARIO)
+    split = {"train": "train", "test": "test"}[pool]
+    for index in range(12):
+        episode = get_episode("PickXtimes", split, index)
+        for ours in options_of("PickXtimes", language=4):
+            theirs = replace(ours, wordings=identity)
+            if ours.setting == "spatial":
+                if find_refusal(episode, theirs) is None:
+                    assert instruct_with(episode, theirs).metadata["scenario"] == "dusty"
+                continue
+            assert find_refusal(episode, ours) == find_refusal(episode, theirs)
+            if find_refusal(episode, ours) is None:
+                own, said = instruct_with(episode, ours), instruct_with(episode, theirs)
+                assert (said.turns, said.mentions) == (own.turns, own.mentions)
+
+
+def test_a_scenario_with_a_pool_is_said_in_this_one_only():
+    identity = opened(HEAD + SCENARIO.replace("setting", 'pool = "train"\nsetting'))
+    options = InstructionOptions("spatial", wordings=identity, language=4)
+    assert "no spatial scenario for it in the pool test" in find_refusal(
+        get_episode("PickXtimes", "test", 0), options
+    )
+
+
+def test_stated_values_of_ones_own_leave_the_others_ours():
+    identity = opened(HEAD + '[stated.PickXtimes]\ncolor = "our {color} cube"\n')
+    said = instruct(
+        episode_with("PickXtimes", color="red", repeats=3), wordings=identity, language=4
+    ).text
+    assert "our red cube" in said
+    assert "three times" in said
+
+
+def test_the_digest_of_words_is_of_what_is_said():
+    ours = words_digest("PickXtimes", "test")
+    pool = SCENARIO.replace("setting", 'pool = "train"\nsetting', 1)
+    texts = {
+        "same": HEAD + SCENARIO,
+        "comment": HEAD + "# mine\n" + SCENARIO,
+        "dust": HEAD + SCENARIO.replace("dusty {", "full of dust {"),
+        "command": HEAD + SCENARIO + '[commands]\nall = ["Do {color} {repeats}."]\n',
+        "sentences": LITERALS,
+        "pool": HEAD + pool,
+    }
+    found = {
+        name: words_digest("PickXtimes", "test", "explicit", opened(text))
+        for name, text in texts.items()
+    }
+    assert found.pop("comment") == found["same"]
+    assert len({ours, *found.values()}) == len(found) + 1
+    other = texts["dust"].replace('"PickXtimes"', '"PickXtimes", "SwingXtimes"')
+    assert words_digest("PickXtimes", "test", "explicit", opened(other)) == found["dust"]
+    assert words_digest("PickXtimes", "test") == ours
+    identity = opened(texts["same"])
+    said = instruct(get_episode("PickXtimes", "test", 0), wordings=identity, language=4)
+    assert said.metadata["words"] == words_of("PickXtimes", "test", 4, wordings=identity)
+
+
+def test_what_a_file_cannot_serve_is_refused_in_a_sentence():
+    spoken, episode = opened(HEAD + SCENARIO), episode_with("PickXtimes")
+    with pytest.raises(
+        InvalidValueError, match=r"has commands or scenarios, which need language 4"
+    ):
+        instruct(episode, wordings=spoken)
+    stop = episode_with("StopCube")
+    with pytest.raises(InvalidValueError, match=f"^The wording file {spoken} has no words of Stop"):
+        instruct(stop, wordings=spoken, language=4)
+    with pytest.raises(InvalidValueError, match="are not open"):
+        instruct(episode, wordings="gone@00000000")
+
+
+OLD = '[PickXtimes]\nown = ["direct"]\n[[PickXtimes.commands]]\ntext = "lift {color}"\n'
 
 
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
         ("name = ", "is not valid TOML"),
-        (UNMASK, "has the name None; it must begin with a line such as"),
-        ('name = "a b"\n' + UNMASK, "has the name 'a b'"),
-        ('name = "a"\nsource = 3\n' + UNMASK, "has the source 3; it must be a text"),
-        ('name = "a"', "has no task; add one such as [PickXtimes]"),
-        ('name = "a"\n[PickXTimes]', "Did you mean 'PickXtimes'?"),
-        ('name = "a"\nStopCube = 3', "has 3 for the task; it must be a table"),
-        ('name = "a"\n[StopCube]\nown = []', "needs [[TASK.commands]]"),
-        ('name = "a"\n[StopCube]\nown = ["dirct"]\ncommands = [{}]', "Did you mean 'direct'?"),
-        ('name = "a"\n[StopCube]\ncommand = 3', "Did you mean 'commands'?"),
-        ('name = "a"\n[StopCube]\ncommands = [{}]', "has a command with the text None"),
-        ('name = "a"\n' + UNMASK, "has no phrases for the field {colors.0}"),
-        ('name = "a"\n' + UNMASK.replace("colors.0", "colour"), "'colour'; known: color, "),
-        ('name = "a"\n' + UNMASK.replace("lift {", "lift {{"), "has a bracket that is not a field"),
-        (
-            'name = "a"\n'
-            + UNMASK.replace("lift", "{visit} {visit}")
-            + "phrases.visit = { 2 = 'x' }",
-            "has the field {visit} twice",
-        ),
-        ('name = "a"\n' + UNMASK + "when = { color = 1.5 }", "has the condition color = 1.5"),
-        ('name = "a"\n' + UNMASK + "when = { shade = 1 }", "There is no key of when"),
-        ('name = "a"\n' + UNMASK + "phrases.colors = 3", "has the phrases colors = 3"),
-        (
-            'name = "a"\n' + UNMASK + "phrases.colors = { red = 'a [b] [c]' }",
-            "has the phrase 'a [b] [c]' for colors red",
-        ),
-        ('name = "a"\n' + UNMASK + "phrases.shade = {}", "There is no key of phrases"),
-        (
-            'name = "a"\n' + UNMASK + "when = { colors = 'red' }",
-            "has the condition colors = 'red'; it must be a list of words.",
-        ),
-        (
-            'name = "a"\n' + UNMASK + "when = { counts = [1, 'a'] }",
-            "has the condition counts = [1, 'a']; it must be a list of numbers.",
-        ),
-        (
-            'name = "a"\n' + UNMASK + "when = { repeats = '1' }",
-            "has the condition repeats = '1'; it must be a number.",
-        ),
-        (
-            'name = "a"\n' + UNMASK + "when = { color = ['red'] }",
-            "has the condition color = ['red']; it must be a word.",
-        ),
-        (
-            'name = "a"\n' + UNMASK.replace("lift", "soulève"),
-            "has the words 'soulève {colors.0}'; they must be printable ASCII on one line",
-        ),
-        (
-            'name = "a"\n' + UNMASK + 'phrases.colors = { red = "a\\nb" }',
-            "has the words 'a\\nb'; they must be printable ASCII on one line",
-        ),
-        (
-            'name = "a"\n' + UNMASK + 'phrases.colors = { red = "the [red] container" }',
-            "the brackets must hold a whole phrase with its article, such as [the red cube].",
-        ),
-        (
-            'name = "a"\n' + UNMASK + 'phrases.colors = { red = "x" }\npointed = "colors.0"',
-            "has pointed = 'colors.0'; it must be a list of fields of the command",
-        ),
-        (
-            'name = "a"\n' + UNMASK + 'phrases.colors = { red = "x" }\npointed = ["colors"]',
-            "Did you mean 'colors.0'?",
-        ),
-        (
-            'name = "a"\n' + UNMASK + 'phrases.colors = { red = "  " }',
-            "has the phrase '  ' for colors red; it must be words",
-        ),
-        (
-            'name = "a"\n' + UNMASK + 'phrases.colors = { red = "the [ ] cube" }',
-            "has the phrase 'the [ ] cube' for colors red; it must be words",
-        ),
+        (HEAD.replace('"hand"', '"a b"') + SCENARIO, "has the name 'a b'; it must begin with"),
+        (HEAD.partition("\n")[2] + SCENARIO.replace("setting", 'pool = "test"\nsetting', 1),
+         "has the name ''; it must begin with a line such as"),
+        (HEAD.replace('"hand"', "3"), "name: Expected a text, got a number; it is 3"),
+        (f"{HEAD}source = 3", "source: Expected a text, got a number; it is 3"),
+        ('name = "a"', "has no tasks; add a line such as tasks = "),
+        ('name = "a"\ntasks = "PickXtimes"', "tasks: Expected a list, got a text; it is 'Pick"),
+        ('name = "a"\ntasks = ["PickXTimes"]', "Did you mean 'PickXtimes'?"),
+        (f'name = "a"\n{OLD}', "has the table [PickXtimes] of an earlier format; write its comma"),
+        (f"{HEAD}[comands]", "Did you mean 'commands'?"),
+        (HEAD, "has no words of PickXtimes, which stands in its tasks"),
+        (f"{HEAD}commands = 3", "commands: Expected a table, got a number; it is 3"),
+        (f"{HEAD}[commands]\nall = 'a'", "Expected a table or a list, got a text"),
+        (f"{HEAD}[commands]\nStopCube = []", "There is no task of words.toml named 'StopCube'"),
+        (f"{HEAD}[commands.all]\ntest = ['Do {{color}}.']",
+         "has no commands of PickXtimes in the pool train"),
+        (f"{HEAD}commands.all.train = ['{{color}}']\ncommands.all.test = ['{{colour}}']",
+         "commands of PickXtimes has the slot 'colour'"),
+        (HEAD + SCENARIO.replace("It's", "It's très"), "'dusty', introduction has the words"),
+        (HEAD + SCENARIO.replace('"spatial"', '"spatail"'),
+         "'dusty' has the setting 'spatail'; the settings are direct, direct-rival, "),
+        (HEAD + SCENARIO.replace('"dusty"', '"\\u001b[31m"'), "frame or people has the words"),
+        (HEAD + SCENARIO + SCENARIO, "has the frame 'dusty' twice in the setting spatial"),
+        (f"{HEAD}literal = 3", "literal: Expected a list, got a number; it is 3"),
+        (f"{HEAD}[[literal]]\ntask = 'PickXtimes'", "literal 1: Object missing required"),
+        (HEAD + literal("red", 1).replace("repeats = 1, ", ""),
+         "literal 1 has when = {'color': 'red'}; it must have a value for color and repeats"),
+        (HEAD + literal("red", "'2'"), "literal 1, when.repeats: Expected a number, got a text"),
+        (HEAD + literal("red", "[2]"), "literal 1, when.repeats: Expected a number, got a list"),
+        (HEAD + literal("red", 1, "lift {{color}}"), "it must be a whole sentence"),
+        (HEAD + literal("red", 1, " "), "has the text ' '; it must be a whole sentence"),
+        (HEAD + literal("red", 1) * 2, "literal 2 states the goal red, once of PickXtimes again"),
+        (HEAD + literal("red", 1).replace("PickXtimes", "StopCube"), "named 'StopCube'; known"),
     ],
-)
-def test_a_bad_file_is_told_in_one_sentence(tmp_path, text, complaint):
-    path = write(tmp_path, text)
+)  # fmt: skip
+def test_a_bad_file_is_refused_by_name_field_value_and_what_would_be_right(text, complaint):
     with pytest.raises(InvalidValueError) as caught:
-        read_wordings(path)
+        parse_wordings(text, "words.toml")
     assert complaint in str(caught.value)
-    assert str(path) in str(caught.value)
+    assert "words.toml" in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_a_file_that_cannot_be_read_is_told(tmp_path):
-    with pytest.raises(InvalidValueError, match="cannot be read"):
-        read_wordings(tmp_path / "missing.toml")
+PIECES = st.sampled_from(
+    [
+        *re.split(r"(\s|[\[\]{}=.,])", LITERALS + SCENARIO),
+        "[[",
+        "{a=",
+        "\0",
+        "\x1b",
+        "é",
+        "9" * 5000,
+    ]
+)
+
+
+@given(st.lists(st.one_of(PIECES, st.text(max_size=3)), max_size=40).map("".join))
+def test_any_text_is_a_file_or_refused(text):
+    with contextlib.suppress(InvalidValueError):
+        parse_wordings(HEAD + text, "words.toml")
+
+
+@pytest.mark.parametrize("name", ["missing.toml", "nul\0.toml", "bytes.toml", ""])
+def test_a_file_that_cannot_be_read_is_refused(tmp_path, name):
     (tmp_path / "bytes.toml").write_bytes(b"\xff")
     with pytest.raises(InvalidValueError, match="cannot be read"):
-        read_wordings(tmp_path / "bytes.toml")
+        read_wordings(tmp_path / name)
 
 
 def test_a_changed_file_is_other_wordings(tmp_path):
-    path = write(tmp_path)
+    path = tmp_path / "words.toml"
+    path.write_text(LITERALS)
     identity = open_wordings(path)
-    path.write_text(HAND.replace("Could you", "Will you"))
+    path.write_text(LITERALS.replace("lift", "take"))
     changed = open_wordings(path)
     assert changed != identity
     assert open_wordings(path, identity) == identity  # this process still has it
-    gone = "by-hand@00000000"
+    gone = "hand@00000000"
     with pytest.raises(InvalidValueError, match=f"holds {changed}, but the episodes need {gone}"):
         open_wordings(path, gone)
     with pytest.raises(InvalidValueError, match=f"holds {changed}, but the episodes need {gone}"):
@@ -245,298 +351,4 @@ def test_a_changed_file_is_other_wordings(tmp_path):
         open_wordings(None, gone)
     with pytest.raises(InvalidValueError, match="are not open"):
         find_wordings(gone)
-    with pytest.raises(InvalidValueError, match="are not open"):
-        instruct_with(episode_with("PickXtimes"), InstructionOptions(wordings=gone))
     assert open_wordings(None) is None
-
-
-def test_a_count_and_a_cube_may_be_one_phrase():
-    identity = opened(
-        """
-        [BinFill.phrases]
-        cubes = { "2 red" = "2 red cubes", "1 red" = "1 red cube" }
-        [[BinFill.commands]]
-        text = "put {cubes.0} into the bin, then press the button"
-        """
-    )
-    episode = replace(episode_with("BinFill"), goal=Goal.of(colors=("red",), counts=(2,)))
-    explicit = instruct(episode, wordings=identity)
-    assert explicit.text == "put 2 red cubes into the bin, then press the button"
-    assert [explicit.span(one) for one in explicit.mentions] == ["2 red cubes"]
-    for form in FORMS:
-        assert instruct(episode, "direct", form, wordings=identity).metadata["command"] != "own"
-
-
-OWN_SENTENCES = """
-[PickXtimes.phrases]
-color = { red = "the red cube", green = "the green cube", blue = "the blue cube" }
-[[PickXtimes.commands]]
-when = { repeats = 1 }
-text = "put {color} on the target once, then press the button"
-[[PickXtimes.commands]]
-when = { repeats = 2 }
-text = "twice, put {color} on the target, then press the button"
-"""
-
-
-OWN_SETTINGS = """[PickXtimes]
-own = ["direct"]
-[PickXtimes.phrases]
-"""
-
-
-@pytest.mark.parametrize("setting", ["direct", "contextual"])
-def test_both_forms_have_our_command_or_none(setting):
-    identity = opened(OWN_SENTENCES)
-    episode = episode_with("PickXtimes", repeats=2)
-    for form in FORMS:
-        said = instruct(episode, setting, form, wordings=identity)
-        assert said.metadata["command"] == "own"
-        assert said.text == instruct(episode, setting, form).text
-    assert not list(unpaired(episode, [setting], identity))
-    # The number is stated in both.
-    for form in FORMS:
-        said = instruct(episode, "spatial", form, wordings=identity)
-        assert said.metadata["command"].startswith("twice, put")
-
-
-@pytest.mark.parametrize(
-    ("task", "phrases", "text"),
-    [
-        ("StopCube", "visit = { 3 = 'the third time' }", "stop the cube at the target for {visit}"),
-        ("StopCube", "visit = { 3 = '[its third visit]' }", "stop the cube on {visit}"),
-        (
-            "PickXtimes",
-            "repeats = { 3 = 'three times' }\ncolor = { red = 'the red cube' }",
-            "put {color} on the target, doing this for {repeats}, then press the button",
-        ),
-        (
-            "VideoPlaceOrder",
-            "placement = { 3 = 'the third target' }\ncolor = { red = 'the red cube' }",
-            "place {color} on {placement} it was placed on",
-        ),
-        (
-            "VideoPlaceOrder",
-            "placement = { 3 = 'the third time' }\ncolor = { red = 'the red cube' }",
-            "place {color} on the target where a cube was placed {placement}",
-        ),
-        (
-            "VideoPlaceButton",
-            """relation = { after = 'the target [right after the button press]' }
-            color = { red = 'the red cube' }""",
-            "place {color} on {relation}",
-        ),
-        (
-            "VideoPlaceButton",
-            """relation = { after = 'right after the button press' }
-            color = { red = 'the red cube' }""",
-            "place {color} on the target {relation}",
-        ),
-    ],
-)
-def test_a_phrase_that_no_expression_can_replace_leaves_our_command(task, phrases, text):
-    identity = opened(f"[{task}.phrases]\n{phrases}\n[[{task}.commands]]\ntext = '{text}'")
-    goals = {"visit": 3, "repeats": 3, "placement": 3, "relation": "after"}
-    (slot,) = goals.keys() & episode_with(task).goal.as_mapping().keys()
-    color = {} if task == "StopCube" else {"color": "red"}
-    episode = episode_with(task, **{slot: goals[slot]}, **color)
-    assert instruct(episode, wordings=identity).metadata["command"] == text
-    for form in FORMS:
-        said = instruct(episode, "direct", form, wordings=identity)
-        assert said.metadata["command"] == "own"
-        assert said.text == instruct(episode, "direct", form).text
-
-
-def test_a_command_may_be_for_referring_expressions_only():
-    identity = opened(
-        """
-        [VideoRepick.phrases]
-        repeats = { 2 = "for two times", 3 = "for three times" }
-        [[VideoRepick.commands]]
-        pointed = ["repeats"]
-        text = "lift the cube of the video and put it down, doing so {repeats}"
-        [[VideoRepick.commands]]
-        text = "repeatedly lift the cube of the video and put it down {repeats}"
-        """
-    )
-    episode = episode_with("VideoRepick", repeats=2)
-    stated = "repeatedly lift the cube of the video and put it down for two times"
-    assert instruct(episode, wordings=identity).text == stated
-    assert instruct(episode, "direct", "resolved", wordings=identity).command == stated
-    said = instruct(episode, "direct", wordings=identity)
-    assert said.command == (
-        f"lift the cube of the video and put it down, doing so {same_number(said)}"
-    )
-
-
-def test_a_setting_under_own_ignores_the_commands():
-    identity = opened(f"{OWN_SENTENCES.replace('[PickXtimes.phrases]', OWN_SETTINGS)}")
-    without_command = episode_with("PickXtimes", repeats=3)
-    said = instruct(without_command, "direct", wordings=identity)
-    assert said.text == instruct(without_command, "direct").text
-    assert (said.metadata["command"], said.metadata["wordings"]) == ("own", identity)
-    with pytest.raises(InvalidValueError, match="have no command of PickXtimes"):
-        instruct(without_command, "spatial", wordings=identity)
-    # A command from outside has no rival; our own has.
-    rival = InstructionOptions("direct-rival")
-    assert find_refusal(without_command, rival) is None
-    options = dataclasses.replace(rival, wordings=identity)
-    assert find_refusal(without_command, options) is None
-    drawn = instruct_with(without_command, options)
-    assert drawn.text == instruct_with(without_command, rival).text
-    assert drawn.metadata["rival"] is not None
-
-
-def test_a_pair_with_our_command_in_one_form_is_no_pair(monkeypatch):
-    episode = episode_with("PickXtimes", repeats=2)
-    identity = opened(OWN_SENTENCES)
-
-    def say(one, options):
-        outside = identity if options.form == "resolved" else None
-        setting = "explicit" if outside else "direct"
-        return instruct_with(one, dataclasses.replace(options, setting=setting, wordings=outside))
-
-    monkeypatch.setattr(episode_checks, "instruct_with", say)
-    assert ("direct", "resolved, more than its references differ") in unpaired(episode, ["direct"])
-
-
-BRACKETS = """
-[PickXtimes.phrases]
-color = { red = "our friend [the red cube] on the table" }
-repeats = { 2 = "[twice] please", 3 = "exactly [three times]" }
-[[PickXtimes.commands]]
-text = "put {color} on the target {repeats}, then press the button"
-
-[BinFill.phrases]
-cubes = { "2 red" = "two [red cubes] of the table" }
-[[BinFill.commands]]
-text = "put {cubes.0} into the bin, then press the button"
-"""
-
-
-def test_words_around_brackets_stay():
-    identity = opened(BRACKETS)
-    red = [episode_with("PickXtimes", color="red", repeats=repeats) for repeats in (2, 3)]
-    twice, thrice = (instruct(one, "direct", wordings=identity) for one in red)
-    assert twice.command == (
-        f"put our friend {pointer(twice)} on the table on the target {same_number(twice)} please, "
-        "then press the button"
-    )
-    assert thrice.command == (
-        f"put our friend {pointer(thrice)} on the table on the target exactly "
-        f"{same_number(thrice)}, then press the button"
-    )
-    said = instruct(red[0], "spatial", wordings=identity).command
-    assert re.search(r"put our friend the cube .* on the table on the target twice please", said)
-    said = next(
-        instruct(one, "reasoning", wordings=identity)
-        for one in train_episodes("PickXtimes", 0, 100)
-        if one.goal["color"] == "red" and one.goal["repeats"] == 2
-        and instruct(one, "reasoning").metadata["pattern"] == "number deduction"
-    ).command  # fmt: skip
-    assert said.startswith("put our friend the red cube on the table on the target ")
-    assert said.endswith(" please, then press the button")
-    cubes = replace(episode_with("BinFill"), goal=Goal.of(colors=("red",), counts=(2,)))
-    said = instruct(cubes, "direct", wordings=identity).command
-    assert said in {
-        f"put {words} of the table into the bin, then press the button"
-        for words in ("that many of them", "two of them", "two of the former", "two of the latter")
-    }
-
-
-def test_the_phrases_of_a_command_stay_with_it():
-    identity = opened(
-        """
-        [PickXtimes.phrases]
-        color = { red = "the red cube" }
-        repeats = { 1 = "one time", 2 = "twice" }
-        [[PickXtimes.commands]]
-        when = { color = "red" }
-        phrases.repeats = { 1 = "just [once]" }
-        text = "put our cube on the target {repeats}, then press the button"
-        [[PickXtimes.commands]]
-        when = { repeats = 1 }
-        phrases.color = { red = "our [red cube]" }
-        text = "put {color} on the target, then press the button"
-        [[PickXtimes.commands]]
-        text = "take {color}, put it on the target {repeats}, then press the button"
-        """
-    )
-    episode = episode_with("PickXtimes", color="red", repeats=1)
-    direct = instruct(episode, "direct", wordings=identity)
-    assert direct.command == (
-        f"take it, put it on the target {same_number(direct)}, then press the button"
-    )
-    spatial = instruct(episode, "spatial", wordings=identity).command
-    assert re.fullmatch("put our the cube .* on the target, then press the button", spatial)
-    wordings = find_wordings(identity).tasks["PickXtimes"]
-    third = wordings.commands[2]
-    assert wordings.phrase(episode.goal, "repeats").text == "just once"
-    assert wordings.phrase(episode.goal, "repeats", third).text == "one time"
-
-
-@pytest.mark.parametrize(
-    ("when", "text", "leaked"),
-    [
-        ("", "put {cubes.0} and {cubes.1} in", set()),
-        ("", "put {cubes.0} and {cubes.1} in, 2 kinds", set()),  # every goal has it
-        ("", "put {cubes.0} and {cubes.1} in", {"1"}),
-        ("when = { counts = [2, 1] }", "put {cubes.0} and {cubes.1} in, 2 and 1", {"1", "2"}),
-    ],
-)
-def test_a_count_in_a_command_is_a_leak_unless_every_goal_has_it(when, text, leaked):
-    after = ", 1 by 1" if leaked == {"1"} else ""
-    identity = opened(
-        f"""
-        [BinFill.phrases]
-        cubes = {{ "2 red" = "two [red cubes]", "1 blue" = "one [blue cube]{after}" }}
-        [[BinFill.commands]]
-        {when}
-        text = "{text}"
-        """
-    )
-    goal = Goal.of(colors=("red", "blue"), counts=(2, 1))
-    said = instruct(replace(episode_with("BinFill"), goal=goal), "direct", wordings=identity)
-    assert find_leaks(said, goal) == leaked
-
-
-def test_a_goal_without_a_command_is_a_refusal_with_a_reason():
-    identity = opened(OWN_SENTENCES)
-    missing = episode_with("PickXtimes", repeats=3)
-    options = InstructionOptions("direct", wordings=identity)
-    assert find_refusal(missing, options) == (
-        f"wordings {identity} have no command of PickXtimes for the goal of episode "
-        f"{missing.key}: {missing.goal['color']}, 3 times"
-    )
-    with pytest.raises(InvalidValueError, match=r"^The wordings hand@.* 3 times\.$"):
-        instruct_with(missing, options)
-    told = episode_with("PickXtimes", repeats=1)
-    said = list(instructions([missing, told], ["explicit"], ["implicit"], options))
-    assert [episode for episode, _ in said] == [told]
-    found = check_episode(missing, wordings=identity)
-    assert not found.texts
-    assert not found.failures
-
-
-def test_a_setting_may_speak_without_the_command(monkeypatch):
-    spec = InstructionSpec((UtteranceSpec("command", plain("do as before")),))
-    setting = replace(get_setting("direct", get_task("PickXtimes")), say=lambda _request: spec)
-    monkeypatch.setattr(generator, "get_setting", lambda _name, _task: setting)
-    said = instruct(episode_with("PickXtimes", repeats=1), "direct", wordings=opened(OWN_SENTENCES))
-    assert (said.text, said.metadata["command"]) == ("Do as before", "own")
-
-
-def test_the_first_command_that_fits_is_used():
-    one = StatedPhrase("", "x", "")
-    commands = TaskWordings(
-        (
-            WordedCommand("once", {"repeats": 1}),
-            WordedCommand("{repeats}", {}, {"repeats": {"1": one, "2": one}}),
-        )
-    )
-    assert commands.find(Goal.of(repeats=1)) is commands.commands[0]
-    assert commands.find(Goal.of(repeats=2)) is commands.commands[1]
-    assert commands.find(Goal.of(repeats=3)) is None
-    assert commands.find(Goal.of(repeats=3), ["repeats"]) is commands.commands[1]
-    assert commands.find(Goal.of(repeats=1), ["repeats"]) is commands.commands[1]
-    assert commands.find(Goal.of(repeats=1, color="red")) is None

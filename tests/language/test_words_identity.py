@@ -50,7 +50,7 @@ def digest(
     """Return the digest of a file's words, with other people or remarks of all tasks."""
     words = read_task_scenarios(text, "mine.toml")["PickXtimes"]
     fields = {"people": general().people, "distractors": general().distractors, **shared}
-    monkeypatch.setattr(identity, "words_in", lambda *_: words)
+    monkeypatch.setattr(identity, "task_words", lambda *_: words)
     monkeypatch.setattr(identity, "general", lambda: General(**fields))  # type: ignore[arg-type]
     return identity.words_digest.__wrapped__("PickXtimes", pool)
 

@@ -20,7 +20,7 @@ _PANELS = {
     EPISODES: (
         "policies", "tasks", "settings", "forms", "split", "episodes", "policy_seeds", "arms",
     ),
-    WORDS: ("stages", "wordings"),
+    WORDS: ("stages", "wordings", "language"),
     PLAY: ("max_steps", "max_cost", "video"),
 }  # fmt: skip
 """The fields of a plan that are used daily; a plan file has all."""

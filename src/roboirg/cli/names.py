@@ -8,16 +8,17 @@ from roboirg.core.errors import Name, known_name
 
 
 def known_tasks(given: object, wordings: str | None = None) -> tuple[str, ...]:
-    """Return tasks as typed or in a plan; of all, those that open wordings have commands of."""
-    from roboirg.core.word_pools import POOLS
+    """Return tasks as typed or in a plan; of all, those that open wordings have words of."""
+    from roboirg.core.word_pools import outside_words
     from roboirg.evaluation.plan.option_parsing import means_all, parse_names
-    from roboirg.language.wordings.wording_store import find_wordings
+    from roboirg.language.scenarios.wording_store import find_wordings
     from roboirg.tasks import find_tasks
 
     names = find_tasks(parse_names("task", given))
-    if wordings is None or wordings in POOLS or not means_all(given):
+    identity = outside_words(wordings)
+    if identity is None or not means_all(given):
         return names
-    return tuple(name for name in names if name in find_wordings(wordings).tasks)
+    return tuple(name for name in names if name in find_wordings(identity).tasks)
 
 
 def known_settings(given: object) -> tuple[str, ...]:

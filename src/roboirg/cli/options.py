@@ -75,7 +75,7 @@ class PlanWords:
     def tasks(self, typed: str = "all", wordings: str | None = None) -> tuple[str, ...]:
         """Return the names of tasks that were typed, or else those of the plan.
 
-        Of all, those that open wordings have commands of.
+        Of all, those that open wordings have words of.
         """
         return known_tasks(self.given("tasks", typed), wordings)
 

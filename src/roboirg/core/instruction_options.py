@@ -26,7 +26,7 @@ class InstructionOptions:
 
     Attributes:
         wordings: ``train`` or ``test`` for the words of that pool (`roboirg.core.word_pools`); or
-            the identity of the wording file whose commands are used, such as
+            the identity of the wording file whose words are said, such as
             ``robomme@1a2b3c4d``, which the process must have opened. None for our words of the
             episode's split.
         delivery: see `roboirg.core.delivery`.
@@ -62,8 +62,8 @@ class InstructionOptions:
     wordings: Label | None = field(
         default=None,
         metadata=described(
-            "Wording file whose commands are used instead of our own; or train or test: our words "
-            "of that pool in every split."
+            "Wording file with words of your own; or train or test: our words of that pool in "
+            "every split."
         ),
     )
     delivery: Label = field(

@@ -11,6 +11,8 @@ from typing import Generic, Literal, NamedTuple, TypeVar, get_args
 
 PoolName = Literal["train", "test"]
 POOLS: tuple[PoolName, ...] = get_args(PoolName)
+ROBOMME_NAME = "robomme"
+"""Name of the wordings with RoboMME's sentences, before the @ of their identity."""
 TRAINING_SPLITS = ("train", "val")
 """The splits whose words a policy may have been trained on."""
 
@@ -52,6 +54,11 @@ def pool_of(split: str, wordings: str | None = None) -> PoolName:
         if wordings == pool:
             return pool
     return "train" if split in TRAINING_SPLITS else "test"
+
+
+def outside_words(wordings: str | None) -> str | None:
+    """Return the identity of a wording file; None for our own words, of whatever pool."""
+    return None if wordings in POOLS else wordings
 
 
 def words_label(wordings: str | None) -> str:

@@ -23,7 +23,7 @@ from roboirg.core.instruction_options import (
     as_fields,
 )
 from roboirg.core.observations import CAMERAS
-from roboirg.language.wordings.wording_store import open_wordings
+from roboirg.language.scenarios.wording_store import open_wordings
 from roboirg.simulation.observation_builder import ObservationSpec
 from roboirg.simulation.rendering.render_settings import RenderSettings
 from roboirg.tasks.splits.splits import get_episode, split_size

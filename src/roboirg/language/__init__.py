@@ -6,9 +6,9 @@ from roboirg.language.generator import expressible, find_refusals, instruct, ins
 from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
 from roboirg.language.mirrored_landmarks import mirrored_objects
 from roboirg.language.request import STAGE_SETS
+from roboirg.language.scenarios.wording_store import open_wordings
 from roboirg.language.settings import plain_settings, setting_names, settings_of
 from roboirg.language.templates import LANGUAGE_VERSION, LANGUAGE_VERSIONS
-from roboirg.language.wordings.wording_store import open_wordings
 
 __all__ = [
     "FORMS",

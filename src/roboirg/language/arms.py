@@ -23,9 +23,9 @@ from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import instruct_with
+from roboirg.language.goal_fields import goal_name
 from roboirg.language.instruction import Instruction, Meaning, Utterance
 from roboirg.language.settings import EXPLICIT
-from roboirg.language.worded_command import goal_name
 from roboirg.tasks import get_task, with_goal
 from roboirg.tasks.other_goals import draw_other_goal
 from roboirg.util.random_draws import shuffled

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Unpack
 
 from roboirg.core.delivery import DELIVERIES
-from roboirg.core.episode import Episode, describe_goal
+from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.field_types import check_whole
 from roboirg.core.instruction_options import (
@@ -18,7 +17,7 @@ from roboirg.core.instruction_options import (
     WordKeywords,
     as_fields,
 )
-from roboirg.core.word_pools import POOLS
+from roboirg.core.word_pools import outside_words
 from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance, hidden_slots
 from roboirg.language.landmarks import FRAMES
 from roboirg.language.phrases import speak
@@ -28,16 +27,15 @@ from roboirg.language.request import (
     STAGE_SETS,
     InstructionRequest,
     InstructionSpec,
-    NoCommandError,
 )
 from roboirg.language.scenarios import in_language_4
 from roboirg.language.scenarios.identity import words_of
-from roboirg.language.settings import all_settings, get_setting, settings_of
+from roboirg.language.scenarios.literals import in_literals
+from roboirg.language.scenarios.wording_store import find_wordings
+from roboirg.language.settings import EXPLICIT, all_settings, get_setting, settings_of
 from roboirg.language.settings.setting import Setting
 from roboirg.language.template_sampler import sampler_of
 from roboirg.language.templates import LANGUAGE_VERSIONS
-from roboirg.language.worded_command import TaskWordings
-from roboirg.language.wordings.wording_store import find_wordings
 from roboirg.tasks import get_task
 
 _DEFAULT_METADATA: dict[str, object] = {
@@ -85,7 +83,7 @@ def instruct(
         UnknownNameError: a name does not exist.
         InvalidValueError: the task lacks the setting, the stages are none of `STAGE_SETS`, the
             number of distractors is below 1, the setting cannot express the episode, or the
-            wordings are not open or lack a command for the goal.
+            wordings are not open or have no words for it.
     """
     chosen = InstructionOptions(setting, form)
     return instruct_with(episode, replace(chosen, **as_fields(options)))
@@ -97,48 +95,24 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
     Each `variant` draws its words anew; 0 is the usual one.
     """
     setting = _setting_of(episode, options)
-    request = request_of(episode, options, variant)
-    missing = _missing(request)
+    missing = _missing(episode, options)
     if missing is not None:
         raise InvalidValueError(f"The {missing}.")
-    reason = setting.refusal(request)
+    reason = setting.refusal(request_of(episode, options, variant))
     if reason is not None:
         raise InvalidValueError(
             f"The {setting.name} setting cannot express episode {episode.key} "
             f"(seed {episode.seed}): {reason}."
         )
-    if request.wordings is not None:
-        with contextlib.suppress(NoCommandError):
-            # Both forms have a command from outside, or none of them.
-            forms = {str(form): _say_outside(request, setting, form) for form in FORMS}
-            return spoken_instruction(*forms[options.form])
-    own = replace(
-        request, wordings=None, sampler=sampler_of(episode, variant, request.options.language)
-    )
-    return spoken_instruction(own, setting.say(own))
-
-
-def _say_outside(
-    request: InstructionRequest, setting: Setting, form: str
-) -> tuple[InstructionRequest, InstructionSpec]:
-    """Return what a setting says in words from outside, and the request that it answers.
-
-    Which command the setting fills is known only then, so it is said again with its phrases.
-    """
-    options = replace(request.options, form=form)
-    sampler = replace(request.sampler, log=[])
-    request = replace(request, options=options, sampler=sampler, filled=[])
-    spec = setting.say(request)
-    if request.phrases_of is None and request.filled:
-        return _say_outside(replace(request, phrases_of=request.filled[-1]), setting, form)
-    return request, spec
+    request = request_of(episode, options, variant)  # without what the refusal noted in its log
+    return spoken_instruction(request, setting.say(request))
 
 
 def find_refusal(episode: Episode, options: InstructionOptions) -> str | None:
     """Return why a setting of the task cannot express an episode; None if it can."""
     setting = _setting_of(episode, options)
     request = request_of(episode, options)
-    return _missing(request) or setting.refusal(request)
+    return _missing(episode, options) or setting.refusal(request)
 
 
 def find_refusals(
@@ -168,32 +142,35 @@ def request_of(
     task, setting = get_task(episode.task), all_settings()[options.setting]
     if "language" not in setting.reads:  # its words are the same in each
         options = replace(options, language=DEFAULT_LANGUAGE)
-    wordings = None
-    if options.wordings is not None and options.wordings not in POOLS:
-        wordings = find_wordings(options.wordings).tasks.get(task.name, TaskWordings(()))
-        if wordings.own & {options.setting, setting.plain}:
-            wordings = None
     sampler = sampler_of(episode, variant, options.language)
-    return InstructionRequest(episode, task, options, sampler, wordings)
+    return InstructionRequest(episode, task, options, sampler)
 
 
 def _setting_of(episode: Episode, options: InstructionOptions) -> Setting:
-    """Return the setting that speaks the language that is asked for."""
+    """Return the setting that speaks the words that are asked for."""
     setting = get_setting(options.setting, get_task(episode.task))
+    identity = outside_words(options.wordings)
+    if identity is not None and setting.name == EXPLICIT:
+        theirs = find_wordings(identity).tasks.get(episode.task)
+        if theirs is not None and theirs.literals:
+            return in_literals(theirs.literals, f"the wording file {identity}")
     return setting if options.language == DEFAULT_LANGUAGE else in_language_4(setting)
 
 
-def _missing(request: InstructionRequest) -> str | None:
-    """Return what the words from outside lack for an episode; None if they have a command."""
-    identity, episode, wordings = request.options.wordings, request.episode, request.wordings
-    if wordings is None or wordings.find(episode.goal) is not None:
+def _missing(episode: Episode, options: InstructionOptions) -> str | None:
+    """Return why a wording file cannot serve a task; None if it can, or words are our own."""
+    identity = outside_words(options.wordings)
+    if identity is None:
         return None
-    if not wordings.commands:
-        return f"wordings {identity} have no commands of {episode.task}"
-    return (
-        f"wordings {identity} have no command of {episode.task} for the goal of episode "
-        f"{episode.key}: {describe_goal(episode.goal.as_mapping())}"
-    )
+    wordings = find_wordings(identity)
+    if episode.task not in wordings.tasks:
+        return f"wording file {identity} has no words of {episode.task}"
+    if wordings.needs_language_4 and options.language == DEFAULT_LANGUAGE:
+        return (
+            f"wording file {identity} has commands or scenarios, which need language 4 (--language "
+            "4, or language: 4 in the plan)"
+        )
+    return None
 
 
 def check_options(options: InstructionOptions) -> None:
@@ -216,16 +193,14 @@ def check_options(options: InstructionOptions) -> None:
 
 def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruction:
     """Return the instruction that has the words of a request."""
-    utterances, mentions = _spoken(spec, as_written=bool(request.filled))
     options = request.options
+    utterances, mentions = _spoken(spec, as_written="command" in spec.notes)
     notes: dict[str, object] = {"wordings": options.wordings, "pool": request.pool}
-    words = words_of(request.task.name, request.pool, options.language, options.setting)
+    words = words_of(
+        request.task.name, request.pool, options.language, options.setting, options.wordings
+    )
     if words:
         notes["words"] = words
-    if request.filled:
-        command = request.filled[-1]
-        notes["command"] = command.text
-        notes["template_slots"] = sorted(command.slots_said(request.episode.goal))
     found = Instruction(
         task=request.task.name,
         episode=request.episode.key,

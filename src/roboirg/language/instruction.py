@@ -100,10 +100,12 @@ class Meaning(NamedTuple):
         terms: by field of the command; empty if the words say nothing about the goal.
         settled: the fields that the last utterance settles alone, as it has all that their terms
             need.
+        goals: of a whole sentence without fields, all that it can mean; empty if terms say it.
     """
 
     terms: Mapping[str, Term]
     settled: frozenset[str] = frozenset()
+    goals: tuple[Goal, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

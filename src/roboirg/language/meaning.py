@@ -63,6 +63,8 @@ def _goals_with(
     """Return the scene's goals with the fields that were said, each with a possible value."""
     found: list[Goal] = []
     for goal in goals_of(episode):
+        if meaning.goals and goal not in meaning.goals:
+            continue
         own = {value.field: value.value for value in values_of_goal(goal)}
         if meaning.terms and own.keys() != meaning.terms.keys():
             continue  # it asks for two containers, and the words for one

@@ -1,9 +1,4 @@
-"""The request to put an episode into words, and what a setting returns for it.
-
-The command's words are ours, or "from outside": those of a wording file. In words from outside the
-phrase of a field has a core that names the value, and words around it: *the container hiding* **the
-red cube**. A referring expression replaces the core; the rest stays.
-"""
+"""The request to put an episode into words, and what a setting returns for it."""
 
 from __future__ import annotations
 
@@ -17,6 +12,7 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.goal_slots import COLOR_SLOTS, SLOT_TYPE_NAMES, SlotTypeName
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName, Pools, pool_of
+from roboirg.language.goal_fields import fields_of
 from roboirg.language.instruction import Expression, Meaning, UtteranceStage
 from roboirg.language.landmarks import Frame, things_of_color
 from roboirg.language.phrases import (
@@ -25,17 +21,8 @@ from roboirg.language.phrases import (
     anaphor,
     antecedent,
     fill,
-    plain,
-    swap_particles,
 )
 from roboirg.language.template_sampler import TemplateSampler
-from roboirg.language.worded_command import (
-    StatedPhrase,
-    TaskWordings,
-    WordedCommand,
-    fields_of,
-    goal_fields,
-)
 from roboirg.tasks import Task, get_task
 
 Distractor = Literal["neutral", "competing"]
@@ -45,14 +32,7 @@ MOST_DISTRACTORS = 100
 STAGE_SETS: tuple[tuple[int, ...], ...] = ((1, 5), (1, 2, 5), (1, 2, 3, 5), (1, 2, 3, 4, 5))
 
 AMOUNT_FIELD = "cubes"
-"""The field of our commands that holds all colors with their counts.
-
-Those of others have ``cubes.0``, ``cubes.1`` and ``cubes.2``.
-"""
-
-
-class NoCommandError(Exception):
-    """The words from outside have no command that referring expressions can fill this way."""
+"""The field of our commands that holds all colors with their counts."""
 
 
 class GoalValue(NamedTuple):
@@ -94,19 +74,12 @@ class InstructionRequest:
         task: its task.
         options: valid ones; see `roboirg.language.instruct`.
         sampler: picks the wordings.
-        wordings: commands from outside; None for our own.
-        phrases_of: the command from outside whose phrases are used; None for the one that states
-            the goal, and where it has none, the others.
-        filled: the commands from outside that `command` has filled, in order; grows.
     """
 
     episode: Episode
     task: Task
     options: InstructionOptions
     sampler: TemplateSampler
-    wordings: TaskWordings | None = None
-    phrases_of: WordedCommand | None = None
-    filled: list[WordedCommand] = field(default_factory=list)
 
     @property
     def resolved(self) -> bool:
@@ -192,37 +165,12 @@ class InstructionRequest:
             )
         return tuple(other for other in colors if other != color)
 
-    def outside_phrase(self, field: str) -> StatedPhrase | None:
-        """Return the words from outside for a field of the command; None for our own."""
-        if self.wordings is None:
-            return None
-        return self.wordings.phrase(self.episode.goal, field, self.phrases_of)
-
-    def around(self, field: str, words: Phrase) -> Phrase:
-        """Return words for a field between the words from outside that stay around it.
-
-        *That one* becomes *the container hiding that one*.
-        """
-        outside = self.outside_phrase(field)
-        if outside is None:
-            return words
-        return (*plain(outside.before), *words, *plain(outside.after))
-
-    def _names_thing(self, outside: StatedPhrase | None) -> bool:
-        """Return whether the core that is replaced names the object to handle.
-
-        It may name the cube in it instead: *the red cube* in *the container hiding the red cube*.
-        """
-        return outside is None or self.task.commands.thing in outside.core
-
-    def by_color(self, color: GoalValue, cube: Phrase) -> Phrase:
+    def by_color(self, cube: Phrase) -> Phrase:
         """Return words for the object to handle, given words for its cube: *that one*.
 
         Where a container is handled, they become *the container over that one*.
         """
-        if self._names_thing(self.outside_phrase(color.field)):
-            cube = fill(self.task.commands.by_color, {"cube": cube})
-        return self.around(color.field, cube)
+        return fill(self.task.commands.by_color, {"cube": cube})
 
     def by_place(
         self, color: GoalValue, place: Phrase, *, plural: bool = False, template: str | None = None
@@ -230,89 +178,24 @@ class InstructionRequest:
         """Return words for the object to handle, given words for its place.
 
         `template` has ``{place}`` and the words around it; None for those of the task.
-
-        Raises:
-            NoCommandError: the words from outside have no phrase for the object, only for its cube.
         """
-        outside, commands = self.outside_phrase(color.field), self.task.commands
-        # What has the color is covered by what is handled: cubes under containers.
-        covered = commands.thing != commands.colored
-        if covered and outside is not None and commands.thing not in outside.text:
-            raise NoCommandError
+        commands = self.task.commands
         template = template or commands.by_place
         if color != self.color_values[0] or len(self.color_values) > 2:  # noqa: PLR2004
             # "Two cubes like the one here and one like the one there"; of three, none says cube.
             template = template.removeprefix(f"{commands.thing}[|s] ")
-        words = fill(template, {"place": place}, plural=plural)
-        if covered and not self._names_thing(outside):
-            return words
-        return self.around(color.field, words)
+        return fill(template, {"place": place}, plural=plural)
 
     def objects_to_point_at(self, color: GoalValue) -> tuple[SceneObject, ...]:
         """Return the cubes of a color, or the containers over them."""
         return things_of_color(self.episode.scene, self.task.commands.pointed, color.color)
 
     def command(self, fields: Mapping[str, Phrase]) -> Phrase:
-        """Fill the task's command, which has the same wording in all settings.
-
-        `fields` are words for fields. In words from outside, the other fields state their values.
-
-        Raises:
-            NoCommandError: the words from outside have no command for these fields.
-        """
-        if self.wordings is not None:
-            return self._outside_command(self.wordings, fields)
+        """Fill the task's command, which has the same wording in all settings."""
         handled = max(1, len(self.values_of("color")))
         wordings = self.task.commands.wordings.of(self.pool)
         possible = [one for one in wordings if one.parts == handled]
         return fill(self.sampler.pick(f"command-{handled}", possible).text, fields)
-
-    def _outside_command(self, wordings: TaskWordings, fields: Mapping[str, Phrase]) -> Phrase:
-        """Fill the first command from outside that leaves room for the words that replace its own.
-
-        Words for a field that equal those that state its value replace nothing.
-        """
-        goal = self.episode.goal
-        names = goal_fields(goal)
-        stated = {name: self.outside_stated(name) for name in names}
-        replaced = {name for name in names if fields.get(name, stated[name]) != stated[name]}
-        command = wordings.find(goal, replaced)
-        if command is None:
-            raise NoCommandError
-        self.filled.append(command)
-        self.sampler.log.append(f"wordings/{wordings.commands.index(command)}")
-        words = stated | {name: fields[name] for name in replaced}
-        for number in {one.field for one in self.values_of("number")} & replaced:
-            words[number] = self.around(number, words[number])
-        return swap_particles(fill(command.text, words))
-
-    def outside_stated(self, field: str) -> Phrase:
-        """Return the words from outside that state a field's value, as a mention of it.
-
-        In `AMOUNT_FIELD` the words before the core are the count, and the core is the color.
-        """
-        phrase = self.outside_phrase(field)
-        if phrase is None:
-            return ()
-        base, _, index = field.partition(".")
-        values = {one.field: one for one in self.goal_values}
-        if base != AMOUNT_FIELD:
-            return self.around(field, antecedent(phrase.core, values[field]))
-        count, color = values[f"counts.{index}"], values[f"colors.{index}"]
-        return (
-            *tagged_words(phrase.before, count),
-            *antecedent(phrase.core, color),
-            *plain(phrase.after),
-        )
-
-
-def tagged_words(text: str, value: GoalValue) -> Phrase:
-    """Return words that name a value, with the spaces around them outside the mention."""
-    words = text.strip()
-    if not words:
-        return plain(text)
-    before, _, after = text.partition(words)
-    return (*plain(before), *antecedent(words, value), *plain(after))
 
 
 class UtteranceSpec(NamedTuple):

@@ -16,45 +16,29 @@ from typer.testing import CliRunner
 from roboirg import main as cli
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 
-RANDOM = ("--split", "none", "--seeds", "6")
-WORDINGS = """\
-name = "test"
-[StopCube.phrases]
-visit.2 = "for the second time"
-visit.3 = "for the third time"
-visit.4 = "for the 4th time"
-visit.5 = "for the 5th time"
-[[StopCube.commands]]
-text = "press the button to stop the cube when it reaches the target {visit}"
-"""
+TIMES = {2: "second", 3: "third", 4: "4th", 5: "5th"}
+WORDINGS = 'name = "test"\ntasks = ["StopCube"]\n' + "".join(
+    f'[[literal]]\ntask = "StopCube"\nwhen.visit = {visit}\n'
+    f'text = "press the button when the cube reaches the target for the {time} time"\n'
+    for visit, time in TIMES.items()
+)
 
 
 @pytest.mark.usefixtures("in_this_process")
 def test_instructions_in_words_from_outside(tmp_path: Path):
     file, out = tmp_path / "test.toml", tmp_path / "rows.jsonl"
     file.write_text(WORDINGS)
-    said = call("show", "StopCube", "0", "--words", "--wordings", file)
-    assert said.count("press the button to stop the cube when it reaches the target") == 4
+    assert "press the button when" in call("show", "StopCube", "0", "--words", "--wordings", file)
     words = plan_file(wordings=str(file), forms="implicit")
     call("export", "instructions", "--out", out, "--plan", words)
     rows = [json.loads(line) for line in out.read_text().splitlines()]
     assert {row["task"] for row in rows} == {"StopCube"}  # all of the file
     assert {row["wordings"].partition("@")[0] for row in rows} == {"test"}
-    (template,) = {row["command_template"] for row in rows}
-    assert template == WORDINGS.splitlines()[-1].partition('"')[2][:-1]
-    assert "StopCube" in call("language", "validate", *RANDOM, "--wordings", file)
-    with pytest.raises(InvalidValueError, match="have no commands of BinFill"):
+    for row in rows:
+        own = row["text"] if row["setting"] == "explicit" else "own"
+        assert row["command_template"] == own
+    with pytest.raises(InvalidValueError, match="has no words of BinFill"):
         call("show", "BinFill", "0", "--words", "--wordings", file)
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_validation_finds_what_words_from_outside_break(tmp_path: Path, snapshot):
-    file = tmp_path / "test.toml"
-    file.write_text(WORDINGS.replace("the 4th time", "the third time"))
-    words = ["language", "validate", *RANDOM, "--wordings", str(file)]
-    result = CliRunner().invoke(cli.app, words, env={"COLUMNS": "150"})
-    assert isinstance(result.exception, RoboIRGError)
-    assert f"{result.stdout}{result.exception}" == snapshot
 
 
 def test_the_same_bytes_every_time_and_only_what_is_asked_for(tmp_path: Path):

@@ -41,7 +41,7 @@ from roboirg.evaluation.records.store import (
     RecordStore,
     read_records,
 )
-from roboirg.language.wordings.wording_file import read_wordings
+from roboirg.language.scenarios.wording_file import read_wordings
 
 CANARY = "canary of another folder"
 LONGEST_MESSAGE = 1_500
@@ -565,10 +565,13 @@ def test_packs_are_refused(name: str, run: Path) -> None:
 
 
 WORDINGS = """name = "workshop"
-[PickXtimes.phrases]
-color = { red = "the red cube" }
-[[PickXtimes.commands]]
-text = "pick up {color}"
+tasks = ["PickXtimes"]
+commands.all = ["pick up {color} {repeats}"]
+stated.all = { color = "the {color} cube" }
+[[literal]]
+task = "PickXtimes"
+when = { color = "red", repeats = 2 }
+text = "the usual"
 """
 
 WORDING_FILES: Mapping[str, tuple[str, str]] = {
@@ -578,11 +581,12 @@ WORDING_FILES: Mapping[str, tuple[str, str]] = {
     "quoted key of 20,000 parts": (".".join(['"a"'] * 20_000) + "=1", "more than 20 parts"),
     "number of 10,000 digits": ("name=" + "9" * 10_000, "not valid TOML"),
     "command of 1 MB": (WORDINGS.replace("pick up", "pick up " + "very " * 200_000), "characters"),
-    "phrase of 1 MB": (WORDINGS.replace("red cube", "red " * 250_000), "characters"),
+    "sentence of 1 MB": (WORDINGS.replace("usual", "usual " * 250_000), "characters"),
+    "file of 4 MB": (WORDINGS + "#" * 4_000_000, "has more than 4,000,000 bytes"),
     "field of an attribute": (WORDINGS.replace("{color}", "{0.__class__}"), "bracket"),
     "field of an item": (WORDINGS.replace("{color}", "{color.__init__}"), "bracket"),
     "format specification": (WORDINGS.replace("{color}", "{color:>1000000000}"), "bracket"),
-    "escape in a phrase": (WORDINGS.replace("red cube", "\\u001b[31m"), "must be"),
+    "escape in a sentence": (WORDINGS.replace("usual", "\\u001b[31m"), "must be"),
     "path as name": (WORDINGS.replace("workshop", "../../evil"), "a word of letters"),
     "YAML": ("a: &a [x, x]\nb: [*a, *a]\n", "not valid TOML"),
     "byte order mark": ("\ufeff" + WORDINGS, "not valid TOML"),

@@ -148,7 +148,10 @@ class ExportPlan:
     @property
     def language_label(self) -> str:
         """The version of its language, and which words of each task it has."""
-        return language_label(self.tasks, self.pool, self.options.language, self.settings)
+        options = self.options
+        return language_label(
+            self.tasks, self.pool, options.language, self.settings, options.wordings
+        )
 
     def fingerprint(self) -> str:
         """Return a hash of everything that determines the dataset."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -100,10 +99,6 @@ def validate_instructions(
     ] = 100,
     tasks: Tasks = "all",
     split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "all",
-    wordings: Annotated[
-        str | None,
-        typer.Option(help="A wording file, or our words for train or test."),
-    ] = None,
 ) -> None:
     """Read all instructions back and check their rules; exit code 2 if one is broken.
 
@@ -114,16 +109,14 @@ def validate_instructions(
     from roboirg.apps.language_lab.validation.validation_tables import validation_tables
     from roboirg.cli.progress_bar import progress_bars
     from roboirg.evaluation.plan.option_parsing import parse_splits
-    from roboirg.language.wordings.wording_store import open_wordings
     from roboirg.util.parallel_map import parallel_map
     from roboirg.util.processor import worker_count
 
-    names = known_tasks(tasks, open_wordings(wordings))
+    names = known_tasks(tasks)
     wanted = () if split.strip().lower() == "none" else parse_splits(split)
     places, found = places_of(names, wanted, seeds), ValidationResults()
-    work = functools.partial(check_place, wordings_file=wordings)
     with progress_bars() as show:
-        for done, (_, results) in enumerate(parallel_map(work, places, worker_count()), 1):
+        for done, (_, results) in enumerate(parallel_map(check_place, places, worker_count()), 1):
             found.add(results)
             show("episodes", done, len(places), "")
     for table in validation_tables(found):
@@ -194,23 +187,31 @@ def score_shortcuts(
 
 @language_app.command("check-scenarios")
 def check_scenario_file(
-    path: Annotated[Path, typer.Argument(help="File of scenarios, TOML.")],
+    path: Annotated[Path, typer.Argument(help="File of scenarios, commands or sentences, TOML.")],
     scenario: Annotated[str | None, typer.Option(help="Check this one only, by its frame.")] = None,
     seeds: Annotated[
         int, typer.Option(min=0, help="Random scenes for each scenario, beyond the splits.")
     ] = 200,
 ) -> None:
-    """Check scenarios of language 4 in each task that their file serves, and print texts of them.
+    """Check the words of a file in each task that it serves, and print texts of them.
 
     The exit code is 2 if a rule breaks.
 
     Example: roboirg language check-scenarios mine.toml --scenario "school trip"
     """
-    from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
-    from roboirg.apps.language_lab.scenarios.scenario_report import report_lines
-    from roboirg.language.scenarios.scenario_file import read_scenario_file
+    from roboirg.apps.language_lab.scenarios.explicit_check import (
+        check_explicit,
+        has_explicit_words,
+    )
+    from roboirg.apps.language_lab.scenarios.scenario_check import (
+        check_scenarios,
+        scenes_of,
+        unserved_settings,
+    )
+    from roboirg.apps.language_lab.scenarios.scenario_report import explicit_lines, report_lines
+    from roboirg.language.scenarios.wording_file import read_words
 
-    by_task = read_scenario_file(path)
+    by_task = read_words(path)
     if scenario is not None:
         frames: set[str] = set()
         for words in by_task.values():
@@ -218,9 +219,18 @@ def check_scenario_file(
         known_name("scenario", scenario, sorted(frames))
     broken = 0
     for task, words in by_task.items():
-        for report in check_scenarios(words, scenario, scenes_of(task, seeds)):
+        if scenario is None and has_explicit_words(words, task):
+            explicit = check_explicit(words, scenes_of(task, 0))
+            typer.echo("\n".join(explicit_lines(explicit, task)))
+            broken += len(explicit.broken)
+        scenes = scenes_of(task, seeds)
+        reports = check_scenarios(words, scenario, scenes)
+        for report in reports:
             typer.echo("\n".join(report_lines(report, task)))
             broken += len(report.broken)
+        for complaint in unserved_settings(reports, scenes) if scenario is None else ():
+            typer.echo(f"BROKEN {task}: {complaint}")
+            broken += 1
     if broken:
         raise RoboIRGError(f"Found {counted(broken, 'broken rule')} in {path.name}.")
 
@@ -267,7 +277,7 @@ def import_robomme(
     out: Annotated[Path, typer.Option(help="Wording file to write, TOML.")],
     name: Annotated[str, typer.Option(help="Name of the wordings, for records.")] = "robomme",
 ) -> None:
-    """Make a wording file of RoboMME's sentences, for explicit; implicit settings keep our words.
+    """Make a wording file of RoboMME's sentences, for explicit; implicit settings say our words.
 
     Example: roboirg language import-robomme robomme --out robomme.toml
     """
@@ -278,7 +288,7 @@ def import_robomme(
     text, wordings = make_wordings(path, name)
     write_atomically(out, text)
     for task, found in wordings.tasks.items():
-        typer.echo(f"{task}: {counted(len(found.commands), 'command')}")
+        typer.echo(f"{task}: {counted(len(found.literals), 'sentence')}")
     typer.echo(f"Wrote {wordings.identity}: {out}")
 
 

@@ -1,4 +1,4 @@
-"""Make a wording file of RoboMME's sentences: a literal command for each goal of its scenes.
+"""Make a wording file of RoboMME's sentences: one for each goal of its scenes.
 
 Only one file of RoboMME's repository is loaded, by its path: the one with the function
 ``get_language_goal``. It gets a stand-in for RoboMME's objects, with the attributes that it reads.
@@ -15,14 +15,9 @@ from types import SimpleNamespace
 from roboirg.core.episode import COLORS, DIFFICULTIES, Goal, describe_goal
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError
-from roboirg.language.settings import EXPLICIT, plain_settings
-from roboirg.language.worded_command import (
-    ROBOMME_NAME,
-    Wordings,
-    goal_fields,
-)
-from roboirg.language.wordings.robomme_sentences import check_robomme_name
-from roboirg.language.wordings.wording_file import check_name, parse_wordings
+from roboirg.core.word_pools import ROBOMME_NAME
+from roboirg.language.goal_fields import goal_fields
+from roboirg.language.scenarios.wording_file import Wordings, check_name, parse_wordings
 from roboirg.tasks import Task, all_tasks
 from roboirg.tasks.splits.published_episodes import published_episode
 from roboirg.tasks.splits.splits import SIZES
@@ -37,8 +32,6 @@ SentenceFunction = Callable[[object, str], object]
 def import_robomme(root: Path, name: str = ROBOMME_NAME) -> tuple[str, Wordings]:
     """Return the text and the content of a wording file with RoboMME's sentences.
 
-    Implicit settings keep our own words: a literal sentence has no words to replace.
-
     Args:
         root: folder of a clone of RoboMME's repository.
         name: of the wordings.
@@ -48,23 +41,22 @@ def import_robomme(root: Path, name: str = ROBOMME_NAME) -> tuple[str, Wordings]
             function, the function does not give one usable sentence for each goal, or the
             sentences are not those of the published evaluation and yet named after it.
     """
-    where = "imported wording file"
+    where = "The imported wording file"
     check_name(name, where)
     text = _wording_text(_load_function(root), name)
-    wordings = parse_wordings(text, where)
-    check_robomme_name(wordings, where)
-    return text, wordings
+    return text, parse_wordings(text, where)
 
 
 def _wording_text(function: SentenceFunction, name: str) -> str:
     source = f"The first sentences of {FUNCTION} in RoboMME's repository."
+    tasks = all_tasks()
     lines = [f"name = {json.dumps(name)}", f"source = {json.dumps(source)}"]
-    for task in all_tasks().values():
-        own = [setting for setting in plain_settings(task) if setting != EXPLICIT]
-        lines += ["", f"[{task.name}]", f"own = {json.dumps(own)}"]
+    lines.append(f"tasks = {json.dumps(list(tasks))}")
+    for task in tasks.values():
         for goal, sentence in _sentences(function, task).items():
             slots = (f"{slot} = {json.dumps(value)}" for slot, value in goal.slots)
-            lines += ["", f"[[{task.name}.commands]]", f"when = {{ {', '.join(slots)} }}"]
+            lines += ["", "[[literal]]", f"task = {json.dumps(task.name)}"]
+            lines.append(f"when = {{ {', '.join(slots)} }}")
             lines.append(f"text = {json.dumps(sentence)}")
     return "\n".join(lines) + "\n"
 

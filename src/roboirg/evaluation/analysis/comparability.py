@@ -12,13 +12,12 @@ from roboirg.core.arms import TOLD
 from roboirg.core.environment_options import DEFAULT_MESHES
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.plain_text import counted
-from roboirg.core.word_pools import words_label
+from roboirg.core.word_pools import ROBOMME_NAME, words_label
 from roboirg.evaluation.analysis.published import MAX_STEPS, TRIALS, published_tasks
 from roboirg.evaluation.analysis.results.frame import RunNames
 from roboirg.evaluation.analysis.results.policy_run import PolicyRun
 from roboirg.evaluation.analysis.stats.cells import Cell, CellKey
 from roboirg.language.settings import EXPLICIT
-from roboirg.language.worded_command import ROBOMME_NAME
 
 Differences = tuple[str, ...]
 """What differs from the published rate; empty if the two can be compared."""

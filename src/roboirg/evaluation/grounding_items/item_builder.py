@@ -86,7 +86,7 @@ def item_id(episode: Episode, options: InstructionOptions) -> str:
     content = (
         episode.key,
         *words,
-        language_label([episode.task], pool, language, [options.setting]),
+        language_label([episode.task], pool, language, [options.setting], options.wordings),
         ENVIRONMENT_VERSION,
     )
     return "g" + hashlib.sha256(repr(content).encode()).hexdigest()[:ID_DIGITS]

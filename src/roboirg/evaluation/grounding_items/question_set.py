@@ -15,7 +15,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.evaluation.grounding_items.grounding_item import GroundingItem
 from roboirg.evaluation.grounding_items.item_builder import make_items, wanted_options
 from roboirg.evaluation.grounding_items.media_store import store_media
-from roboirg.language.wordings.wording_store import open_wordings
+from roboirg.language.scenarios.wording_store import open_wordings
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.parallel_map import parallel_map
 

@@ -54,6 +54,7 @@ from roboirg.evaluation.records.film import VideoMode
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.evaluation.records.record_codec import RecordKey, identity_key
 from roboirg.language.generator import check_options, find_refusal
+from roboirg.language.scenarios.wording_store import open_wordings
 from roboirg.language.settings import (
     EXPLICIT,
     SETTING_GROUPS,
@@ -63,7 +64,6 @@ from roboirg.language.settings import (
     get_setting,
     settings_of,
 )
-from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.by_name.key_variables import check_variables
 from roboirg.policies.contract.option_checking import flags_as_words
@@ -190,7 +190,7 @@ class Plan(BaseModel):
     )
     wordings: Annotated[ChosenWordings | None, BeforeValidator(_open_wordings)] = _option(
         None,
-        "Wording file whose commands are used; or train or test: our words of that pool in every "
+        "Wording file with words of your own; or train or test: our words of that pool in every "
         "split.",
     )
     instruction: InstructionOptions = _option(

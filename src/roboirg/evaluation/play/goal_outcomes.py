@@ -11,7 +11,7 @@ from roboirg.evaluation.records.record import EventRecord, GoalOutcomes, Origina
 from roboirg.judging import Event, FailureAttribution, Status
 from roboirg.judging.episode_replay import Decision, decide
 from roboirg.language.arms import TrialWords
-from roboirg.language.worded_command import goal_name
+from roboirg.language.goal_fields import goal_name
 
 
 def judged_events(events: Iterable[EventRecord], start: int) -> list[Event]:

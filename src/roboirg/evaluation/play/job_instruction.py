@@ -8,13 +8,14 @@ from functools import cached_property
 
 from roboirg.core.arms import AGAIN, TOLD
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.versions import NO_VERSION, WORDS, Mismatch, Versions
 from roboirg.evaluation.records.record import Job, Summary
 from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.language.arms import TrialWords, arm_episode, say_arm, word_trial
 from roboirg.language.instruction import Instruction
 from roboirg.language.scenarios.identity import words_of
-from roboirg.language.wordings.wording_store import open_wordings
+from roboirg.language.scenarios.wording_store import open_wordings
 from roboirg.tasks.splits import splits
 
 
@@ -59,10 +60,11 @@ def _open_wordings(job: Job) -> None:
 
 def other_versions(record: Summary) -> list[Mismatch]:
     """Return where a record's language, words or environment are not the installed ones."""
+    words = installed_words(record)
     installed = Versions(
         environment_version=ENVIRONMENT_VERSION,
         language_version=LANGUAGE_VERSIONS.get(record.options.language, "unknown"),
-        words_version=installed_words(record) or NO_VERSION,
+        words_version=record.words_version if words is None else words or NO_VERSION,
     )
     recorded = Versions(
         environment_version=record.environment_version,
@@ -72,9 +74,17 @@ def other_versions(record: Summary) -> list[Mismatch]:
     return recorded.differences(installed)
 
 
-def installed_words(job: Job) -> str:
-    """Return which words this package has for a job; empty if they are code."""
-    return words_of(job.task, job.pool, job.options.language, job.options.setting)
+def installed_words(job: Job) -> str | None:
+    """Return which words this package has for a job; empty if they are code.
+
+    None if some are those of a wording file that is not there as it was.
+    """
+    try:
+        _open_wordings(job)
+    except InvalidValueError:
+        return None
+    options = job.options
+    return words_of(job.task, job.pool, options.language, options.setting, options.wordings)
 
 
 def has_other_words(record: Summary) -> bool:

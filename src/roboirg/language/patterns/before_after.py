@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from roboirg.language.patterns.pattern import Derived, Pattern
 from roboirg.language.phrases import MentionedValue, Phrase, antecedent, fill, plain
-from roboirg.language.request import GoalValue, InstructionRequest, NoCommandError
+from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.slot_types import relation
 from roboirg.language.templates import derivations
 
@@ -32,7 +32,7 @@ def _other(request: InstructionRequest) -> Derived:
     single = derivations.MOMENTS[rejected]
     named = derivations.RESOLVED_MOMENT_COMPLEMENT.format(single=single)
     other = request.refer(derivations.MOMENT_COMPLEMENT, "other", goal_value, resolved=named)
-    fields = relation.placed(request, goal_value, other)
+    fields = relation.placed(goal_value, other)
     return Derived(fill(template, introduced), fields, {"patterns": ["contextual logic"]})
 
 
@@ -44,9 +44,6 @@ def _neighbor(request: InstructionRequest) -> Derived:
     context = fill(
         template, {"moment": antecedent(derivations.MOMENTS[rejected], MentionedValue(rejected))}
     )
-    outside = request.outside_phrase(goal_value.field)
-    if outside is not None and not outside.before and not outside.is_place:
-        raise NoCommandError  # there is no word for the target that this could replace
     words = _single(request, rejected)
     single = request.refer(words, "that", MentionedValue(rejected), resolved=words)
     placement = (*plain("the target of "), *fill(derivations.NEIGHBOR, {"single": single}))

@@ -75,7 +75,7 @@ def _fields(request: InstructionRequest, pair: ValuePair, order: tuple[int, int]
     meant, kind = pair.meant, pair.word_kind
     words = _resolved(request, pair, order) if request.resolved else _pointing(request, pair)
     if kind == "color":
-        return {meant.field: request.by_color(meant, words)}
+        return {meant.field: request.by_color(words)}
     if kind == "amount":
         return described(request, [words])
     if meant.slot == "counts":
@@ -83,8 +83,8 @@ def _fields(request: InstructionRequest, pair: ValuePair, order: tuple[int, int]
         # The plural fits any number.
         return amount.amounts([(*words, *plain(" of "), *amount.cubes(shade, 2))])
     if kind == "number":
-        return {meant.field: request.around(meant.field, words)}
-    return wrapped(request, meant, words)
+        return {meant.field: words}
+    return wrapped(meant, words)
 
 
 def _pointing(request: InstructionRequest, pair: ValuePair) -> Phrase:

@@ -69,7 +69,7 @@ def _thing(
 ) -> Phrase:
     words = {"thing": plain(request.task.commands.colored), **fields}
     cubes = fill(template, words, plural=request.count_of(goal_value) > 1)
-    return request.by_color(goal_value, cubes)
+    return request.by_color(cubes)
 
 
 def _singled(request: InstructionRequest, goal_value: GoalValue, pair: tuple[str, ...]) -> Phrase:

@@ -97,7 +97,7 @@ def _ordinal(request: InstructionRequest) -> Derived:
         *plain(f"the {goal_value.slot_type} "),
         *fill(step.words, {"reference": reference}),
     )
-    fields = ordinal.wrapped(request, goal_value, element)
+    fields = ordinal.wrapped(goal_value, element)
     return _derived(request, "sequential relation", step, fields)
 
 
@@ -110,7 +110,7 @@ def _counted(request: InstructionRequest) -> Derived:
     words = fill(step.words, {"noun": noun, "reference": reference})
     if goal_value.slot_type == "placement":
         words = (*plain("the target used "), *words)
-    fields = {goal_value.field: request.around(goal_value.field, words)}
+    fields = {goal_value.field: words}
     return _derived(request, "number deduction", step, fields)
 
 

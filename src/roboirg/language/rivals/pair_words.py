@@ -145,9 +145,9 @@ def _chosen_fields(request: InstructionRequest, draw: PairDraw) -> Fields:
     kind, (meant, rival) = draw.pair.word_kind, draw.pair
     if kind == "color":
         words = _chosen(request, draw, f"the {pair_noun(request, draw.pair)}")
-        fields = {meant.field: request.by_color(meant, words)}
+        fields = {meant.field: request.by_color(words)}
         if draw.pair.ordered:
-            fields[rival.field] = request.by_color(rival, _the_other(rival, "the other one"))
+            fields[rival.field] = request.by_color(_the_other(rival, "the other one"))
         return fields
     if kind == "amount":
         words = _chosen(request, draw, f"of the {pair_noun(request, draw.pair)}")
@@ -155,8 +155,8 @@ def _chosen_fields(request: InstructionRequest, draw: PairDraw) -> Fields:
     if kind == "number":
         return {meant.field: _chosen(request, draw, "the number of times")}
     if kind == "relation":
-        return relation.placed(request, meant, _chosen(request, draw, "at the moment"))
-    return wrapped(request, meant, _chosen(request, draw, f"the {meant.slot_type}"))
+        return relation.placed(meant, _chosen(request, draw, "at the moment"))
+    return wrapped(meant, _chosen(request, draw, f"the {meant.slot_type}"))
 
 
 def _counted(request: InstructionRequest, draw: PairDraw) -> Fields:

@@ -48,8 +48,6 @@ class ValuePair(NamedTuple):
 
 def pair_refusal(request: InstructionRequest) -> str | None:
     """Return why an episode can have no rival; None if it can."""
-    if request.wordings is not None:
-        return "commands from a wording file have no rivals"
     if rival_pairs(request):
         return None
     if len(request.values_of("amount")) > 2:  # noqa: PLR2004 - a color and its count

@@ -9,40 +9,54 @@ from collections.abc import Iterable
 from msgspec.structs import replace
 
 from roboirg.core.instruction_options import DEFAULT_LANGUAGE
-from roboirg.core.word_pools import PoolName
-from roboirg.language.scenarios.scenario_file import general, setting_scenarios, words_in
+from roboirg.core.word_pools import PoolName, outside_words
+from roboirg.language.scenarios.scenario_file import general, setting_scenarios
+from roboirg.language.scenarios.wording_store import task_words
 from roboirg.language.settings import EXPLICIT
 from roboirg.language.templates import LANGUAGE_VERSIONS
 from roboirg.util.short_hash import short_hash
 
 
-def words_of(task: str, pool: PoolName, language: int, setting: str = EXPLICIT) -> str:
+def words_of(
+    task: str,
+    pool: PoolName,
+    language: int,
+    setting: str = EXPLICIT,
+    wordings: str | None = None,
+) -> str:
     """Return which words a task has in a pool, such as ``PickXtimes/test@1a2b3c4d5e6f``.
 
     ``PickXtimes/test/lab@3c4d5e6f1a2b`` in a setting *lab* whose own file serves the task. Empty
-    in the usual language, whose words are code: its version is enough.
+    in the usual language, whose words are code: its version is enough. `wordings` may be the
+    identity of an open wording file, whose words come before ours.
     """
     if language == DEFAULT_LANGUAGE:
         return ""
     name = f"{task}/{pool}"
     if task in setting_scenarios(setting):
         name += f"/{setting}"
-    return f"{name}@{words_digest(task, pool, setting)}"
+    return f"{name}@{words_digest(task, pool, setting, outside_words(wordings))}"
 
 
 def language_label(
-    tasks: Iterable[str], pool: PoolName, language: int, settings: Iterable[str] = ()
+    tasks: Iterable[str],
+    pool: PoolName,
+    language: int,
+    settings: Iterable[str] = (),
+    wordings: str | None = None,
 ) -> str:
     """Return the version of a language, followed by which words each task has in settings."""
     names = (EXPLICIT, *settings)
     words: list[str] = []
     for task in tasks:
-        words += [words_of(task, pool, language, setting) for setting in names]
+        words += [words_of(task, pool, language, setting, wordings) for setting in names]
     return " ".join([LANGUAGE_VERSIONS[language], *dict.fromkeys(words)]).strip()
 
 
 @functools.cache
-def words_digest(task: str, pool: PoolName, setting: str = EXPLICIT) -> str:
+def words_digest(
+    task: str, pool: PoolName, setting: str = EXPLICIT, wordings: str | None = None
+) -> str:
     """Return a hash of all that can be said of a task in a pool; ``none`` without words.
 
     It counts one file: the setting's own, or else the task's. A file that another package brings
@@ -51,18 +65,20 @@ def words_digest(task: str, pool: PoolName, setting: str = EXPLICIT) -> str:
     Neither comments nor the order of scenarios and of their sentences change it. The order of a
     list does, since its entries are drawn by their numbers.
     """
-    words = words_in(setting, task)
+    words = task_words(task, setting, wordings)
     if words is None:
         return "none"
     scenarios: list[list[str]] = []
     for scenario in words.scenarios:
-        if scenario.fields.pool == pool:
+        if scenario.fields.pool in (None, pool):
             # Which other tasks say it, too, does not matter.
             needs = replace(scenario.fields.needs, tasks=())
             fields = replace(scenario.fields, needs=needs)
             scenarios.append([repr(fields), repr(sorted(scenario.texts.items()))])
     people = list(general().people.items())  # in their order, by which they are drawn
     stated = repr(sorted(words.stated.items()))
-    commands = words.commands[pool]
+    commands = words.commands.get(pool, ())
     said = [people, general().distractors[pool], stated, commands, sorted(scenarios)]
+    if words.literals:
+        said.append(repr(sorted(words.literals.items(), key=repr)))
     return short_hash(json.dumps(said))

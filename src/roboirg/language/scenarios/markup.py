@@ -22,6 +22,8 @@ Operation = Literal[
 ]  # fmt: skip
 """How a value follows from what a pointer stands for."""
 
+MOST_LETTERS = 2_000
+"""Of a sentence."""
 _NAME = r"(?:rival )?[a-z]+(?:\.\d)?"
 _SLOT = re.compile(rf"\{{(?P<name>{_NAME})(?::(?P<form>[a-z -]+))?\}}")
 _AGREEMENT = re.compile(rf"\[(?P<controller>{_NAME}): ?(?P<one>[^\[\]|]*)\|(?P<many>[^\[\]|]*)\]")
@@ -89,6 +91,11 @@ def parse(text: object) -> Text:
     """
     if not isinstance(text, str) or not text.isascii() or not text.isprintable():
         raise ValueError(f"has the words {text!r}; they must be printable ASCII on one line")
+    if len(text) > MOST_LETTERS:
+        raise ValueError(
+            f"has words of {len(text):,} characters, {text[:40]!r}; at most {MOST_LETTERS:,} are "
+            "one sentence"
+        )
     parts: list[Part] = []
     end = 0
     for mark in (*_MARK.finditer(text), None):

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
+from roboirg.core.episode import Goal
 from roboirg.core.word_pools import PoolName
 from roboirg.language.scenarios.markup import Operation, Text
 
@@ -63,10 +64,13 @@ People = Mapping[Literal["he", "she"], Texts]
 
 
 class ScenarioFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a scenario's file has besides sentences."""
+    """What a scenario's file has besides sentences.
+
+    `pool` is None for both, in the files of users only.
+    """
 
     frame: str
-    pool: PoolName
+    pool: PoolName | None
     setting: str
     list: str = ""
     derive: Derive | None = None
@@ -106,15 +110,21 @@ class FileFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         tasks: that it serves.
+        name: of a user's words, for records; empty for ours.
+        source: of a user's words, in a sentence.
         scenario: the table of each scenario.
-        commands: of a task, or of `ALL`, by pool.
+        commands: of a task, or of `ALL`, by pool; a list is for both pools.
         stated: words by field, of a task or of `ALL`.
+        literal: the table of each whole sentence.
     """
 
     tasks: Annotated[Texts, msgspec.Meta(min_length=1)]
+    name: str = ""
+    source: str = ""
     scenario: tuple[dict[str, Any], ...] = ()
-    commands: Mapping[str, Mapping[PoolName, Texts]] = {}
+    commands: Mapping[str, Mapping[PoolName, Texts] | Texts] = {}
     stated: Mapping[str, Mapping[str, str]] = {}
+    literal: tuple[dict[str, Any], ...] = ()
 
 
 class TaskScenarios(msgspec.Struct, frozen=True):
@@ -125,9 +135,11 @@ class TaskScenarios(msgspec.Struct, frozen=True):
         stated: the words that state a field's value.
         scenarios: all that are said of it.
         file: the name of the file that has them.
+        literals: whole sentences, which explicit says instead of a command.
     """
 
     commands: Mapping[PoolName, Texts]
     stated: Mapping[str, Text]
     scenarios: list[Scenario]
     file: str
+    literals: Mapping[Goal, str] = {}

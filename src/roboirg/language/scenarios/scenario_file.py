@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import re
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import msgspec
 
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
-from roboirg.core.word_pools import POOLS
+from roboirg.core.word_pools import POOLS, PoolName
 from roboirg.language.phrases import TaggedText
+from roboirg.language.scenarios.literals import Literals, read_literals
 from roboirg.language.scenarios.markup import Pointer, Text, parse, slots_in
 from roboirg.language.scenarios.scenario import (
     PEOPLE,
@@ -26,12 +28,12 @@ from roboirg.language.scenarios.scenario import (
     TaskScenarios,
     Texts,
 )
+from roboirg.language.scenarios.written import converted, data_of, text_of
 from roboirg.language.settings import all_settings
 from roboirg.language.settings.setting import Setting
 from roboirg.tasks import Task, every_task
 
 FOLDER = Path(__file__).parent
-Stored = TypeVar("Stored")
 ALL = "all"
 """Instead of a task: for all tasks of a file."""
 PRONOUNS = {"he": ("he", "him", "his", "his"), "she": ("she", "her", "her", "hers")}
@@ -50,17 +52,18 @@ SENTENCES = frozenset({"introduction", *_CONTEXTUAL, "lead", "say", "resolved", 
 @functools.cache
 def pointer_table() -> tuple[PointerRow, ...]:
     """Return the closed table of pointers."""
-    return _shared(dict[str, tuple[PointerRow, ...]], "pointers.toml")["pointer"]
+    name = "pointers.toml"
+    return converted(_shared(name), dict[str, tuple[PointerRow, ...]], name)["pointer"]
 
 
 @functools.cache
 def general() -> General:
     """Return what all tasks share."""
-    return _shared(General, "general.toml")
+    return converted(_shared("general.toml"), General, "general.toml")
 
 
-def _shared(kind: type[Stored], name: str) -> Stored:
-    return _as(kind, _text_of(FOLDER / name), name)
+def _shared(name: str) -> dict[str, Any]:
+    return data_of(text_of(FOLDER / name), name)
 
 
 @functools.cache
@@ -112,29 +115,59 @@ def scenario_settings() -> Mapping[str, Setting]:
 def read_task_scenarios(text: str, where: str) -> Mapping[str, TaskScenarios]:
     """Return the words of each task that a file serves; `where` names the file in complaints.
 
-    A file without commands of a task takes those of the task's own file.
-
     Raises:
         InvalidValueError: it is not as `docs/add-scenario.md` says; a line for each mistake.
     """
-    head = _as(FileFields, text, where)
+    return tasks_in(read_head(text, where), where)
+
+
+def read_head(text: str, where: str) -> FileFields:
+    """Return the content of a file with its tables as they were written."""
+    data = data_of(text, where)
+    for task in every_task():
+        if task in data:
+            raise InvalidValueError(
+                f"{where} has the table [{task}] of an earlier format; write its commands under "
+                "[commands], and import RoboMME's sentences again with `roboirg language "
+                "import-robomme`."
+            )
+    check_names(f"key of {where} named", data, FileFields.__struct_fields__)
+    if "tasks" not in data:
+        raise InvalidValueError(f'{where} has no tasks; add a line such as tasks = ["PickXtimes"].')
+    fields: dict[str, Any] = {}
+    for field in msgspec.structs.fields(FileFields):
+        if field.name in data:
+            fields[field.name] = converted(data[field.name], field.type, f"{where}, {field.name}")
+    return FileFields(**fields)
+
+
+def tasks_in(head: FileFields, where: str) -> Mapping[str, TaskScenarios]:
+    """Return the words of each task that a file serves, like `read_task_scenarios`.
+
+    A task for which it has no commands has those of its own file; so does each stated value.
+    """
     check_names(f"task of {where} named", head.tasks, every_task())
     check_names(f"task of {where} named", [*head.commands, *head.stated], (*head.tasks, ALL))
     mistakes: list[str] = []
-    words = {task: _command_words(head, task, where, mistakes) for task in head.tasks}
+    literals = read_literals(head.literal, head.tasks, where, mistakes)
+    words = {
+        task: _command_words(head, task, literals[task], where, mistakes) for task in head.tasks
+    }
     stated = dict[str, Text]()
     for of_task in words.values():
         stated |= of_task.stated
+    usual: dict[str, Any] = {"pool": None} if head.name else {}
     scenarios = [
-        _scenario(one, stated, f"{where}, scenario {one.get('frame', number)!r}", mistakes)
+        _scenario(usual | one, stated, f"{where}, scenario {one.get('frame', number)!r}", mistakes)
         for number, one in enumerate(head.scenario, 1)
     ]
-    names = [[one.get(part) for part in ("frame", "setting", "pool")] for one in head.scenario]
-    mistakes += [
-        f"{where} has the frame {name[0]!r} twice in the setting {name[1]}, {name[2]}."
-        for at, name in enumerate(names)
-        if name in names[:at] and None not in name
-    ]
+    seen: set[str] = set()
+    for one in head.scenario:
+        frame, setting, pool = one.get("frame"), one.get("setting"), one.get("pool", "both pools")
+        name = f"{where} has the frame {frame!r} twice in the setting {setting}, {pool}."
+        if name in seen and None not in (frame, setting):
+            mistakes.append(name)
+        seen.add(name)
     if mistakes:
         raise InvalidValueError("\n".join(mistakes))
     for scenario in filter(None, scenarios):
@@ -146,24 +179,38 @@ def read_task_scenarios(text: str, where: str) -> Mapping[str, TaskScenarios]:
     return words
 
 
-def _command_words(head: FileFields, task: str, where: str, mistakes: list[str]) -> TaskScenarios:
+def _command_words(
+    head: FileFields, task: str, literals: Literals, where: str, mistakes: list[str]
+) -> TaskScenarios:
     """Return the words of a task without scenarios: its commands, and the values they state."""
-    path, file = own_file(task), where
-    if path and not {ALL, task} & head.commands.keys():
-        where = path.name
-        head = _as(FileFields, _text_of(path), where)
-    texts = {**head.stated.get(ALL, {}), **head.stated.get(task, {})}
+    path = own_file(task)
+    own = read_head(text_of(path), path.name) if path else head
+    texts: dict[str, str] = {}
+    for known in (own, head):
+        texts |= {**known.stated.get(ALL, {}), **known.stated.get(task, {})}
     stated = {
         name: _sentence(text, "", texts, f"{where}, stated", mistakes)
         for name, text in texts.items()
     }
-    written = {**head.commands.get(ALL, {}), **head.commands.get(task, {})}
-    for pool in POOLS:
+    written = _commands(head, task) or _commands(own, task)
+    # Whole sentences need no commands: a task without words of ours may have nothing else.
+    for pool in POOLS if written or not literals else ():
         if not written.get(pool):
             mistakes.append(f"{where} has no commands of {task} in the pool {pool}.")
         for command in written.get(pool, ()):
             _sentence(command, "", texts, f"{where}, commands of {task}", mistakes)
-    return TaskScenarios(written, stated, [], file)
+    return TaskScenarios(written, stated, [], where, literals)
+
+
+def _commands(head: FileFields, task: str) -> dict[PoolName, Texts]:
+    """Return the commands of a task by pool, as a file has them."""
+    found: dict[PoolName, Texts] = {}
+    for name in (ALL, task):
+        commands = head.commands.get(name, {})
+        if isinstance(commands, tuple):
+            commands = dict.fromkeys(POOLS, commands)
+        found |= commands
+    return found
 
 
 def _scenario(
@@ -183,6 +230,8 @@ def _scenario(
         texts[name] = tuple(_sentence(one, listed, stated, at, mistakes) for one in several)
     said = tuple(sorted(name.removeprefix("say.") for name in texts if name.startswith("say.")))
     if fields is not None:
+        for name in (fields.frame, *itertools.chain(*(fields.people or {}).values())):
+            _parsed(name, f"{where}, frame or people", mistakes)
         mistakes += [f"{where} {one}." for one in _unmet(fields, texts, said, stated)]
     if fields is None or mistakes:
         return None
@@ -208,9 +257,9 @@ def _fields(written: Mapping[str, Any], where: str, mistakes: list[str]) -> Scen
             mistakes.append(f"{where} has no {one.name}.")
         elif one.name in written:
             try:
-                found[one.name] = msgspec.convert(written[one.name], one.type)
-            except msgspec.ValidationError as error:
-                mistakes.append(f"{where}, {one.name}: {error}.")
+                found[one.name] = converted(written[one.name], one.type, f"{where}, {one.name}")
+            except InvalidValueError as error:
+                mistakes.append(str(error))
     known = SENTENCES.union(ScenarioFields.__struct_fields__)
     mistakes += [
         f"{where} has the field {name!r}; the fields are {', '.join(sorted(known))}."
@@ -347,21 +396,6 @@ def _parsed(text: object, where: str, mistakes: list[str]) -> Text:
         return (TaggedText(str(text)),)
 
 
-def _as(kind: type[Stored], text: str, where: str) -> Stored:
-    """Return data of a type from TOML."""
-    try:
-        return msgspec.toml.decode(text, type=kind)
-    except (ValueError, msgspec.MsgspecError) as error:
-        raise InvalidValueError(f"{where}: {error}.") from error
-
-
-def _text_of(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:
-        raise InvalidValueError(f"The file {str(path)!r} cannot be read: {error}.") from error
-
-
 def read_scenario_file(path: Path) -> Mapping[str, TaskScenarios]:
     """Read a file of scenarios from anywhere, like `read_task_scenarios`."""
-    return read_task_scenarios(_text_of(path), path.name)
+    return read_task_scenarios(text_of(path), path.name)

@@ -9,6 +9,7 @@ from typing import NamedTuple, cast
 
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.word_pools import outside_words
 from roboirg.language.instruction import REFERENCE, Expression, Meaning, Term, UtteranceStage
 from roboirg.language.phrases import (
     Phrase,
@@ -20,12 +21,7 @@ from roboirg.language.phrases import (
     swap_particles,
     words_of,
 )
-from roboirg.language.request import (
-    InstructionRequest,
-    InstructionSpec,
-    NoCommandError,
-    UtteranceSpec,
-)
+from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.scenarios.choice import Chosen, choose, rival_values
 from roboirg.language.scenarios.declared import (
     ChoosingRemark,
@@ -44,7 +40,8 @@ from roboirg.language.scenarios.markup import (
     slots_in,
 )
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
-from roboirg.language.scenarios.scenario_file import general, words_in
+from roboirg.language.scenarios.scenario_file import general
+from roboirg.language.scenarios.wording_store import task_words
 from roboirg.language.settings import all_settings, contextual
 from roboirg.language.settings.setting import Setting
 
@@ -77,8 +74,9 @@ def _choose(request: InstructionRequest) -> _Choice:
     setting = all_settings()[request.options.setting]
     # Contextual says the scenarios of direct.
     name = _DIRECT if setting.offers == _CONTEXTUAL else setting.name
-    sampler, own = request.sampler, request.wordings is None
-    key = (name, setting.words, sampler.key, request.frame, request.pool, own)
+    sampler = request.sampler
+    wordings = outside_words(request.options.wordings)
+    key = (name, setting.words, sampler.key, request.frame, request.pool, wordings)
     found = _CHOICES.get(key)
     if found is None or found.episode != request.episode:
         if len(_CHOICES) >= _MOST_CHOICES:
@@ -87,9 +85,10 @@ def _choose(request: InstructionRequest) -> _Choice:
         reason, chosen = setting.refusal(request), None
         if reason is None:
             words = _words(request)
-            wanted = (name, request.pool)
             known = [
-                one for one in words.scenarios if (one.fields.setting, one.fields.pool) == wanted
+                scenario
+                for scenario in words.scenarios
+                if scenario.fields.setting == name and scenario.fields.pool in (None, request.pool)
             ]
             chosen = choose(replace(request, sampler=replace(sampler, log=log)), name, known)
             if chosen is None:
@@ -101,17 +100,23 @@ def _choose(request: InstructionRequest) -> _Choice:
 
 def _words(request: InstructionRequest) -> TaskScenarios:
     """Return the words of a task that has some."""
-    return cast("TaskScenarios", words_in(request.options.setting, request.task.name))
+    return cast("TaskScenarios", _find_words(request))
+
+
+def _find_words(request: InstructionRequest) -> TaskScenarios | None:
+    """Return the words of a task in a setting; None if nothing has been written."""
+    return task_words(request.task.name, request.options.setting, request.options.wordings)
 
 
 def refusal(request: InstructionRequest) -> str | None:
     """Return why a setting cannot express an episode; None if it can."""
     task, setting = request.task, all_settings()[request.options.setting]
-    file = setting.words or task.words
-    if not file:
+    words = _find_words(request)
+    if words is None or not words.commands:  # whole sentences serve explicit alone
+        file = setting.words or task.words
+        if file:
+            return f"{task.name} is not among the tasks of {file}"
         return f"language 4 has no scenarios of {task.name} yet"
-    if words_in(setting.name, task.name) is None:
-        return f"{task.name} is not among the tasks of {file}"
     return None if setting.offers == _EXPLICIT else _choose(request).refusal
 
 
@@ -119,9 +124,7 @@ def say(request: InstructionRequest) -> InstructionSpec:
     """Return the words of an episode in a setting that does not refuse it."""
     words = _words(request)
     if all_settings()[request.options.setting].offers == _EXPLICIT:
-        speech = Speech(request, words, Introduced(goal_values(request)))
-        command = UtteranceSpec("command", speech.command({}, ()))
-        return InstructionSpec((command,), meaning=speech.meaning())
+        return say_explicit(request, words)
     choice = _choose(request)
     request.sampler.log.extend(choice.log)
     return say_chosen(request, words, cast("Chosen", choice.chosen))
@@ -130,6 +133,13 @@ def say(request: InstructionRequest) -> InstructionSpec:
 def in_language_4(setting: Setting) -> Setting:
     """Return a setting that speaks in scenarios; the same if it offers them nothing to say."""
     return replace(setting, say=say, refusal=refusal) if setting.offers else setting
+
+
+def say_explicit(request: InstructionRequest, words: TaskScenarios) -> InstructionSpec:
+    """Return a command that states the goal."""
+    speech = Speech(request, words, Introduced(goal_values(request)))
+    command = UtteranceSpec("command", speech.command({}, ()))
+    return InstructionSpec((command,), meaning=speech.meaning())
 
 
 def say_chosen(
@@ -277,12 +287,7 @@ class Speech:
 
     def command(self, fields: Mapping[str, Phrase], lead: Phrase) -> Phrase:
         """Return the command with the words for some fields; the others state their values."""
-        if self._request.wordings is not None:
-            skeleton = self._request.command(
-                {name: self._outside(name, words) for name, words in fields.items()}
-            )
-        else:
-            skeleton = self._skeleton(fields)
+        skeleton = self._skeleton(fields)
         if lead:
             lead = _begun(lead, str.upper)
             ended = lead[-1].text.endswith((". ", "! ", "? "))
@@ -304,25 +309,6 @@ class Speech:
             name: fields.get(name) or self.field(name, self._words.stated[name]) for name in wanted
         }
         return swap_particles(fill(template, words)) if fields else fill(template, words)
-
-    def _outside(self, name: str, words: Phrase) -> Phrase:
-        """Return words for a field of a command from outside.
-
-        They take the place of its core: *it* that of *the red cube* in *the container over it*.
-        """
-        outside, commands = self._request.outside_phrase(name), self._request.task.commands
-        direct = self._scenario is None or self._scenario.fields.setting == _DIRECT
-        if outside is None or (self._request.resolved and direct):
-            return self._request.outside_stated(name)
-        if name in {one.field for one in self._request.values_of("number")}:
-            return words  # what stays around it is added to numbers later
-        prefix = commands.by_color.removesuffix("{cube}")
-        if prefix and commands.thing not in outside.core:
-            first, *rest = words
-            if not first.text.startswith(prefix):
-                raise NoCommandError
-            words = (first._replace(text=first.text.removeprefix(prefix)), *rest)
-        return self._request.around(name, tuple(piece for piece in words if piece.text))
 
     def neutral(self, scenario: Scenario) -> Iterator[Phrase]:
         """Yield remarks for ever: the scenario's own in any order, then those about anything."""

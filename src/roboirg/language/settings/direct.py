@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.word_pools import POOLS
 from roboirg.language.phrases import sentences
 from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.settings.setting import Instruct, Setting
@@ -40,9 +39,7 @@ def _pairing_rules(instruct: Instruct) -> Iterator[str]:
     introduction = instruct(InstructionOptions("direct")).turns[0]
     explicit = instruct(InstructionOptions("explicit")).command
     resolved = instruct(InstructionOptions("direct", "resolved"))
-    outside = resolved.metadata["wordings"] not in (None, *POOLS)
-    paired = not outside or resolved.metadata["command"] != "own"
-    if paired and resolved.turns != (introduction, explicit):
+    if resolved.turns != (introduction, explicit):
         yield "resolved, its command is not the explicit one"
 
 

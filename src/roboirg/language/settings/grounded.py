@@ -46,8 +46,6 @@ Clues = Mapping[GoalValue, Clue]
 
 def refusal(request: InstructionRequest) -> str | None:
     """Return why nothing in an episode can be described by what is seen; None if something can."""
-    if request.wordings is not None:
-        return "it has no words for commands from outside"
     return None if clues_of(request) else "nothing to see in this scene singles out a slot's value"
 
 

@@ -110,7 +110,7 @@ def _pointed(
     place = request.refer(words, expression, color, resolved=landmark.phrase)
     template = None
     stands_last = _STANDS_LAST.fullmatch(request.task.commands.by_place)
-    if request.wordings is None and stands_last:
+    if stands_last:
         # "That one over there": the noun is that of the introduction.
         noun = stands_last["noun"]
         words = request.sampler.pick(

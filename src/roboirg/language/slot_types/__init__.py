@@ -13,7 +13,6 @@ from roboirg.language.phrases import Phrase
 from roboirg.language.request import GoalValues, InstructionRequest
 from roboirg.language.slot_types import amount, color, number, ordinal, relation
 from roboirg.language.slot_types.slot_type import Fields, SlotType
-from roboirg.language.worded_command import goal_fields
 
 __all__ = ["Fields", "described", "slot_types_in", "stated"]
 
@@ -49,8 +48,6 @@ def described(request: InstructionRequest, things: Sequence[Phrase]) -> Fields:
 
 def stated(request: InstructionRequest) -> Fields:
     """Return the fields of the command with every value named."""
-    if request.wordings is not None:
-        return {name: request.outside_stated(name) for name in goal_fields(request.episode.goal)}
     fields: Fields = {}
     for slot_type, goal_values in slot_types_in(request):
         fields |= slot_type.stated(request, goal_values)

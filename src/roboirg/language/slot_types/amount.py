@@ -15,13 +15,7 @@ from roboirg.language.phrases import (
     listed,
     plain,
 )
-from roboirg.language.request import (
-    AMOUNT_FIELD,
-    GoalValue,
-    GoalValues,
-    InstructionRequest,
-    tagged_words,
-)
+from roboirg.language.request import AMOUNT_FIELD, GoalValue, GoalValues, InstructionRequest
 from roboirg.language.slot_types import color, number
 from roboirg.language.slot_types.slot_type import Fields, SlotType
 from roboirg.language.templates import introductions, remarks
@@ -42,9 +36,8 @@ def amount(count: Phrase, thing: Phrase) -> Phrase:
 
 
 def amounts(items: Sequence[Phrase]) -> Fields:
-    """Return the fields of the command for the words for each color with its count."""
-    single = {f"{AMOUNT_FIELD}.{index}": item for index, item in enumerate(items)}
-    return {AMOUNT_FIELD: listed(items), **single}
+    """Return the field of the command for the words for each color with its count."""
+    return {AMOUNT_FIELD: listed(items)}
 
 
 def cubes(shade: GoalValue, count: int) -> Phrase:
@@ -82,40 +75,24 @@ def _color_reference(request: InstructionRequest) -> color.ColorReference:
 
 
 def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
-    """Return ``that many of them``, ``two of them``, or ``exactly those`` for several colors.
-
-    The parts of a command from outside are ``that many of the former`` and so on.
-    """
+    """Return ``that many of them``, ``two of them``, or ``exactly those`` for several colors."""
     matched = pairs(goal_values)
+    if len(matched) > 1:
+        return {AMOUNT_FIELD: anaphor("exactly those", "them", all_colors(goal_values))}
+    ((shade, count),) = matched
     if _counts_said(request, goal_values):
         ((words, expression),) = _color_reference(request).pointers
-        ((shade, _),) = matched
         thing = anaphor(f"of {words.replace(' one', ' color')}", expression, shade)
         return _described(request, goal_values, [thing])
-    pointers = THEM if len(matched) == 1 else color.LISTS[len(matched)]
-    items = [
-        amount(
-            anaphor("that many", "that", count),
-            anaphor(f"of {words}", expression, shade),
-        )
-        for (shade, count), (words, expression) in zip(matched, pointers, strict=True)
-    ]
-    fields = amounts([(*item, *_after(request, at)) for at, item in enumerate(items)])
-    if len(matched) > 1:
-        fields[AMOUNT_FIELD] = anaphor("exactly those", "them", all_colors(goal_values))
-    return fields
+    ((words, expression),) = THEM
+    of_color = anaphor(f"of {words}", expression, shade)
+    return amounts([amount(anaphor("that many", "that", count), of_color)])
 
 
 def all_colors(goal_values: Sequence[GoalValue]) -> Mentionable:
     """Return what a mention of several colors stands for: ``red and green``."""
     colors = [value.color for value in goal_values if value.slot == "colors"]
     return MentionedValue(" and ".join(colors), "colors")
-
-
-def _after(request: InstructionRequest, index: int) -> Phrase:
-    """Return the words from outside that stay after the words for an amount."""
-    outside = request.outside_phrase(f"{AMOUNT_FIELD}.{index}")
-    return () if outside is None else plain(outside.after)
 
 
 def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:
@@ -172,16 +149,11 @@ def _competing(request: InstructionRequest, goal_values: GoalValues) -> list[Phr
 
 
 def _described(
-    request: InstructionRequest, goal_values: GoalValues, things: Sequence[Phrase]
+    _request: InstructionRequest, goal_values: GoalValues, things: Sequence[Phrase]
 ) -> Fields:
     items: list[Phrase] = []
-    for index, ((_, count), thing) in enumerate(zip(pairs(goal_values), things, strict=True)):
-        outside = request.outside_phrase(f"{AMOUNT_FIELD}.{index}")
-        if outside is not None and outside.before:
-            item = (*tagged_words(outside.before, count), *thing)
-        else:
-            item = amount(_count(count), thing)
-        items.append((*item, *_after(request, index)))
+    for (_, count), thing in zip(pairs(goal_values), things, strict=True):
+        items.append(amount(_count(count), thing))
     return amounts(items)
 
 

@@ -113,8 +113,7 @@ def named(request: InstructionRequest, goal_value: GoalValue) -> Phrase:
 def _stated(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``the red cube``, or words for the container over it."""
     return {
-        goal_value.field: request.by_color(goal_value, named(request, goal_value))
-        for goal_value in goal_values
+        goal_value.field: request.by_color(named(request, goal_value)) for goal_value in goal_values
     }
 
 
@@ -122,7 +121,7 @@ def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``it``, ``the former`` and ``the latter``, or ``the first``, etc."""
     pointers = draw_reference(request, goal_values).pointers
     return {
-        goal_value.field: request.by_color(goal_value, anaphor(words, expression, goal_value))
+        goal_value.field: request.by_color(anaphor(words, expression, goal_value))
         for goal_value, (words, expression) in zip(goal_values, pointers, strict=True)
     }
 

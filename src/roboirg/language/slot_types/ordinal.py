@@ -40,29 +40,22 @@ def series_length(request: InstructionRequest, goal_value: GoalValue) -> int:
     return sum(fact.kind == "placed" and fact.place in targets for fact in scene.past)
 
 
-def wrapped(request: InstructionRequest, goal_value: GoalValue, which: Phrase) -> Fields:
+def wrapped(goal_value: GoalValue, which: Phrase) -> Fields:
     """Return the command's field, given the words for the visit or placement."""
-    words = fill(WRAPPED[goal_value.slot_type], {"which": which})
-    return {goal_value.field: request.around(goal_value.field, words)}
+    return {goal_value.field: fill(WRAPPED[goal_value.slot_type], {"which": which})}
 
 
-def _stated(request: InstructionRequest, goal_values: GoalValues) -> Fields:
+def _stated(_request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``during its third visit``, ``the target of the second placement``."""
     (goal_value,) = goal_values
     words = f"{OWNERS[goal_value.slot_type]} {ordinal(goal_value.number)} {goal_value.slot_type}"
-    return wrapped(request, goal_value, antecedent(words, goal_value))
+    return wrapped(goal_value, antecedent(words, goal_value))
 
 
-def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
+def _reduced(_request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``that visit``."""
     (goal_value,) = goal_values
-    words = f"that {goal_value.slot_type}"
-    if request.outside_phrase(goal_value.field) is None:
-        return wrapped(request, goal_value, anaphor(words, "that", goal_value))
-    # All of it takes the place of "the second target".
-    words = WRAPPED[goal_value.slot_type].format(which=words)
-    pointing = anaphor(words, "that", goal_value)
-    return {goal_value.field: request.around(goal_value.field, pointing)}
+    return wrapped(goal_value, anaphor(f"that {goal_value.slot_type}", "that", goal_value))
 
 
 def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:

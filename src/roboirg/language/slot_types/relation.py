@@ -8,19 +8,15 @@ from roboirg.language.request import GoalValue, GoalValues, InstructionRequest
 from roboirg.language.slot_types.slot_type import Fields, SlotType, competing_with, pointing_at
 from roboirg.language.templates import derivations, introductions, remarks
 
-USED = "the target used "
 EXPRESSIONS: dict[str, Expression] = {"at that moment": "that", "then": "then"}
 
 
-def placed(request: InstructionRequest, goal_value: GoalValue, moment: Phrase) -> Fields:
+def placed(goal_value: GoalValue, moment: Phrase) -> Fields:
     """Return ``the target used ...``.
 
     Not *it*: only one cube is placed in the video, so *it* would give the cube away.
     """
-    outside = request.outside_phrase(goal_value.field)
-    if outside is None or outside.is_place:
-        moment = (*plain(USED), *moment)
-    return {goal_value.field: request.around(goal_value.field, moment)}
+    return {goal_value.field: (*plain("the target used "), *moment)}
 
 
 def named(goal_value: GoalValue) -> Phrase:
@@ -28,21 +24,15 @@ def named(goal_value: GoalValue) -> Phrase:
     return antecedent(derivations.MOMENTS[str(goal_value.value)], goal_value)
 
 
-def _stated(request: InstructionRequest, goal_values: GoalValues) -> Fields:
-    return placed(request, goal_values[0], named(goal_values[0]))
+def _stated(_request: InstructionRequest, goal_values: GoalValues) -> Fields:
+    return placed(goal_values[0], named(goal_values[0]))
 
 
 def _reduced(request: InstructionRequest, goal_values: GoalValues) -> Fields:
     """Return ``at that moment``, or ``then``."""
     (goal_value,) = goal_values
     words = request.sampler.pick("moment anaphor", derivations.MOMENT_ANAPHORS)
-    outside, pointing = request.outside_phrase(goal_value.field), EXPRESSIONS[words]
-    if outside is None or not outside.is_place:
-        moment = anaphor(words, pointing, goal_value)
-        return placed(request, goal_value, moment)
-    # All of it takes the place of "the target right before the button press".
-    target = anaphor(f"{USED}{words}", pointing, goal_value)
-    return {goal_value.field: request.around(goal_value.field, target)}
+    return placed(goal_value, anaphor(words, EXPRESSIONS[words], goal_value))
 
 
 def _introduce(request: InstructionRequest, goal_values: GoalValues) -> Phrase:

@@ -14,6 +14,7 @@ from roboirg.apps.language_lab.validation.episode_checks import leaking, places_
 from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.plain_text import counted
 from roboirg.language.generator import request_of, spoken_instruction
 from roboirg.language.instruction import FORMS, Instruction, Mention
 from roboirg.language.meaning import field_values, meant_goals
@@ -44,7 +45,7 @@ class ScenarioReport:
         examples: for each broken rule one text.
         renderings: texts, from different scenes.
         competing: a text with a competing remark; empty if the setting has none.
-        scenes: number of scenes that it fits.
+        fitting: the keys of the scenes that it fits.
         open: number of these where its command alone leaves several goals.
         longest: the text with most tokens, after their number.
     """
@@ -54,9 +55,14 @@ class ScenarioReport:
     examples: dict[str, str] = field(default_factory=dict)
     renderings: list[str] = field(default_factory=list)
     competing: str = ""
-    scenes: int = 0
+    fitting: list[str] = field(default_factory=list)
     open: int = 0
     longest: tuple[int, str] = (0, "")
+
+    @property
+    def scenes(self) -> int:
+        """Number of scenes that it fits."""
+        return len(self.fitting)
 
     def add(self, rule: str, text: str) -> None:
         """Count a broken rule."""
@@ -106,11 +112,36 @@ def our_scenarios() -> tuple[Scenario, ...]:
     return tuple(found)
 
 
+def unserved_settings(
+    reports: Sequence[ScenarioReport], scenes: Sequence[Episode]
+) -> Iterator[str]:
+    """Yield each setting of a user's file that has no scenario for some scenes."""
+    fitting: dict[str, set[str]] = {}
+    for report in reports:
+        fields = report.scenario.fields
+        if fields.pool is None:  # those of ours are never alone
+            fitting.setdefault(fields.setting, set()).update(report.fitting)
+    for name, keys in fitting.items():
+        options = InstructionOptions(name, language=4)
+        left = [episode for episode in scenes if episode.key not in keys]
+        refusal = all_settings()[name].refusal
+        lacking = [episode for episode in left if refusal(request_of(episode, options)) is None]
+        if lacking:
+            yield (
+                f"{name} has no scenario that fits {counted(len(lacking), 'scene')}, such as "
+                f"{lacking[0].key}"
+            )
+
+
 def _in_both_pools(scenario: Scenario, words: TaskScenarios) -> Iterator[str]:
-    """Yield the frame and the sentences that the other pool has, in its own file or in ours."""
+    """Yield the frame and the sentences that the other pool has, in its own file or in ours.
+
+    A scenario of a user, which serves both pools, has no other one.
+    """
     theirs: set[str] = set()
     for other in (*words.scenarios, *our_scenarios()):
-        if other.fields.pool != scenario.fields.pool:
+        pools = {other.fields.pool, scenario.fields.pool}
+        if pools == {"train", "test"}:
             theirs.update(blanked(other))
     for shared in sorted(theirs.intersection(blanked(scenario))):
         yield f"the other pool has {shared!r}, too"
@@ -152,7 +183,7 @@ def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episod
     implicit, number = told[0], report.scenes
     if len(report.renderings) < SHOWN and number % 3 == 0:
         report.renderings.append(implicit.text)
-    report.scenes += 1
+    report.fitting.append(episode.key)
     report.open += not all(is_right(goal, episode) for goal in goals_of_command(implicit, episode))
     others = [goal for goal in goals_of(episode) if goal != episode.goal]
     for goal in others[number % max(1, len(others)) :][:1]:

@@ -4,15 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from roboirg.apps.language_lab.scenarios.explicit_check import ExplicitReport
 from roboirg.apps.language_lab.scenarios.scenario_check import ScenarioReport
 from roboirg.core.plain_text import counted
 from roboirg.language.token_counts import USUAL_LIMIT
 
 
+def explicit_lines(report: ExplicitReport, task: str) -> Iterator[str]:
+    """Yield what an author wants to know of the explicit words of a task."""
+    yield f"explicit ({task})"
+    yield from (f"  {text}" for text in report.renderings)
+    yield f"  {report.longest[0]} of {USUAL_LIMIT} tokens; states {counted(report.goals, 'goal')}."
+    yield from (f"  BROKEN {rule}" for rule in report.broken)
+    yield ""
+
+
 def report_lines(report: ScenarioReport, task: str) -> Iterator[str]:
     """Yield what an author wants to know of a scenario in a task: texts, length, broken rules."""
     fields, fits = report.scenario.fields, report.scenes
-    yield f"{fields.frame} ({task}, {fields.setting}, {fields.pool})"
+    pool = fields.pool or "both pools"
+    yield f"{fields.frame} ({task}, {fields.setting}, {pool})"
     yield from (f"  {text}" for text in report.renderings)
     if report.competing:
         yield f"  With a competing remark: {report.competing}"

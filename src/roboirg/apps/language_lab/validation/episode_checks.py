@@ -20,12 +20,12 @@ from roboirg.core.episode import SPLITS, Episode, Goal, Split, values_in
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.field_types import check_whole
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import PoolName
 from roboirg.language.generator import expressible, find_refusal, instruct_with
 from roboirg.language.instruction import Instruction, Mention, hidden_slots
-from roboirg.language.settings import ACCEPTANCE_SETTINGS, EXPLICIT, all_settings, settings_of
+from roboirg.language.settings import ACCEPTANCE_SETTINGS, all_settings, settings_of
 from roboirg.language.settings.setting import Instruct, Setting
 from roboirg.language.variants import expressible_options
-from roboirg.language.wordings.wording_store import open_wordings
 from roboirg.reader import Interpretation, interpret
 from roboirg.tasks import get_task, goals_of
 from roboirg.tasks.splits.splits import SIZES, get_episode
@@ -38,8 +38,6 @@ Violation = tuple[Rule, str]
 
 EpisodePlace = tuple[str, Split, int]
 """Task, split and position of an episode."""
-
-_identity_of = functools.cache(open_wordings)
 
 
 def places_of(tasks: Sequence[str], splits: Sequence[Split], seeds: int) -> list[EpisodePlace]:
@@ -66,27 +64,27 @@ def places_of(tasks: Sequence[str], splits: Sequence[Split], seeds: int) -> list
     return found
 
 
-def check_place(place: EpisodePlace, wordings_file: str | None = None) -> ValidationResults:
-    """Check the episode of a place; `wordings_file` as for `open_wordings`."""
-    expected, identity = place[1] in SPLITS, _identity_of(wordings_file)
-    return check_episode(get_episode(*place), must_be_expressible=expected, wordings=identity)
+def check_place(place: EpisodePlace, pool: PoolName | None = None) -> ValidationResults:
+    """Check the episode of a place in the words of a pool; None for those of its split."""
+    expected = place[1] in SPLITS
+    return check_episode(get_episode(*place), must_be_expressible=expected, pool=pool)
 
 
 def check_episode(
-    episode: Episode, *, must_be_expressible: bool = False, wordings: str | None = None
+    episode: Episode, *, must_be_expressible: bool = False, pool: PoolName | None = None
 ) -> ValidationResults:
     """Check all rules on all instructions of an episode.
 
     Args:
         episode: of a split or not.
         must_be_expressible: whether the refusal of a setting that selects seeds is a violation.
-        wordings: identity of an open wording file; None for our own words.
+        pool: of the words; None for that of the split.
     """
     results = ValidationResults()
     # Texts repeat (stages 1 and 5 are the direct ones): read each once.
     read = functools.cache(lambda text: interpret(text, episode.scene, episode.task))
     commands: dict[str, set[str]] = {}
-    for options in expressible_options(episode, wordings):
+    for options in expressible_options(episode, pool):
         setting = options.setting
         instruction = instruct_with(episode, options)
         results.texts[episode.task, setting] += 1
@@ -103,13 +101,11 @@ def check_episode(
         else:
             violations += misread("self-contained", instruction.command, episode, read)
         _add_violations(results, episode, setting, violations)
-    for setting, words in unpaired(episode, expressible(episode, wordings=wordings), wordings):
+    for setting, words in unpaired(episode, expressible(episode, wordings=pool), pool):
         _add_violations(results, episode, setting, [("pairing", words)])
-    said = find_refusal(episode, InstructionOptions(EXPLICIT, wordings=wordings)) is None
     for setting in settings_of(get_task(episode.task)):
-        # What has no command at all counts once.
-        if all_settings()[setting].may_refuse if said else setting == EXPLICIT:
-            _count_refusals(all_settings()[setting], episode, wordings, results)
+        if all_settings()[setting].may_refuse:
+            _count_refusals(all_settings()[setting], episode, pool, results)
         reason = find_refusal(episode, InstructionOptions(setting))
         if reason is not None and must_be_expressible and setting in ACCEPTANCE_SETTINGS:
             _add_violations(results, episode, setting, [("expressible", reason)])
@@ -163,18 +159,16 @@ def _count_command(
 
 
 def _count_refusals(
-    setting: Setting, episode: Episode, wordings: str | None, results: ValidationResults
+    setting: Setting, episode: Episode, pool: PoolName | None, results: ValidationResults
 ) -> None:
     for changes in setting.variants:
         variant = ", ".join(str(value) for value in changes.values())
         group = EpisodeGroup(episode.task, setting.name, variant, episode.difficulty)
-        options = replace(InstructionOptions(setting.name, wordings=wordings), **changes)
+        options = replace(InstructionOptions(setting.name, wordings=pool), **changes)
         reason = find_refusal(episode, options)
         results.scenes[group] += 1
         results.refused[group] += reason is not None
         if reason is not None:
-            # The goal is reason enough: episodes with the same one count together.
-            reason = reason.replace(f" of episode {episode.key}", "")
             results.reasons[Refusal(setting.name, reason)] += 1
 
 
@@ -207,23 +201,23 @@ def _contents(goal: Goal, slots: Collection[str]) -> Mapping[str, Counter[str]]:
 
 
 def unpaired(
-    episode: Episode, settings: Sequence[str], wordings: str | None = None
+    episode: Episode, settings: Sequence[str], pool: PoolName | None = None
 ) -> Iterator[tuple[str, str]]:
     """Yield settings whose words differ from their counterpart, each with the difference.
 
     Args:
         episode: what to say.
         settings: names.
-        wordings: identity of an open wording file; None for our own words.
+        pool: of the words; None for that of the split.
     """
 
     def say(options: InstructionOptions) -> Instruction:
-        return instruct_with(episode, replace(options, wordings=wordings))
+        return instruct_with(episode, replace(options, wordings=pool))
 
     for name in settings:
         for complaint in all_settings()[name].pairing_rules(say):
             yield name, complaint
-        options = InstructionOptions(name, wordings=wordings)
+        options = InstructionOptions(name, wordings=pool)
         if find_refusal(episode, options) is None:
             yield from ((name, complaint) for complaint in _differences(options, say))
 
@@ -233,11 +227,7 @@ def _differences(options: InstructionOptions, say: Instruct) -> Iterator[str]:
     implicit, resolved = say(options), say(replace(options, form="resolved"))
     if implicit.turns[:-1] != resolved.turns[:-1]:
         yield "resolved, its context differs"
-    # In words from outside, one time may have a sentence of its own, without a number; but both
-    # forms have our own command, or none of them.
-    templates = {str(one.metadata["command"]) for one in (implicit, resolved)}
-    same = len(templates) == 1 or "own" in templates
-    if same and without_references(implicit) != without_references(resolved):
+    if without_references(implicit) != without_references(resolved):
         yield "resolved, more than its references differ"
     if all_settings()[options.setting].implicit and implicit.command == resolved.command:
         yield "resolved, its command is still the implicit one"

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
 from typing import cast
 
 from roboirg.core.episode import ALL_COLORS, Goal, SlotValue
 from roboirg.language.instruction import Instruction, hidden_slots
-from roboirg.language.worded_command import FIELD
-from roboirg.language.wordings.wording_store import find_wordings
 
 _NUMBERS = {
     1: frozenset(("1", "one", "ones", "once", "first", "single", "1st")),
@@ -32,23 +29,10 @@ def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
     text = _without_pointers(instruction).lower().replace("before or after", "")
     words = frozenset(re.findall(r"[a-z0-9]+", text))
     hidden = hidden_slots(instruction, goal)
-    words -= _template_words(instruction, hidden)
     found = [words & _spellings(goal[slot]) for slot in hidden]
     places = cast("list[str]", instruction.metadata["landmarks"])
     named = [place for place in places if place in instruction.command]
     return frozenset(named).union(*found)
-
-
-def _template_words(instruction: Instruction, hidden: Collection[str]) -> frozenset[str]:
-    """Return the words of a template from outside that every hidden value has."""
-    text = str(instruction.metadata["command"])
-    if text == "own":
-        return frozenset()
-    wordings = find_wordings(str(instruction.metadata["wordings"])).tasks[instruction.task]
-    conditions = {slot for one in wordings.commands if one.text == text for slot in one.when}
-    if not conditions.isdisjoint(hidden):
-        return frozenset()
-    return frozenset(re.findall(r"[a-z0-9]+", FIELD.sub("", text).lower()))
 
 
 def _spellings(value: SlotValue) -> frozenset[str]:

@@ -63,8 +63,7 @@ class ValidationResults:
         texts: prompts read, by task and setting.
         commands: episodes whose implicit command was read alone.
         exceptions: those of them whose scene leaves a single candidate.
-        scenes: scenes of the settings that may refuse; and those
-            for which wordings have no command, in explicit.
+        scenes: scenes of the settings that may refuse.
         refused: those of them that were refused.
         reasons: how often each reason was given.
         failures: all violations of rules.

@@ -6,12 +6,16 @@ options of an instruction hold the identity, and a job also says which file to o
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
+from msgspec.structs import replace
+
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.word_pools import POOLS
-from roboirg.language.worded_command import Wordings
-from roboirg.language.wordings.wording_file import read_wordings
+from roboirg.core.word_pools import POOLS, outside_words
+from roboirg.language.scenarios.scenario import TaskScenarios
+from roboirg.language.scenarios.scenario_file import setting_scenarios, task_scenarios, words_in
+from roboirg.language.scenarios.wording_file import Wordings, read_wordings
 
 _OPEN: dict[str, Wordings] = {}
 """The wordings of this process by identity."""
@@ -55,3 +59,28 @@ def find_wordings(identity: str) -> Wordings:
             f"The wordings {identity!r} are not open; call open_wordings with their file first."
         )
     return _OPEN[identity]
+
+
+def task_words(task: str, setting: str, wordings: str | None) -> TaskScenarios | None:
+    """Return what is said of a task in a setting; None if nothing has been written.
+
+    Args:
+        task: its name.
+        setting: its name; a setting whose own file serves the task says nothing else.
+        wordings: the identity of open wordings; None, or a pool, for our own words.
+    """
+    identity = outside_words(wordings)
+    if identity is None or task in setting_scenarios(setting):
+        return words_in(setting, task)
+    return _with_ours(task, identity)
+
+
+@functools.cache
+def _with_ours(task: str, identity: str) -> TaskScenarios | None:
+    """Return the words of a wording file, with our scenarios in the settings where it has none."""
+    ours, theirs = task_scenarios(task), find_wordings(identity).tasks.get(task)
+    if ours is None or theirs is None:
+        return theirs
+    settings = {scenario.fields.setting for scenario in theirs.scenarios}
+    others = [one for one in ours.scenarios if one.fields.setting not in settings]
+    return replace(theirs, scenarios=[*theirs.scenarios, *others])

@@ -1,0 +1,95 @@
+"""Check commands and whole sentences: each goal of the published scenes has one that means it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from roboirg.apps.language_lab.scenarios.scenario_check import SHOWN, tokens_of
+from roboirg.core.episode import Episode, Goal, describe_goal
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.word_pools import PoolName, pool_of
+from roboirg.language.generator import request_of, spoken_instruction
+from roboirg.language.goal_fields import goal_fields
+from roboirg.language.instruction import Instruction
+from roboirg.language.scenarios.literals import literal_refusal, say_literal
+from roboirg.language.scenarios.scenario import TaskScenarios
+from roboirg.language.scenarios.scenario_file import task_scenarios
+from roboirg.language.scenarios.spoken import say_explicit
+from roboirg.language.token_counts import USUAL_LIMIT
+from roboirg.shortcuts.command_chance import is_right, understood_goals
+from roboirg.tasks import goals_of, with_goal
+
+
+@dataclass(slots=True)
+class ExplicitReport:
+    """What was found about the explicit words of a task.
+
+    Attributes:
+        goals: number of goals that have a sentence.
+        renderings: a few sentences.
+        broken: what is wrong, each once.
+        longest: the text with most tokens, after their number.
+    """
+
+    goals: int = 0
+    renderings: list[str] = field(default_factory=list)
+    broken: dict[str, None] = field(default_factory=dict)
+    longest: tuple[int, str] = (0, "")
+
+
+def has_explicit_words(words: TaskScenarios, task: str) -> bool:
+    """Return whether a file has explicit words of its own for a task."""
+    ours = task_scenarios(task)
+    if words.literals or ours is None:
+        return True
+    return (words.commands, words.stated) != (ours.commands, ours.stated)
+
+
+def check_explicit(words: TaskScenarios, scenes: Iterable[Episode]) -> ExplicitReport:
+    """Check what is said of each goal that scenes allow, in the words of each pool."""
+    report = ExplicitReport()
+    said: set[Goal] = set()
+    for episode in _goals_once(scenes):
+        try:
+            instruction = _explicit(episode, words)
+        except InvalidValueError as error:
+            report.broken[str(error).rstrip(".")] = None
+            continue
+        text = instruction.text
+        meant = understood_goals(instruction, episode)
+        if not meant or not all(is_right(goal, episode) for goal in meant):
+            goal = describe_goal(episode.goal.as_mapping())
+            report.broken[f"says {text!r} of the goal {goal}, and of others or none"] = None
+        said.add(episode.goal)
+        report.longest = max(report.longest, (tokens_of(text), text))
+        if text not in report.renderings and len(report.renderings) < SHOWN:
+            report.renderings.append(text)
+    report.goals = len(said)
+    tokens, text = report.longest
+    if tokens > USUAL_LIMIT:
+        report.broken[f"needs {tokens} tokens; at most {USUAL_LIMIT} are heard: {text}"] = None
+    return report
+
+
+def _goals_once(scenes: Iterable[Episode]) -> Iterable[Episode]:
+    """Return an episode for each goal and pool, of goals with as many fields as an episode's."""
+    found: dict[tuple[Goal, PoolName], Episode] = {}
+    for episode in scenes:
+        fields, pool = len(goal_fields(episode.goal)), pool_of(episode.split)
+        for goal in goals_of(episode):
+            if len(goal_fields(goal)) == fields and (goal, pool) not in found:
+                found[goal, pool] = with_goal(episode, goal)
+    return found.values()
+
+
+def _explicit(episode: Episode, words: TaskScenarios) -> Instruction:
+    """Return what is said of an episode; raises if nothing is."""
+    request = request_of(episode, InstructionOptions(language=4))
+    if not words.literals:
+        return spoken_instruction(request, say_explicit(request, words))
+    reason = literal_refusal(request, words.literals, "the file")
+    if reason is not None:
+        raise InvalidValueError(reason)
+    return spoken_instruction(request, say_literal(request, words.literals))

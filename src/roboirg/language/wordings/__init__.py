@@ -1,1 +1,0 @@
-"""Words from outside: the commands of others, from a wording file."""
