@@ -252,7 +252,7 @@ def test_a_clue_leads_to_one_thing(task):
     kind = get_task(task).commands.pointed
     for scene in scenes_of(task):
         found = {}
-        for thing, clue in spoken_clues(scene, kind):
+        for thing, clue in spoken_clues(scene, get_task(task)):
             assert found.setdefault(clue.words, thing.name) == thing.name
             assert thing.name not in {
                 things_at(scene, kind, "robot")[aside].name for aside in clue.aside
