@@ -25,8 +25,9 @@ from roboirg.language.scenarios.scenario_file import read_task_scenarios
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 
-WRITTEN = ("PickXtimes", "SwingXtimes", "StopCube", "VideoUnmask")
-SPATIAL = ("PickXtimes", "VideoUnmask")
+UNMASK = ("VideoUnmask", "VideoUnmaskSwap", "ButtonUnmask", "ButtonUnmaskSwap")
+WRITTEN = ("PickXtimes", "SwingXtimes", "StopCube", *UNMASK)
+SPATIAL = ("PickXtimes", *UNMASK)
 GRID = st.integers(-17, 17).map(lambda step: step / 100)
 PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=7, unique=True)
 """Centimeter grid: ties, exact margins and collinear rows are common."""
@@ -252,7 +253,7 @@ def test_a_clue_leads_to_one_thing(task):
     kind = get_task(task).commands.pointed
     for scene in scenes_of(task):
         found = {}
-        for thing, clue in spoken_clues(scene, kind):
+        for thing, clue in spoken_clues(scene, get_task(task)):
             assert found.setdefault(clue.words, thing.name) == thing.name
             assert thing.name not in {
                 things_at(scene, kind, "robot")[aside].name for aside in clue.aside
@@ -277,6 +278,47 @@ def test_a_scenario_with_a_spot_fits_only_what_has_one():
             assert landmark in known
             fitting += 1
     assert fitting
+
+
+def test_any_place_is_a_spot_where_there_is_one_and_fits_all_others_too():
+    (scenario,) = read_task_scenarios(WOBBLY, "mine.toml")["PickXtimes"].scenarios
+    text = WOBBLY.replace("The table wobbles {place:spot}", "Sand the cube {place:any}")
+    (any_place,) = read_task_scenarios(text, "mine.toml")["PickXtimes"].scenarios
+    options = InstructionOptions("spatial", language=4, wordings="train")
+    forms = set()
+    for index in range(40):
+        request = request_of(get_episode("PickXtimes", "train", index), options)
+        spot = choose(request, "spatial", [scenario])
+        found = choose(request, "spatial", [any_place])
+        assert spot is None or spot.introduced == found.introduced
+        forms.add(found.introduced.values["place"][0].form)
+    assert forms == {"spot", None}
+
+
+@pytest.mark.parametrize("task", UNMASK)
+def test_only_what_has_moved_since_is_said_to_have_started_there(task):
+    noun = "cube" if "Button" in task else "container"
+    started = "that started " if task == "VideoUnmaskSwap" else ""
+    for scene in scenes_of(task):
+        places = {
+            f"the {noun} {started}{place.attributive}": place.thing
+            for place in spoken_places(scene, get_task(task).commands.pointed, "robot")
+        }
+        for thing, clue in spoken_clues(scene, get_task(task)):
+            assert clue.kind == "sets" or places[clue.words] is thing
+
+
+def test_what_was_somewhere_at_the_start_is_the_cube_if_it_is_the_container_over_it():
+    """At first the video of VideoUnmaskSwap shows the cubes alone."""
+    same = 0
+    for scene in scenes_of("VideoUnmaskSwap"):
+        covers = {cube.inside for cube in scene.of_kind("hidden_cube")}
+        of_cubes = spots(scene, "hidden_cube")
+        for spot, container in spots(scene).items():
+            if container.name in covers and spot in of_cubes:
+                assert of_cubes[spot].inside == container.name
+                same += 1
+    assert same
 
 
 def test_the_phrases_of_places_by_class(snapshot):

@@ -483,6 +483,39 @@ def test_a_list_and_a_position_in_it_before_the_command_give_the_value():
     assert report.scenes > report.broken.total() == 0
 
 
+@pytest.mark.parametrize("task", ["ButtonUnmask", "ButtonUnmaskSwap"])
+def test_before_containers_stand_only_cubes_are_spoken_of(task):
+    for scenario in task_scenarios(task).scenarios:
+        texts = {name: text for name, text in scenario.texts.items() if "say." not in name}
+        for text in itertools.chain.from_iterable(texts.values()):
+            assert not re.search("container|hidden|watched|where .* went", literal(text))
+        for text in scenario.texts["say.colors.0"]:
+            assert literal(text).startswith("the container over ")
+
+
+def test_a_place_at_the_start_of_the_video_is_not_called_a_place_of_now():
+    for scenario in task_scenarios("VideoUnmaskSwap").scenarios:
+        said = f"{literal(scenario.text('introduction'))} {literal(scenario.text('say.colors.0'))}"
+        if scenario.fields.setting == "spatial" or "aside" in str(scenario.texts):
+            assert re.search("start|beginning|before .* moved|as soon as they moved", said)
+
+
+def test_positions_count_cubes_that_are_named_by_color_and_by_place():
+    text = """
+tasks = ["ButtonUnmask"]
+[[scenario]]
+frame = "one each"
+pool = "test"
+setting = "spatial"
+introduction = "I get the cube {place.0:any}, and {person.2} gets the {colors.1} cube."
+say.colors.0 = ["the container over <other place.0: mine>"]
+say.colors.1 = ["the one over <latter colors.1: {person.2}'s>"]
+"""
+    scenes = scenes_of("ButtonUnmask", 40)
+    (report,) = check_scenarios(read(text, "ButtonUnmask"), None, scenes)
+    assert report.scenes > report.broken.total() == 0
+
+
 def test_a_person_stands_for_what_he_or_she_wants():
     text = RIVAL.replace("We have", "{person} wants").replace("they still sell", "{person.2} wants")
     text = text.replace("<former list.0: the former>", "<former list.0: {hers}>")

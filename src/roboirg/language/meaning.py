@@ -149,10 +149,11 @@ def _operand_values(operand: Operand, field: str, episode: Episode) -> Values:
 
 def _described_thing(described: Described, episode: Episode) -> SceneObject | None:
     """Return the only thing in the scene that fits a description; None if there is no such one."""
-    kind_of_thing = get_task(episode.task).commands.pointed
+    task = get_task(episode.task)
     if described.kind == "place":
-        return things_at(episode.scene, kind_of_thing, described.frame).get(described.phrase)
-    for found in spoken_clues(episode.scene, kind_of_thing):
+        known = things_at(episode.scene, task.commands.pointed, described.frame)
+        return known.get(described.phrase)
+    for found in spoken_clues(episode.scene, task):
         if found.clue.words == described.phrase:
             return found.thing
     return None

@@ -67,4 +67,5 @@ TASK = Task(
     goals=unmask.goals,
     stages=stages,
     commands=COMMANDS,
+    words="containers.toml",
 )

@@ -98,4 +98,5 @@ TASK = Task(
     goals=unmask.goals,
     stages=stages,
     commands=COMMANDS,
+    words="containers.toml",
 )

@@ -51,5 +51,5 @@ TASK = Task(
     stages=unmask.pick_stages,
     commands=COMMANDS,
     demonstration=demonstration,
-    words="VideoUnmask.toml",
+    words="containers.toml",
 )

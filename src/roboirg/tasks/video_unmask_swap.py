@@ -64,4 +64,5 @@ TASK = Task(
     stages=unmask.pick_stages,
     commands=COMMANDS,
     demonstration=demonstration,
+    words="containers.toml",
 )

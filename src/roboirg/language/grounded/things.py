@@ -20,6 +20,7 @@ from roboirg.language.grounded.clue import Clue, ClueKind
 from roboirg.language.landmarks import LandmarkClass, Ranking, candidates_in, nearness, selectors
 from roboirg.language.places import USUAL, PlaceClass, SpokenPlace, spoken_places
 from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.tasks import Task
 
 AXES = ("x", "y")
 FEW = 3
@@ -82,8 +83,8 @@ def _anchors(
     return found
 
 
-def _standing(request: InstructionRequest) -> templates.Standing:
-    words = request.task.commands.things_at
+def _standing(task: Task) -> templates.Standing:
+    words = task.commands.things_at
     if "started" in words:
         return templates.STOOD
     return templates.STANDS_NOW if "now" in words else templates.STANDS
@@ -95,7 +96,7 @@ def _places(
     """Return the words that single out one of the targets, from what stands around it."""
     thing, pool = request.task.commands.pointed, request.pool
     things = candidates_in(scene, thing)
-    standing = _standing(request)
+    standing = _standing(request.task)
     fields = {**standing._asdict(), "noun": thing.removeprefix("hidden_")}
     form = int(bool(standing.started))
     found = _middles(things, targets, templates.MIDDLE.of(pool)[form], fields)
@@ -156,13 +157,18 @@ class SpokenClue(NamedTuple):
     clue: Clue
 
 
-def spoken_clues(scene: Scene, kind: str) -> list[SpokenClue]:
-    """Return the clues of language 4 to all things of a kind, from what stands around them."""
-    noun = kind.removeprefix("hidden_")
+def spoken_clues(scene: Scene, task: Task) -> list[SpokenClue]:
+    """Return the clues of language 4 to all things that a task points at, by where they are.
+
+    What has moved before the words are heard is *the container that started in the back*.
+    """
+    kind = task.commands.pointed
+    noun, started = kind.removeprefix("hidden_"), _standing(task).started
     places = [place for place in spoken_places(scene, kind, "robot") if place.attributive]
     found = _with_others_aside(candidates_in(scene, kind), places)
     for place in places:
-        clue = Clue(_SPOKEN.get(place.kind, "bridging"), f"the {noun} {place.attributive}")
+        words = f"the {noun} {started}{place.attributive}"
+        clue = Clue(_SPOKEN.get(place.kind, "bridging"), words)
         # A neighbor is named where there is nothing else: *nearest to the one in the middle*.
         is_rare = place.kind > USUAL and "nearest to" in clue.words
         is_led_to = any(place.thing is known.thing for known in found)

@@ -35,6 +35,8 @@ from roboirg.language.settings.reasoning import in_turn
 
 _DESCRIBED = ("place", "clue", "aside", "rest")
 """Slots for a thing that is described; a scenario fits the things that have those that it names."""
+_ANY = "any"
+"""The form of a place that is said after a noun, as a spot where there is one."""
 
 
 class Chosen(NamedTuple):
@@ -141,7 +143,7 @@ def _has_words(slot: Slot, offer: Offer) -> bool:
     if slot.name.partition(".")[0] not in _DESCRIBED:
         return True
     values = offer.values.get(slot.name, ())
-    return bool(values) and (values[0].kind != "place" or values[0].form == slot.form)
+    return bool(values) and (values[0].kind != "place" or slot.form in (_ANY, values[0].form))
 
 
 def _others(request: InstructionRequest, slot: str) -> list[str | int]:

@@ -20,6 +20,8 @@ _RANKS: Mapping[str, int] = {"former": 1, "latter": 2, "first": 1, "second": 2, 
 """Positions that classes of expressions name."""
 _DIRECTIONS: Mapping[Operation, int] = {"minus": -1, "earlier": -1, "plus": 1, "later": 1}
 """Of a step that is said."""
+_DESCRIBED = ("place", "clue")
+"""Slots of a thing that is not named by its value."""
 _STEPS: Mapping[Operation, int] = {"before": -1, "after": 1}
 """Steps that the operation itself names."""
 
@@ -60,13 +62,16 @@ class SaidValues:
             values = self.by_slot.get(base, ())[int(number) : int(number) + 1]
         return tuple(self._operand(value) for value in values)
 
-    def listed(self, base: str) -> tuple[Operand, ...]:
-        """Return the members of a list, named together or one by one, as they were said."""
-        if base in self.by_slot:
-            return self.operands(base)
+    def listed(self, *bases: str) -> tuple[Operand, ...]:
+        """Return the members of a list, named together or one by one, as they were said.
+
+        Of several bases, the members are those of any: a cube by its color, another by its place.
+        """
         members: list[Operand] = []
         for slot in self.by_slot:
-            if slot.startswith(f"{base}."):
+            base, _, number = slot.partition(".")
+            is_new = not number or base not in self.by_slot
+            if base in bases and is_new:
                 members += self.operands(slot)
         return tuple(members)
 
@@ -82,7 +87,7 @@ def pointed_term(pointer: Pointer, said: SaidValues) -> Term:
     """Return the term of words that point back at what was said."""
     operation, slot = pointer.operation, pointer.of
     if operation == "rank":
-        members = said.listed("list") or said.listed(slot.partition(".")[0])
+        members = said.listed("list") or said.listed(slot.partition(".")[0], *_DESCRIBED)
         return Term("rank", members, _rank_of(pointer, said))
     if operation == "other":
         members = said.listed("list")

@@ -128,7 +128,7 @@ def _clues_to(request: InstructionRequest, value: GoalValue, *, spoken: bool) ->
 def _spoken_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
     """Return the clues of language 4 to the things of a color."""
     targets = request.objects_to_point_at(color)
-    known = spoken_clues(request.episode.scene, request.task.commands.pointed)
+    known = spoken_clues(request.episode.scene, request.task)
     return [found.clue for found in known if found.thing in targets]
 
 

@@ -50,7 +50,7 @@ COVERED = (
     rf"(?:{_SLOT} cube|it|both)"
 )
 """Words for a cube in plain view."""
-_PLACED = r"(?!{}|one)[a-z]+ \{{(?:place|aside)[.\d]*:None"
+_PLACED = r"(?!{}|one|started)[a-z]+ \{{(?:place|aside)[.\d]*:None"
 """Another thing than that which the place is of."""
 _NAMED = "|".join((*ALL_COLORS, *(set(CARDINALS) - {"one"}), *ORDINALS, "twice"))
 _VALUE = re.compile(
