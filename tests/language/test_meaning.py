@@ -15,7 +15,7 @@ from roboirg.language.generator import find_refusal
 from roboirg.language.instruction import Described, Meaning, Term
 from roboirg.language.landmarks import candidates_in
 from roboirg.language.request import values_of_goal
-from roboirg.language.scenarios import declared, spoken
+from roboirg.language.scenarios import amounts, declared
 from roboirg.language.scenarios.scenario_file import task_scenarios
 from roboirg.language.settings import settings_of
 from roboirg.shortcuts.command_chance import (
@@ -171,7 +171,7 @@ FAULTS = {
         declared, "_taken_rank", lambda rank, *given: 3 - rank(*given)
     ),
     "a remark chooses what it sets aside": change(
-        spoken,
+        amounts,
         "chosen_term",
         lambda term, *given: term(*given)._replace(rank=3 - term(*given).rank),
     ),

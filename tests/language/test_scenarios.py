@@ -119,7 +119,7 @@ def spoken(task, language=4):
         ("[[scenario]]", "[[scenario", "(at line 3, column 11)"),
         ('["PickXtimes"]', "[]", "Expected a list of length >= 1"),
         ('["PickXtimes"]', '["Juggle"]', "named 'Juggle'; known: "),
-        ('["PickXtimes"]', '["BinFill"]', "has no commands of BinFill in the pool train."),
+        ('["PickXtimes"]', '["VideoRepick"]', "has no commands of VideoRepick in the pool train."),
         (
             "[[scenario]]",
             '[commands.StopCube]\ntrain = ["Go."]\n[[scenario]]',
@@ -252,8 +252,11 @@ def test_every_published_scene_has_words_in_both_pools(task):
     for episode, name, pool in itertools.product(scenes_of(task, 0), all_settings(), POOLS):
         if name in settings_of(all_tasks()[task]):
             usual = InstructionOptions(name, wordings=pool)
-            refusals = (find_refusal(episode, replace(usual, language=one)) for one in (3, 4))
-            assert len(set(refusals)) == 1, (episode.key, name, pool)
+            refusals = {find_refusal(episode, replace(usual, language=one)) for one in (3, 4)}
+            if (task, name) == ("BinFill", "grounded"):  # each language says what it can
+                assert refusals <= {None, "nothing to see in this scene singles out a slot's value"}
+            else:
+                assert len(refusals) == 1, (episode.key, name, pool)
 
 
 @pytest.mark.parametrize("task", WRITTEN)
@@ -325,8 +328,8 @@ def test_arms_say_scenarios():
 
 
 def test_language_4_is_refused_in_a_sentence_where_it_has_no_words():
-    with pytest.raises(InvalidValueError, match=r"language 4 has no scenarios of BinFill yet\.$"):
-        instruct(get_episode("BinFill", "test", 0), "direct", language=4)
+    with pytest.raises(InvalidValueError, match=r"language 4 has no scenarios of VideoRepick yet"):
+        instruct(get_episode("VideoRepick", "test", 0), "direct", language=4)
     with pytest.raises(InvalidValueError, match=r"^language is 5; it must be 3 or 4\.$"):
         instruct(get_episode("PickXtimes", "test", 0), language=5)
 
@@ -379,8 +382,6 @@ def test_a_file_without_commands_has_those_of_each_task():
         assert scenario not in own.scenarios
 
 
-WAITING = {"amount"}
-"""Types of values that no task with scenarios has yet."""
 SIMILAR = 0.7
 """Share of words from which two introductions are the same one with other nouns."""
 
@@ -411,10 +412,9 @@ def test_every_pointer_is_said_in_both_pools():
         for scenario in written:
             text = str(scenario).replace('"', "'")
             said[scenario["pool"]] += re.sub(r"<[a-z]+ [^:<>]+: ", "<", text)
-    known = [row for row in pointer_table() if not set(row.of) <= WAITING]
     lacking = [
         (row.words, pool)
-        for row, pool in itertools.product(known, POOLS)
+        for row, pool in itertools.product(pointer_table(), POOLS)
         if not is_said(row, said[pool])
     ]
     assert not lacking

@@ -223,6 +223,8 @@ def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> In
 
 def _hidden_slots(request: InstructionRequest, instruction: Instruction) -> int:
     """Return how many values of the goal the command leaves to its context."""
+    if instruction.meaning is not None:
+        return len(instruction.meaning.terms.keys() - instruction.meaning.settled)
     if request.resolved:
         return 0
     hidden = hidden_slots(instruction, request.episode.goal)

@@ -7,14 +7,15 @@ with their margins; the goal of the episode is never read.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from roboirg.core.episode import Episode, Goal, SceneObject
 from roboirg.language.grounded import spoken_clues
 from roboirg.language.instruction import Described, Meaning, Term
 from roboirg.language.landmarks import candidates_in, things_of_color
 from roboirg.language.places import things_at
-from roboirg.language.request import values_of_goal
+from roboirg.language.request import GoalValues, values_of_goal
 from roboirg.tasks import get_task, goals_of
 
 Value = str | int
@@ -62,15 +63,29 @@ def _goals_with(
 ) -> tuple[Goal, ...]:
     """Return the scene's goals with the fields that were said, each with a possible value."""
     found: list[Goal] = []
+    # "Put them into the bin" is said of any number of colors.
+    is_any = not meaning.terms or (not possible and "counts.0" in meaning.terms)
     for goal in goals_of(episode):
         if meaning.goals and goal not in meaning.goals:
             continue
-        own = {value.field: value.value for value in values_of_goal(goal)}
-        if meaning.terms and own.keys() != meaning.terms.keys():
-            continue  # it asks for two containers, and the words for one
-        if all(own[field] in values for field, values in possible.items()):
-            found.append(goal)
+        for values in _in_every_order(goal):
+            own = {value.field: value.value for value in values}
+            if not is_any and own.keys() != meaning.terms.keys():
+                continue  # it asks for two containers, and the words for one
+            if all(own[field] in values for field, values in possible.items()):
+                found.append(goal)
+                break
     return tuple(found)
+
+
+def _in_every_order(goal: Goal) -> Iterator[GoalValues]:
+    """Yield the values of a goal, with amounts in every order, which means nothing."""
+    if "counts" not in dict(goal.slots):
+        yield values_of_goal(goal)
+        return
+    for amounts in itertools.permutations(goal.amounts):
+        colors, counts = zip(*amounts, strict=True)
+        yield values_of_goal(Goal.of(colors=colors, counts=counts))
 
 
 def _term_values(term: Term, field: str, episode: Episode) -> Values:
@@ -118,6 +133,9 @@ def _values_without(operands: Sequence[Operand], field: str, episode: Episode) -
     described = [operand for operand in operands if isinstance(operand, Described)]
     if described:
         return _values_of_last_thing(described, field, episode)
+    if field == "counts.0":  # all cubes but three
+        things = candidates_in(episode.scene, get_task(episode.task).commands.pointed)
+        return frozenset(len(things) - int(str(kept)) for kept in operands)
     return _possible_values(field, episode).difference(operands)
 
 

@@ -121,6 +121,12 @@ class InstructionRequest:
         """Return the goal values of one slot."""
         return tuple(value for value in self.goal_values if value.slot == slot)
 
+    def fields_in(self, name: str) -> list[str]:
+        """Return the fields of the goal that a field of our commands holds: itself, or amounts."""
+        if name != AMOUNT_FIELD:
+            return [name]
+        return [value.field for value in self.goal_values]
+
     @property
     def color_values(self) -> GoalValues:
         """The goal values that are colors, counted or not."""

@@ -235,4 +235,5 @@ TASK = Task(
     goals=goals,
     stages=stages,
     commands=COMMANDS,
+    words="BinFill.toml",
 )

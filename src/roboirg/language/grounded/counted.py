@@ -10,6 +10,7 @@ import itertools
 from collections.abc import Sequence
 
 from roboirg.core.episode import SceneObject
+from roboirg.core.instruction_options import DEFAULT_LANGUAGE
 from roboirg.core.motions import Swap
 from roboirg.language.grounded import grounded_templates as templates
 from roboirg.language.grounded.clue import Clue
@@ -115,6 +116,8 @@ def amount_clues(request: InstructionRequest, count: GoalValue) -> list[Clue]:
     cubes = request.objects_to_point_at(color)
     # Along x, bin and button lie at the ends of the cubes' region: nearly all are on one side.
     draws = ["all but", "y bin", "y button"]
+    if request.options.language != DEFAULT_LANGUAGE:
+        draws = ["all but"]
     order = request.sampler.cycle("counted", draws)
     for draw in itertools.islice(order, len(draws)):
         axis, _, fixture = draw.partition(" ")

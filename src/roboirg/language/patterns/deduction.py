@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from roboirg.core.goal_slots import SlotTypeName
@@ -23,20 +23,24 @@ class Deduction(NamedTuple):
     references: tuple[int, ...]
 
 
-def deductions(results: Sequence[int], choices: Sequence[Sequence[int]]) -> list[Deduction]:
+def deductions(
+    results: Sequence[int], choices: Sequence[Sequence[int]], unspelled: Collection[str] = ()
+) -> list[Deduction]:
     """Return the relations that give all of these results, each from a quantity of its own.
 
     Args:
         results: the goal's numbers.
         choices: all results that are possible in the scene. A relation that can give only one
             of them would give the result away.
+        unspelled: names of relations whose words do not contain the number that they spell.
     """
     found: list[Deduction] = []
     for relation in derivations.RELATIONS:
         references = tuple(_reference(relation, result) for result in results)
         if any(reference is None for reference in references):
             continue
-        if relation.spells in results or not _open(relation, choices):
+        is_spelled = relation.spells in results and relation.name not in unspelled
+        if is_spelled or not _open(relation, choices):
             continue
         found.append(Deduction(relation, tuple(one for one in references if one is not None)))
     return found

@@ -10,13 +10,15 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from roboirg.core.errors import check_names
-from roboirg.language.grounded import Clue
+from roboirg.core.goal_slots import COLOR_SLOTS
+from roboirg.language.grounded import LEFT, Clue
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.places import USUAL, SpokenPlace, spoken_places
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.rivals.balanced_rivals import balanced_rival
 from roboirg.language.rivals.pair_draw import draw_order
 from roboirg.language.rivals.value_pair import rival_pairs
+from roboirg.language.scenarios.amounts import hidden_fields
 from roboirg.language.scenarios.derived import derivations_of
 from roboirg.language.scenarios.introduced import (
     Introduced,
@@ -33,8 +35,8 @@ from roboirg.language.settings import all_settings
 from roboirg.language.settings.grounded import clues_of
 from roboirg.language.settings.reasoning import in_turn
 
-_DESCRIBED = ("place", "clue", "aside", "rest")
-"""Slots for a thing that is described; a scenario fits the things that have those that it names."""
+_DESCRIBED = ("place", "clue", "aside", "rest", "kept")
+"""Slots for what is described; a scenario fits the things that have those that it names."""
 _ANY = "any"
 """The form of a place that is said after a noun, as a spot where there is one."""
 
@@ -73,7 +75,7 @@ def choose(
     else:
         ways = offers
     for offer in ways(request):
-        saying = [scenario for scenario in fitting if _says(scenario, offer)]
+        saying = [scenario for scenario in fitting if _says(scenario, offer, request)]
         if saying:
             sayable.append(_Sayable(offer, saying))
     if not sayable:
@@ -126,10 +128,13 @@ def _fits(scenario: Scenario, request: InstructionRequest) -> bool:
     return not scenario.fields.list or bool(_lengths(request, scenario))
 
 
-def _says(scenario: Scenario, offer: Offer) -> bool:
+def _says(scenario: Scenario, offer: Offer, request: InstructionRequest) -> bool:
     """Return whether a scenario points back in exactly the fields of an offer, by its way."""
     derive, notes = scenario.fields.derive, offer.notes
-    if set(scenario.said) != set(offer.fields) or offer.listed not in (None, scenario.fields.list):
+    hidden: set[str] = set()
+    for name in scenario.said:
+        hidden.update(hidden_fields(scenario.text(f"say.{name}"), request.fields_in(name)))
+    if hidden != set(offer.fields) or offer.listed not in (None, scenario.fields.list):
         return False
     if derive is not None:
         relations = (None, *derive.relations)
@@ -181,26 +186,36 @@ def _direct(request: InstructionRequest) -> Iterator[Offer]:
 
 
 def _spatial(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield a spot of a thing of the goal; if none has any, a place after a noun."""
+    """Yield a spot of a thing of the goal; if none has any, a place after a noun.
+
+    Of amounts both, where there are both: a thing stands for its color.
+    """
     colors = request.color_values
-    form: str | None = "spot"
-    drawn = _drawn_places(request, form)
-    if not drawn:
-        form = None
+    for form in ("spot", None):
         drawn = _drawn_places(request, form)
-    if not drawn:
-        return
-    # Of two things only that with the shorter words has a place.
-    at, place = min(drawn.items(), key=lambda item: len(item[1].said(form)))
-    words = place.said(form)
-    value = (IntroducedValue(colors[at].slot, "place", colors[at].value, words, form),)
-    notes: dict[str, object] = {
-        "landmarks": [words],
-        "landmark_classes": [int(place.kind)],
-        "frame": request.frame,
-    }
-    fields = [color.field for color in colors]
-    yield Offer(fields, {"place": value, f"place.{at}": value}, notes)
+        if not drawn:
+            continue
+        # Of two things only that with the shorter words has a place.
+        at, place = min(drawn.items(), key=lambda item: len(item[1].said(form)))
+        words = place.said(form)
+        value = (IntroducedValue(colors[at].slot, "place", colors[at].value, words, form),)
+        notes: dict[str, object] = {
+            "landmarks": [words],
+            "landmark_classes": [int(place.kind)],
+            "frame": request.frame,
+        }
+        fields = [color.field for color in colors]
+        offer = Offer(fields, {"place": value, f"place.{at}": value}, notes)
+        if not request.values_of("amount"):
+            yield offer
+            return
+        yield _with_others_stated(request, colors[at], offer)
+
+
+def _with_others_stated(request: InstructionRequest, thing: GoalValue, offer: Offer) -> Offer:
+    """Return an offer for amounts, of which only one color is found out: the first one."""
+    values = goal_values(request, request.color_values.index(thing))
+    return offer._replace(fields=["colors.0"], values={**values, **offer.values})
 
 
 def _drawn_places(request: InstructionRequest, form: str | None) -> dict[int, SpokenPlace]:
@@ -230,7 +245,13 @@ def _grounded(request: InstructionRequest) -> Iterator[Offer]:
     thing, clue = min(clues.items(), key=lambda item: len(item[1].words))
     fields = {value.field for value in (*clues, *request.values_in(thing.slot))}
     notes = {"touched": [thing.slot], "pattern": clue.kind, "patterns": [clue.kind]}
-    yield Offer(fields, _seen(thing, clue), notes)
+    offer = Offer(fields, _seen(thing, clue), notes)
+    if thing.slot == "counts":
+        kept = (IntroducedValue(REFERENCE, "number", LEFT),)
+        offer = Offer(["colors.0", "counts.0"], {"kept": kept}, notes)
+    elif request.values_of("amount"):
+        offer = _with_others_stated(request, thing, offer)
+    yield offer
 
 
 def _seen(thing: GoalValue, clue: Clue) -> Values:
@@ -251,6 +272,8 @@ def _rival(request: InstructionRequest) -> Iterator[Offer]:
     pair = balanced_rival(request, rival_pairs(request))
     order = draw_order(request)
     fields = [value.field for value in pair if pair.ordered or value is pair.meant]
+    if pair.slot == "counts":
+        fields.append("colors.0")  # the only one, at which the words for them point, too
     rival = IntroducedValue(pair.rival.slot, pair.meant.slot_type, pair.rival.value)
     both = (named(pair.meant), rival) if order.meant_first else (rival, named(pair.meant))
     aimed = "former" if order.meant_first == order.points_at_meant else "latter"
@@ -280,7 +303,7 @@ def rival_values(request: InstructionRequest, introduced: Introduced) -> Iterato
     said += [value.value for value in request.goal_values]
     for slot, kind in {value.slot: value.slot_type for value in request.goal_values}.items():
         others: Sequence[str | int] = request.task.commands.colors
-        if kind != "color":
+        if slot not in COLOR_SLOTS:
             others = _others(request, slot)
         for other in others:
             if other not in said:

@@ -93,7 +93,9 @@ def pointed_term(pointer: Pointer, said: SaidValues) -> Term:
         members = said.listed("list")
         return Term("other", members, _taken_rank(members, said))
     if operation == "without" or slot == "rest":
-        return Term("without", said.listed("excluded") or said.listed("aside"))
+        return Term(
+            "without", said.listed("excluded") or said.listed("aside") or said.listed("kept")
+        )
     if operation == "double" or operation == "half":  # noqa: PLR1714 - the type checker narrows it
         return Term(operation, said.operands(slot))
     operands = said.operands(slot)

@@ -6,7 +6,7 @@ The rules are those of `roboirg.language.patterns`; here they give values instea
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.patterns.deduction import deductions
@@ -39,11 +39,18 @@ def derivations_of(request: InstructionRequest) -> Iterator[Offer]:
 
 
 def _deduced(request: InstructionRequest) -> Iterator[Offer]:
-    for value in request.values_of("number"):
-        choices = request.alternative_numbers(value.slot)
-        for relation, (reference,) in deductions([value.number], choices):
-            values = _counted(value, reference, relation.offset)
-            yield _derived("number deduction", [value.field], values, relation.name)
+    """Yield the number as it follows from another one; counts all by one relation."""
+    numbers = request.values_of("number") or request.values_in("counts")
+    if not numbers:
+        return
+    slot, kind = numbers[0].slot, numbers[0].slot_type
+    fields = [value.field for value in request.values_of(kind)]
+    results, choices = [number.number for number in numbers], request.alternative_numbers(slot)
+    # Words for amounts need not name the number: "and Leo wants the same".
+    unspelled = ["twice"] if kind == "amount" else []
+    for relation, references in deductions(results, choices, unspelled):
+        values = _counted(numbers[0], references, relation.offset)
+        yield _derived("number deduction", fields, values, relation.name)
 
 
 def _stepped(
@@ -55,19 +62,20 @@ def _stepped(
     length = series_length(request, value)
     choices = [number for (number,) in request.alternative_numbers(value.slot)]
     for step in open_steps(known, value.number, length, choices):
-        values = _counted(value, value.number - step.offset, step.offset)
+        values = _counted(value, [value.number - step.offset], step.offset)
         yield _derived(pattern, [value.field], values, step.name)
 
 
-def _counted(value: GoalValue, reference: int, offset: int) -> Values:
-    """Return a reference, and the step from there to the goal, without its direction."""
+def _counted(value: GoalValue, references: Sequence[int], offset: int) -> Values:
+    """Return references, and the step from there to the goal, without its direction."""
     step = {"step": (IntroducedValue("", "number", abs(offset)),)} if offset else {}
-    return {"reference": (IntroducedValue(REFERENCE, value.slot_type, reference),), **step}
+    known = [IntroducedValue(REFERENCE, value.slot_type, number) for number in references]
+    return {**several("reference", known), **step}
 
 
 def _colored(request: InstructionRequest) -> Iterator[Offer]:
     """Yield the color that is left without others; of two colors that one is the other one."""
-    colors = request.values_of("color")
+    colors = request.color_values
     if len(colors) == 1:
         excluded = [IntroducedValue(REFERENCE, "color", one) for one in excluded_colors(request)]
         yield _derived("color exclusion", [colors[0].field], several("excluded", excluded))

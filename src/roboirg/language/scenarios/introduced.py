@@ -124,12 +124,21 @@ def named(value: GoalValue) -> IntroducedValue:
     return IntroducedValue(value.slot, value.slot_type, value.value)
 
 
-def goal_values(request: InstructionRequest) -> Values:
-    """Return the values of the goal by field, and all of a slot with several by its name."""
+def goal_values(request: InstructionRequest, first: int = 0) -> Values:
+    """Return the values of the goal by field, and all of a slot with several by its name.
+
+    Amounts have no order: that with the number `first` gets the fields of the first one. Words that
+    point back at them stand for their colors.
+    """
     values: dict[str, tuple[IntroducedValue, ...]] = {}
     for value in request.goal_values:
         values[value.slot] = tuple(map(named, request.values_in(value.slot)))
         values[value.field] = (named(value),)
+    if request.values_of("amount"):
+        for slot in ("colors", "counts"):
+            found = [*values[slot]]
+            values |= several(slot, [found.pop(first), *found])
+        values["amounts"] = values["colors"]
     return values
 
 

@@ -15,6 +15,8 @@ from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.core.word_pools import POOLS, PoolName
 from roboirg.language.phrases import TaggedText
+from roboirg.language.request import AMOUNT_FIELD
+from roboirg.language.scenarios.amounts import SLOTS
 from roboirg.language.scenarios.literals import Literals, read_literals
 from roboirg.language.scenarios.markup import Pointer, Text, parse, slots_in
 from roboirg.language.scenarios.scenario import (
@@ -40,7 +42,7 @@ PRONOUNS = {"he": ("he", "him", "his", "his"), "she": ("she", "her", "her", "her
 GIVEN = frozenset(
     {"list", "list.0", "list.1", "list.2", "rank", "reference", "step", "taken"}
     | {"place", "place.0", "place.1", "clue", "clue.0", "clue.1", "aside.0", "aside.1", "rest"}
-    | {"total", "excluded", "excluded.0", "excluded.1"}
+    | {"kept", "excluded", "excluded.0", "excluded.1"}
     | PEOPLE
 )
 """Slots that are no fields of the goal."""
@@ -309,6 +311,8 @@ def _unmet(
 
 def _slots(stated: Collection[str]) -> set[str]:
     """Return the slots of a task, and its fields: ``colors`` and ``colors.0``."""
+    if AMOUNT_FIELD in stated:
+        return {*SLOTS, *stated}
     return {*stated, *(name.partition(".")[0] for name in stated)}
 
 

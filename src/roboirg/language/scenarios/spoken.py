@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import NamedTuple, cast
 
@@ -17,18 +17,26 @@ from roboirg.language.phrases import (
     anaphor,
     antecedent,
     fill,
+    listed,
     plain,
     swap_particles,
     words_of,
 )
-from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
-from roboirg.language.scenarios.choice import Chosen, choose, rival_values
-from roboirg.language.scenarios.declared import (
-    ChoosingRemark,
-    SaidValues,
-    chosen_term,
-    pointed_term,
+from roboirg.language.request import (
+    AMOUNT_FIELD,
+    InstructionRequest,
+    InstructionSpec,
+    UtteranceSpec,
 )
+from roboirg.language.scenarios.amounts import (
+    NUMBERS,
+    amount_text,
+    field_term,
+    hidden_fields,
+    stated_counts,
+)
+from roboirg.language.scenarios.choice import Chosen, choose, rival_values
+from roboirg.language.scenarios.declared import ChoosingRemark, SaidValues
 from roboirg.language.scenarios.introduced import Introduced, goal_values
 from roboirg.language.scenarios.markup import (
     Agreement,
@@ -164,7 +172,7 @@ def say_chosen(
     fields = {name: speech.field(name, text, remark) for name, text in said.items()}
     command = speech.command(fields, before)
     utterances.append(UtteranceSpec("command", command))
-    return InstructionSpec(tuple(utterances), notes, speech.meaning(pointing=fields.keys()))
+    return InstructionSpec(tuple(utterances), notes, speech.meaning())
 
 
 def _lead(request: InstructionRequest, chosen: Chosen) -> tuple[Text, ChoosingRemark | None]:
@@ -214,6 +222,7 @@ class Speech:
         self._scenario = scenario
         self._said = SaidValues(request.frame)
         self._terms: dict[str, Term] = {}
+        self._hidden: set[str] = set()
 
     def phrase(
         self, text: Text, introduced: Introduced | None = None, *, resolved: bool = False
@@ -225,8 +234,7 @@ class Speech:
             if isinstance(part, TaggedText):
                 pieces.append(part)
             elif isinstance(part, Slot):
-                pieces.extend(values.phrase(part))
-                self._said.add(part.name, values.values[part.name])
+                pieces.extend(self._slot(part, values))
             elif isinstance(part, Agreement):
                 words = part.one if values.count(part.controller) == 1 else part.many
                 pieces.append(TaggedText(words))
@@ -235,6 +243,14 @@ class Speech:
             else:
                 pieces.extend(self._named(part) if resolved else self._pointing(part))
         return tuple(piece for piece in pieces if piece.text)
+
+    def _slot(self, slot: Slot, values: Introduced) -> Phrase:
+        """Return the words for a slot; amounts are said color by color."""
+        if slot.name in ("amounts", "reference") and "amounts" in values.values:
+            numbers, colors = NUMBERS[slot.name], range(len(values.values["colors"]))
+            return listed([self.phrase(amount_text(numbers, at), values) for at in colors])
+        self._said.add(slot.name, values.values[slot.name])
+        return values.phrase(slot)
 
     def _pointing(self, pointer: Pointer) -> Phrase:
         """Return words that point back."""
@@ -269,20 +285,19 @@ class Speech:
             usual = self._words.stated[name] if states else words
             words = scenario.texts.get(f"resolved.{name}", (usual,))[0]
         phrase = self.phrase(words, resolved=self._request.resolved)
-        pointers = list(pointers_in(words))
-        if remark and pointers:
-            self._terms[name] = chosen_term(pointers[-1], remark, self._said)
-        elif pointers:
-            self._terms[name] = pointed_term(pointers[-1], self._said)
-        else:
-            self._terms[name] = Term("same", self._said.operands(name))
-        return phrase
+        fields = self._request.fields_in(name)
+        unsaid = range(stated_counts(words) or len(fields), len(fields) // 2)
+        others = [self.phrase(amount_text("counts", at)) for at in unsaid]
+        self._hidden.update(hidden_fields(words, fields))
+        for field in fields:
+            self._terms[field] = field_term(field, words, remark, self._said)
+        return listed([phrase, *others])
 
-    def meaning(self, pointing: Collection[str] = ()) -> Meaning:
+    def meaning(self) -> Meaning:
         """Return what has been said, of which some fields point back at what came before."""
         settled = set(self._terms)
         if not self._request.resolved:
-            settled -= set(pointing)
+            settled -= self._hidden
         return Meaning(dict(self._terms), frozenset(settled))
 
     def command(self, fields: Mapping[str, Phrase], lead: Phrase) -> Phrase:
@@ -296,6 +311,8 @@ class Speech:
 
     def _skeleton(self, fields: Mapping[str, Phrase]) -> Phrase:
         wanted = {value.field for value in self._request.goal_values}
+        if self._request.values_of("amount"):
+            wanted = {AMOUNT_FIELD}
         commands = self._words.commands[self._request.pool]
         possible = [command for command in commands if wanted == {*slots_in(parse(command))}]
         if not possible:

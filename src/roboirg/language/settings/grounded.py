@@ -10,10 +10,12 @@ from collections.abc import Mapping, Sequence
 
 from roboirg.core.episode import Goal, values_in
 from roboirg.core.goal_slots import COLOR_SLOTS
+from roboirg.core.instruction_options import DEFAULT_LANGUAGE
 from roboirg.language.grounded import (
     Clue,
     amount_clues,
     draw_clue,
+    late,
     placement_clues,
     repeat_clues,
     spoken_clues,
@@ -46,7 +48,12 @@ Clues = Mapping[GoalValue, Clue]
 
 def refusal(request: InstructionRequest) -> str | None:
     """Return why nothing in an episode can be described by what is seen; None if something can."""
-    return None if clues_of(request) else "nothing to see in this scene singles out a slot's value"
+    is_new = request.options.language != DEFAULT_LANGUAGE
+    # Of amounts each language says what it can; the others refuse the same scenes in both.
+    spoken = is_new and bool(request.values_of("amount"))
+    if clues_of(request, spoken=spoken):
+        return None
+    return "nothing to see in this scene singles out a slot's value"
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
@@ -90,8 +97,8 @@ def clues_of(request: InstructionRequest, *, spoken: bool = False) -> Clues:
         if clue is not None:
             found[value] = clue
     colors = request.color_values
-    some_lack = not spoken and any(one not in found for one in colors)
-    if len(colors) > MOST_COLORS or some_lack:
+    some_lack = any(one not in found for one in colors)
+    if not spoken and (len(colors) > MOST_COLORS or some_lack):
         # The words describe all colors of the goal, or none; those of language 4 only one.
         found = {value: clue for value, clue in found.items() if value not in colors}
     if any(one.slot == "colors" for one in found):
@@ -127,6 +134,8 @@ def _clues_to(request: InstructionRequest, value: GoalValue, *, spoken: bool) ->
 
 def _spoken_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
     """Return the clues of language 4 to the things of a color."""
+    if request.values_of("amount") and late(request.episode.scene):
+        return []  # another cube may be meant when it is there
     targets = request.objects_to_point_at(color)
     known = spoken_clues(request.episode.scene, request.task)
     return [found.clue for found in known if found.thing in targets]

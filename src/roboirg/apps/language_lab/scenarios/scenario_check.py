@@ -236,14 +236,14 @@ def _broken(request: InstructionRequest, chosen: Chosen, told: Instruction) -> I
     if meaning is None:
         yield "declares no meaning"
         return
-    for value in request.goal_values:
-        found = field_values(meaning, value.field, episode)
-        if found != {value.value}:
-            words = " or ".join(sorted(map(str, found))) or "nothing"
-            yield f"say.{value.field}: means {words}, but the goal is {value.value}"
     goals = meant_goals(meaning, episode)
     if not goals or not all(is_right(goal, episode) for goal in goals):
         yield "means another goal, or several"
+        for value in request.goal_values:
+            found = field_values(meaning, value.field, episode)
+            if found != {value.value}:
+                words = " or ".join(sorted(map(str, found))) or "nothing"
+                yield f"say.{value.field}: means {words}, but the goal is {value.value}"
     for _, words in leaking(told, episode):
         yield f"the command gives away {words}"
     yield from _broken_pointers(told, chosen.scenario)

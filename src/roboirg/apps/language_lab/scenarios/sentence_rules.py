@@ -67,6 +67,8 @@ _SILENT = ("distractors", "cue")
 _COMMAND = ("lead", "say", "remarks")
 """Fields of the command, which may point back only."""
 _FREE_SLOTS = PEOPLE | {"rank", "step"}
+_COUNTS = {"counts.0", "counts.1"}
+"""Slots that a command may state next to words that point back."""
 _POINTED_AT = {
     "remarks.former": "list.0", "remarks.latter": "list.1",
     "remarks.not_former": "list.0", "remarks.not_latter": "list.1",
@@ -107,6 +109,8 @@ def _wrong(name: str, text: Text, never: Mapping[str, str]) -> Iterator[str]:
             yield f"names {', '.join(sorted(values))}, which could be a value"
     if field not in ("introduction", "competing", "resolved"):
         said = {part.name for part in text if isinstance(part, Slot)} - _FREE_SLOTS
+        if field == "say":
+            said -= _COUNTS
         if said:
             yield f"says {{{', '.join(sorted(said))}}}; a value may only be pointed at there"
     if field == "distractors" and pointers:
@@ -133,7 +137,7 @@ def literal(text: Text) -> str:
         if isinstance(part, Pointer):
             words.append(literal(part.parts))
         elif isinstance(part, Agreement):
-            words.append(f"{part.one} {part.many}")
+            words.append(" ".join(filter(None, (part.one, part.many))))
         elif isinstance(part, Slot):
             words.append(f"{{{part.name}:{part.form}}}")
         else:

@@ -45,7 +45,9 @@ GRAMMAR: Patterns = {
     rf"(?:\b{_PERSON} and {_PERSON}|\b{_VALUE} and {_VALUE}(?: \w+s)?"
     rf"|(?<!of )\b(?i:they|we|both)) (?:{_SINGULAR})\b": "several take a plural",
     r"(?<!\bof )\b(?i:he|she|it) (?:are|aren't|don't|haven't)\b": "one takes a singular",
-    rf"\b({_VALUE}|{_PERSON})(?<! one)(?: \w+)? (?:and|or) (?:then )?(?:the )?\1\b": "it is named twice",
+    rf"\b({_VALUE}|{_PERSON})(?<! one)(?: \w+)? (?:and|or) (?:then )?(?:the )?\1\b": (
+        "it is named twice"
+    ),
     rf"\b(?:{'|'.join(CARDINALS[2:])}|(?i:these|those))"
     r" (?:time|cube|container|lap|pass|visit|person|kid)\b": "several take a plural",
     r"\b(?:once|twice) times?\b": "it is a number already",
