@@ -100,13 +100,13 @@ def test_a_goal_without_its_sentence_is_refused_in_explicit_only(language):
 
 
 def test_a_task_without_words_of_ours_can_have_sentences_in_language_4():
-    slots = 'when = { colors = ["red"], counts = [2] }'
-    text = f'name = "a"\ntasks = ["BinFill"]\n[[literal]]\ntask = "BinFill"\n{slots}\ntext = "go"'
+    slots = 'when = { repeats = 2 }'
+    text = f'name = "a"\ntasks = ["VideoRepick"]\n[[literal]]\ntask = "VideoRepick"\n{slots}\ntext = "go"'
     identity = opened(text)
-    goal = next(iter(find_wordings(identity).tasks["BinFill"].literals))
-    episode = replace(episode_with("BinFill"), goal=goal)
+    goal = next(iter(find_wordings(identity).tasks["VideoRepick"].literals))
+    episode = replace(episode_with("VideoRepick"), goal=goal)
     assert instruct(episode, wordings=identity, language=4).text == "go"
-    with pytest.raises(InvalidValueError, match="language 4 has no scenarios of BinFill yet"):
+    with pytest.raises(InvalidValueError, match="language 4 has no scenarios of VideoRepick yet"):
         instruct(episode, "direct", wordings=identity, language=4)
 
 
