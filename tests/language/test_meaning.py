@@ -209,3 +209,26 @@ def test_a_fault_in_operations_pointers_places_or_clues_is_found(fault, monkeypa
     FAULTS[fault](monkeypatch)
     texts = itertools.chain.from_iterable(said_of(task, 4) for task in WRITTEN)
     assert any(not is_goal_alone(understood_goals(said, one), one) for one, _, said in texts)
+
+
+def test_amounts_have_no_order_and_them_may_be_of_any_number_of_colors():
+    episode = next(one for one in scenes_of("BinFill", 0) if len(one.goal["colors"]) == 2)
+    (first, one), (second, other) = episode.goal.amounts
+    values = {"colors.0": second, "counts.0": other, "colors.1": first, "counts.1": one}
+    terms = {field: Term("same", (value,)) for field, value in values.items()}
+    assert meaning.meant_goals(Meaning(terms), episode) == (episode.goal,)
+    assert meaning.command_goals(Meaning(terms), episode) == goals_of(episode)
+    stated = Meaning(terms, frozenset({"counts.0", "colors.1", "counts.1"}))
+    left = [dict(goal.amounts) for goal in meaning.command_goals(stated, episode)]
+    assert dict(episode.goal.amounts) in left
+    assert all(len(amounts) == 2 and amounts[first] == one for amounts in left)
+
+
+def test_the_rest_is_all_cubes_but_those_that_are_kept():
+    kept = 0
+    for episode, options, said in said_of("BinFill", 1):
+        if options.setting == "grounded" and said.meaning.terms["counts.0"].operation == "without":
+            cubes = candidates_in(episode.scene, "cube")
+            assert episode.goal["counts"] == (len(cubes) - 3,), said.text
+            kept += 1
+    assert kept

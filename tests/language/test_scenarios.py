@@ -19,6 +19,7 @@ from roboirg.core.word_pools import POOLS
 from roboirg.language import instruct, instruct_with
 from roboirg.language.arms import say_arm
 from roboirg.language.generator import find_refusal, request_of, spoken_instruction
+from roboirg.language.number_words import cardinal
 from roboirg.language.scenarios.choice import choose
 from roboirg.language.scenarios.scenario_file import (
     FOLDER,
@@ -295,6 +296,35 @@ def test_of_two_containers_only_one_has_to_be_found_out(name):
         assert len(named) == sum(counts)
         assert not re.search("red|green|blue", said.turns[-1])
     assert found
+
+
+@pytest.mark.parametrize("name", ["spatial", "grounded"])
+def test_of_several_amounts_one_color_has_to_be_found_out_and_the_others_are_stated(name):
+    hidden = defaultdict(set)
+    for index, pool in itertools.product(range(120), POOLS):
+        episode = get_episode("BinFill", "random", index)
+        options = InstructionOptions(name, language=4, wordings=pool)
+        if len(episode.goal["colors"]) < 2 or find_refusal(episode, options) is not None:
+            continue
+        said = instruct_with(episode, options)
+        named = re.findall(r"(\w+) (red|green|blue) cube", said.turns[1])
+        stated = {(color, cardinal(count)) for color, count in episode.goal.amounts}
+        assert {(color, count) for count, color in named} < stated, said.text
+        assert len(named) == len(stated) - 1
+        assert said.metadata["hidden_slots"] == 1
+        (color,) = set(episode.goal["colors"]) - {color for _, color in named}
+        hidden[len(stated)].add(episode.goal["colors"].index(color))
+    # That it is found out says nothing about its place among the goal's colors.
+    assert hidden == {2: {0, 1}, 3: {0, 1, 2}}
+
+
+def test_all_amounts_are_said_in_one_phrase_each_count_and_color_a_mention():
+    scenes = scenes_of("BinFill", 0)
+    episode = next(one for one in scenes if len(one.goal["colors"]) == 3)
+    said = instruct(episode, language=4)
+    assert re.search(r"\w+ red cubes?, \w+ blue ones? and \w+ green ones? ", said.text)
+    values = [mention.value for mention in said.mentions]
+    assert values == [value for color, count in episode.goal.amounts for value in (count, color)]
 
 
 def test_a_clue_that_sets_two_things_aside_has_a_sentence_for_them():

@@ -100,7 +100,7 @@ def test_a_goal_without_its_sentence_is_refused_in_explicit_only(language):
 
 
 def test_a_task_without_words_of_ours_can_have_sentences_in_language_4():
-    slots = 'when = { repeats = 2 }'
+    slots = "when = { repeats = 2 }"
     text = f'name = "a"\ntasks = ["VideoRepick"]\n[[literal]]\ntask = "VideoRepick"\n{slots}\ntext = "go"'
     identity = opened(text)
     goal = next(iter(find_wordings(identity).tasks["VideoRepick"].literals))

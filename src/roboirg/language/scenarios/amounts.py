@@ -20,14 +20,20 @@ from roboirg.language.scenarios.declared import (
 from roboirg.language.scenarios.markup import Text, parse, pointers_in, slots_said
 
 NUMBERS: Mapping[str, str] = {"amounts": "counts", "reference": "reference", "kept": "kept"}
-"""Slots for numbers of things in their colors, with the slot of the numbers."""
+"""What words point back at that has numbers of things in their colors, with the slot of these."""
 SLOTS = frozenset({"amounts", "colors", "colors.0", "colors.1", "counts", "counts.0", "counts.1"})
 """Slots of a task whose goals are amounts."""
+_NOUNS = ("cube", "one", "one")
+"""Of up to three colors that are listed."""
 
 
-def amount_text(numbers: str, at: int) -> Text:
-    """Return a color with its number, to be filled: *two red cubes*, or *ones* after the first."""
-    noun = "one" if at else "cube"
+def amount_texts(numbers: str, size: int) -> list[Text]:
+    """Return the text for each of some colors in a list: *two red cubes*, *one blue one*."""
+    return [amount_text(numbers, at, _NOUNS[at]) for at in range(size)]
+
+
+def amount_text(numbers: str, at: int, noun: str = "cube") -> Text:
+    """Return a color with its number and a noun, to be filled: *two red cubes*."""
     number = f"{numbers}.{at}"
     return parse(f"{{{number}}} {{colors.{at}}} [{number}: {noun}|{noun}s]")
 
@@ -44,13 +50,18 @@ def hidden_fields(words: Text, fields: Sequence[str]) -> Sequence[str]:
     return [f"colors.{at}" for at in range(stated_counts(words))] or fields
 
 
-def field_term(field: str, words: Text, remark: ChoosingRemark | None, said: SaidValues) -> Term:
-    """Return the term of a field; a remark, if there is one, has chosen what words point at."""
+def hidden_term(field: str, words: Text, remark: ChoosingRemark | None, said: SaidValues) -> Term:
+    """Return the term of a field that words leave to their context.
+
+    Args:
+        field: of the goal.
+        words: for the field of the command that holds it.
+        remark: what has chosen the value that they point at, if anything has.
+        said: what was said before.
+    """
     base, _, number = field.partition(".")
-    if field not in hidden_fields(words, [field]):
-        return Term("same", said.operands(field))
     at = int(number) if stated_counts(words) else -1
-    pointer = [*pointers_in(words)][at]
+    pointer = list(pointers_in(words))[at]
     numbers = NUMBERS.get(pointer.of)
     if numbers and base == "colors":
         return Term("same", said.operands(field))

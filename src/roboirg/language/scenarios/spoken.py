@@ -31,8 +31,9 @@ from roboirg.language.request import (
 from roboirg.language.scenarios.amounts import (
     NUMBERS,
     amount_text,
-    field_term,
+    amount_texts,
     hidden_fields,
+    hidden_term,
     stated_counts,
 )
 from roboirg.language.scenarios.choice import Chosen, choose, rival_values
@@ -247,8 +248,8 @@ class Speech:
     def _slot(self, slot: Slot, values: Introduced) -> Phrase:
         """Return the words for a slot; amounts are said color by color."""
         if slot.name in ("amounts", "reference") and "amounts" in values.values:
-            numbers, colors = NUMBERS[slot.name], range(len(values.values["colors"]))
-            return listed([self.phrase(amount_text(numbers, at), values) for at in colors])
+            texts = amount_texts(NUMBERS[slot.name], len(values.values["colors"]))
+            return listed([self.phrase(text, values) for text in texts])
         self._said.add(slot.name, values.values[slot.name])
         return values.phrase(slot)
 
@@ -286,11 +287,16 @@ class Speech:
             words = scenario.texts.get(f"resolved.{name}", (usual,))[0]
         phrase = self.phrase(words, resolved=self._request.resolved)
         fields = self._request.fields_in(name)
-        unsaid = range(stated_counts(words) or len(fields), len(fields) // 2)
-        others = [self.phrase(amount_text("counts", at)) for at in unsaid]
-        self._hidden.update(hidden_fields(words, fields))
+        # The colors that the words leave out are stated after them.
+        left_out = range(stated_counts(words) or len(fields), len(fields) // 2)
+        others = [self.phrase(amount_text("counts", at)) for at in left_out]
+        hidden = hidden_fields(words, fields)
+        self._hidden.update(hidden)
         for field in fields:
-            self._terms[field] = field_term(field, words, remark, self._said)
+            term = Term("same", self._said.operands(field))
+            if field in hidden:
+                term = hidden_term(field, words, remark, self._said)
+            self._terms[field] = term
         return listed([phrase, *others])
 
     def meaning(self) -> Meaning:

@@ -138,7 +138,11 @@ def _spoken_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
         return []  # another cube may be meant when it is there
     targets = request.objects_to_point_at(color)
     known = spoken_clues(request.episode.scene, request.task)
-    return [found.clue for found in known if found.thing in targets]
+    clues = [found.clue for found in known if found.thing in targets]
+    if request.values_of("amount"):
+        # Of several things of a color, one with simple words stands for all.
+        clues = [clue for clue in clues if clue.kind != "bridging"] or clues
+    return clues
 
 
 _SOUGHT = {
