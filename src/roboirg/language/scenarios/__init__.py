@@ -16,6 +16,7 @@ other ``.toml``  commands and scenarios of the tasks that name the file as their
 ``scenario``     the fields of the files; ``scenario_file`` reads and checks them
 ``derived``      how the goal of an episode can follow from something else
 ``choice``       what is said: derivation, then scenario
+``amounts``      the fields of the goal that a scenario leaves open, and what they follow from
 ``introduced``   the values that the words name
 ``spoken``       the words
 ``identity``     which words they are, by a digest
