@@ -553,3 +553,32 @@ def test_a_person_stands_for_what_he_or_she_wants():
     (report,) = check_scenarios(words, None, scenes_of("PickXtimes", 0)[::7])
     assert not report.broken
     assert any(re.search(r" (?:his|hers): ", one) for one in report.renderings)
+
+
+def test_where_no_container_moves_none_is_followed():
+    moved = r"follow|keep(?:ing)? (?:up|track)|los(?:es?|t|ing) track|shell game"
+    for scenario in task_scenarios("ButtonUnmask").scenarios:
+        texts = itertools.chain.from_iterable(scenario.texts.values())
+        assert not re.search(moved, " ".join(map(literal, texts))), scenario.fields.frame
+
+
+ELSEWHERE = r"last|year|yesterday|home|at work|used to|his|her\b|their|old"
+"""Words of a cube that is not on the table."""
+
+
+@pytest.mark.parametrize("task", ["PickXtimes", "SwingXtimes", "VideoUnmask", "ButtonUnmaskSwap"])
+def test_a_competing_cube_is_elsewhere_and_not_that_of_the_cue(task):
+    """After *It's nicer than my green one*, *that cube* is the green one on the table."""
+    for scenario in task_scenarios(task).scenarios:
+        told = [literal(text) for text in scenario.texts.get("competing", ())]
+        rivals = [text for text in told if "{rival color" in text]
+        assert all(re.search(ELSEWHERE, text, re.IGNORECASE) for text in rivals), rivals
+        assert not rivals or "that cube" not in literal(scenario.text("cue"))
+
+
+def test_the_one_i_mentioned_is_the_one_that_was_mentioned_there():
+    """A competing remark mentions another one, but not there."""
+    for scenario in itertools.chain.from_iterable(map(scenarios_of, POOLS)):
+        for texts in (scenario.texts.get(f"say.{name}", ()) for name in ("color", "colors.0")):
+            said = " ".join(map(literal, texts))
+            assert "I mentioned" not in said or re.search("I mentioned (?:to|in) ", said), said
