@@ -166,7 +166,6 @@ def test_every_mistake_of_a_file_is_named_by_scenario_and_field():
         "'birthday', introduction has the slot 'colr'",
         "'birthday', reinforcement has the pointer <them color: it>",
         "'two' has no remarks.not_latter",
-        "'two' has no remarks.not_latter",
         "mine.toml has the frame 'two' twice in the setting direct-rival, test.",
     ]
     assert [line[: len(one)] for line, one in zip(named, begun, strict=True)] == begun

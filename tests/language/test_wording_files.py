@@ -184,10 +184,8 @@ def test_a_mistake_of_a_command_for_both_pools_is_named_once():
 def test_the_length_of_foreign_words_is_the_same_everywhere_and_a_bound_without_a_tokenizer(
     tmp_path, monkeypatch
 ):
-    file, text = (
-        tmp_path / "mine.toml",
-        f'{HEAD}[commands]\nall = ["Juggle {{color}} {{repeats}}."]',
-    )
+    file = tmp_path / "mine.toml"
+    text = f'{HEAD}[commands]\nall = ["Juggle {{color}} {{repeats}}."]'
     shown = ["show", "PickXtimes", "3", "--words", "--wordings", str(file), "--language", "4"]
     for has_tokenizer, bound in ((True, ""), (False, "at most ")):
         if not has_tokenizer:
@@ -208,7 +206,8 @@ def test_the_check_finds_a_setting_without_a_scenario_for_some_scenes(tmp_path):
     assert isinstance(checked.exception, RoboIRGError)
     assert re.search(
         r"BROKEN PickXtimes: spatial has no scenario that fits \d+ scenes, such as "
-        r"PickXtimes/(\w+)/(\d+) \(\w+, .*\); look at it with `roboirg show PickXtimes \2 --split \1`\.\n\n",
+        r"PickXtimes/(\w+)/(\d+) \(\w+, .*\); look at it with "
+        r"`roboirg show PickXtimes \2 --split \1`\.\n\n",
         checked.output,
     )
 
