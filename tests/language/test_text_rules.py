@@ -81,7 +81,7 @@ def broken(text, task="PickXtimes", step=20):
         ('say.color', 'lead = "So"\nsay.color', "lead: must end with a space: 'So'"),
         ('say.color', 'lead = "On the target on "\nsay.color', "must not follow 'on the target'"),
         ('say.color', 'resolved.color = "the {color} cube, ' + "it's so very nice, " * 9
-         + '"\nsay.color', "tokens; at most 64 are heard"),
+         + '"\nsay.color', "tokens; only 64 are heard"),
     ],
 )  # fmt: skip
 def test_wrong_grammar_is_named_with_its_words(before, after, rule):

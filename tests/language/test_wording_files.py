@@ -16,7 +16,7 @@ from roboirg import main as cli
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import POOLS
-from roboirg.language import FORMS, instruct, instruct_with, open_wordings
+from roboirg.language import FORMS, instruct, instruct_with, open_wordings, token_counts
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction_row import row
 from roboirg.language.scenarios.identity import words_digest, words_of
@@ -93,7 +93,9 @@ def test_a_whole_sentence_is_explicit_and_all_other_settings_say_ours(language):
 @pytest.mark.parametrize("language", [3, 4])
 def test_a_goal_without_its_sentence_is_refused_in_explicit_only(language):
     identity, episode = opened(LITERALS), episode_with("PickXtimes", color="green", repeats=2)
-    complaint = f"{identity} has no sentence of PickXtimes for the goal: green, twice"
+    complaint = (
+        f"{identity} has no sentence of PickXtimes for the goal: green, twice; leave explicit out"
+    )
     with pytest.raises(InvalidValueError, match=complaint):
         instruct(episode, wordings=identity, language=language)
     assert instruct(episode, "direct", wordings=identity, language=language).text
@@ -101,8 +103,8 @@ def test_a_goal_without_its_sentence_is_refused_in_explicit_only(language):
 
 def test_a_task_without_words_of_ours_can_have_sentences_in_language_4():
     slots = "when = { repeats = 2 }"
-    text = f'name = "a"\ntasks = ["VideoRepick"]\n[[literal]]\ntask = "VideoRepick"\n{slots}\ntext = "go"'
-    identity = opened(text)
+    head = 'name = "a"\ntasks = ["VideoRepick"]\n'
+    identity = opened(f'{head}[[literal]]\ntask = "VideoRepick"\n{slots}\ntext = "go"')
     goal = next(iter(find_wordings(identity).tasks["VideoRepick"].literals))
     episode = replace(episode_with("VideoRepick"), goal=goal)
     assert instruct(episode, wordings=identity, language=4).text == "go"
@@ -127,7 +129,7 @@ def test_a_sentence_means_each_goal_for_which_the_file_says_it(language):
 
 def test_the_words_of_the_page_are_checked_and_said(tmp_path):
     """Whoever follows the page sees what it promises."""
-    assert len(PAGE.split()) <= 900
+    assert len(PAGE.split()) <= 950
     file = tmp_path / "mine.toml"
     file.write_text(SPOKEN)
     checked = CliRunner().invoke(
@@ -149,15 +151,51 @@ def test_the_words_of_the_page_are_checked_and_said(tmp_path):
     assert told[shown.replace("\n", " ")] == "fresh paint"
 
 
-def test_the_check_lists_each_goal_without_a_sentence(tmp_path):
-    file = tmp_path / "theirs.toml"
-    file.write_text(WHOLE)
-    checked = CliRunner().invoke(cli.app, ["language", "check-scenarios", str(file)])
-    assert isinstance(checked.exception, RoboIRGError)
-    missing = re.findall(
-        "BROKEN the file has no sentence of StopCube .* visit (\\d)", checked.output
-    )
-    assert missing == ["3", "4", "5"]
+def check(file, text):
+    """Return what the check of a file prints."""
+    file.write_text(text)
+    return CliRunner().invoke(cli.app, ["language", "check-scenarios", str(file), "--seeds", "0"])
+
+
+def test_the_commands_of_the_page_state_every_goal_of_their_tasks(tmp_path):
+    rows = re.findall(r"\n\| ([A-Z]\w+)[^|]* \| (`[^|]+`) \|", PAGE)
+    assert [task for task, _ in rows] == ["SwingXtimes", "StopCube", "BinFill", "VideoUnmask"]
+    commands = [f"{task} = {re.findall('`(.*?)`', cell)}" for task, cell in rows]
+    head = f'name = "mine"\ntasks = {[task for task, _ in rows]}\n[commands]\n'
+    checked = check(tmp_path / "mine.toml", head + "\n".join(commands))
+    assert checked.exit_code == 0, checked.output
+    assert checked.output.count("explicit (") == len(rows)
+
+
+def test_goals_without_a_sentence_are_one_line_and_not_broken(tmp_path):
+    checked = check(tmp_path / "theirs.toml", WHOLE)
+    assert checked.exit_code == 0
+    assert "No sentence of 3 goals, such as on visit 3; episodes with them" in checked.output
+    never = WHOLE.replace("visit = 2", "visit = 77")
+    assert "BROKEN states no goal" in check(tmp_path / "theirs.toml", never).output
+
+
+def test_a_mistake_of_a_command_for_both_pools_is_named_once():
+    with pytest.raises(InvalidValueError) as caught:
+        parse_wordings(f"{HEAD}[commands]\nall = ['Très {{color}} {{repeats}}.']", "words.toml")
+    assert str(caught.value).count("printable ASCII") == 1
+
+
+def test_the_length_of_foreign_words_is_the_same_everywhere_and_a_bound_without_a_tokenizer(
+    tmp_path, monkeypatch
+):
+    file = tmp_path / "mine.toml"
+    text = f'{HEAD}[commands]\nall = ["Juggle {{color}} {{repeats}}."]'
+    shown = ["show", "PickXtimes", "3", "--words", "--wordings", str(file), "--language", "4"]
+    for has_tokenizer, bound in ((True, ""), (False, "at most ")):
+        if not has_tokenizer:
+            monkeypatch.setattr(token_counts, "_tokenizer", lambda: None)
+            token_counts.tokens_of.cache_clear()
+        longest = re.search(r"  (.*) of 64 tokens; states", check(file, text).output)[1]
+        assert re.fullmatch(rf"{bound}\d+", longest)
+        explicit = CliRunner().invoke(cli.app, [*shown, "--settings", "explicit"]).output
+        assert f"({longest} tokens)" in explicit
+    token_counts.tokens_of.cache_clear()
 
 
 def test_the_check_finds_a_setting_without_a_scenario_for_some_scenes(tmp_path):
@@ -167,7 +205,9 @@ def test_the_check_finds_a_setting_without_a_scenario_for_some_scenes(tmp_path):
     checked = CliRunner().invoke(cli.app, ["language", "check-scenarios", str(file)])
     assert isinstance(checked.exception, RoboIRGError)
     assert re.search(
-        r"BROKEN PickXtimes: spatial has no scenario that fits \d+ scenes, such as Pick",
+        r"BROKEN PickXtimes: spatial has no scenario that fits \d+ scenes, such as "
+        r"PickXtimes/(\w+)/(\d+) \(\w+, .*\); look at it with "
+        r"`roboirg show PickXtimes \2 --split \1`\.\n\n",
         checked.output,
     )
 
@@ -177,7 +217,7 @@ def test_the_check_finds_a_command_that_lacks_a_field_or_hides_its_value(tmp_pat
     for command, complaint in (
         ('["Lift {color}."]', "has no command of PickXtimes with {color} and {repeats}"),
         ('["Lift {color} {repeats}."]\n[stated.all]\ncolor = "a cube"', "and of others or none"),
-        (f'["Lift {{color}} {{repeats}}{" again" * 60}."]', "tokens; at most 64 are heard"),
+        (f'["Lift {{color}} {{repeats}}{" again" * 60}."]', "tokens; only 64 are heard"),
     ):
         file.write_text(f"{HEAD}[commands]\nall = {command}\n")
         checked = CliRunner().invoke(cli.app, ["language", "check-scenarios", str(file)])

@@ -102,7 +102,8 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
     if reason is not None:
         raise InvalidValueError(
             f"The {setting.name} setting cannot express episode {episode.key} "
-            f"(seed {episode.seed}): {reason}."
+            f"(seed {episode.seed}): {reason}; leave {setting.name} out (--settings), or choose "
+            "other episodes (--episodes)."
         )
     request = request_of(episode, options, variant)  # without what the refusal noted in its log
     return spoken_instruction(request, setting.say(request))

@@ -1,4 +1,4 @@
-"""Count the tokens that an instruction needs, without a tokenizer.
+"""Count the tokens that an instruction needs, mostly without a tokenizer.
 
 Many policies cut what they hear after a fixed number of tokens, most often 64, some 48. The count
 here is that of a SentencePiece vocabulary of 32,000 pieces, the one of the first Mistral models
@@ -12,7 +12,7 @@ from __future__ import annotations
 import functools
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from importlib.resources import files
 
 ADDED_TOKENS = 2
@@ -23,6 +23,34 @@ SHORT_LIMIT = 48
 """Tokens that pi0 and SmolVLA read."""
 
 _WORD = re.compile(r"[^\s.,:;?!]+|[.,:;?!]")
+
+
+@functools.lru_cache(maxsize=100)  # the longest text of many is asked for again and again
+def tokens_of(text: str) -> int:
+    """Return the number of tokens of any text; without the tokenizer, new words count high."""
+    encode = _tokenizer()
+    return count_tokens(text) if encode is None else len(encode(text)) + ADDED_TOKENS
+
+
+def tokens_shown(text: str) -> str:
+    """Return the number of tokens of any text for a user: ``51``; a bound is ``at most 51``."""
+    number = str(tokens_of(text))
+    if _tokenizer() or split_words(text) <= _pieces().keys():
+        return number
+    return f"at most {number}"
+
+
+@functools.cache
+def _tokenizer() -> Callable[[str], list[int]] | None:
+    """Return the tokenizer with 32,000 pieces; None if it is not installed."""
+    try:
+        from sentencepiece import SentencePieceProcessor
+
+        folder = files("mistral_common")
+    except ImportError:
+        return None
+    model = folder.joinpath("data/tokenizer.model.v1")
+    return SentencePieceProcessor(model_file=str(model)).encode
 
 
 def count_tokens(text: str) -> int:

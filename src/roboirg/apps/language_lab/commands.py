@@ -211,12 +211,18 @@ def check_scenario_file(
     from roboirg.apps.language_lab.scenarios.scenario_report import explicit_lines, report_lines
     from roboirg.language.scenarios.wording_file import read_words
 
-    by_task = read_words(path)
+    wordings = read_words(path)
+    by_task = wordings.tasks
     if scenario is not None:
         frames: set[str] = set()
         for words in by_task.values():
             frames.update(written.fields.frame for written in words.scenarios)
         known_name("scenario", scenario, sorted(frames))
+    if not wordings.name:
+        typer.echo(
+            f"{path.name} has no name, so it is a file of scenarios for the benchmark; to use it "
+            'with --wordings, begin it with a line such as name = "mine".\n'
+        )
     broken = 0
     for task, words in by_task.items():
         if scenario is None and has_explicit_words(words, task):
@@ -229,7 +235,7 @@ def check_scenario_file(
             typer.echo("\n".join(report_lines(report, task)))
             broken += len(report.broken)
         for complaint in unserved_settings(reports, scenes) if scenario is None else ():
-            typer.echo(f"BROKEN {task}: {complaint}")
+            typer.echo(f"BROKEN {task}: {complaint}.\n")
             broken += 1
     if broken:
         raise RoboIRGError(f"Found {counted(broken, 'broken rule')} in {path.name}.")

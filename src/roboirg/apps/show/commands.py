@@ -13,7 +13,6 @@ from roboirg.cli.declared_options import WordsCommand
 from roboirg.cli.names import known_settings
 from roboirg.cli.options import Settings, Split
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
     from roboirg.core.episode import Episode
@@ -63,7 +62,7 @@ def show(
 def _print_words(episode: Episode, settings: Sequence[str], options: InstructionOptions) -> None:
     """Print what is said in each setting, and how many tokens it needs."""
     from roboirg.language.generator import find_refusal, instruct_with
-    from roboirg.language.token_counts import count_tokens
+    from roboirg.language.token_counts import tokens_shown
 
     told = {name: replace(options, setting=name) for name in settings}
     refusals = {name: find_refusal(episode, one) for name, one in told.items()}
@@ -74,8 +73,8 @@ def _print_words(episode: Episode, settings: Sequence[str], options: Instruction
             typer.echo(f"{typer.style(name, bold=True)} cannot express the episode: {refusal}")
             continue
         instruction = instruct_with(episode, chosen)
-        length = counted(count_tokens(instruction.text), "token")
-        typer.echo(f"{typer.style(name, bold=True)} ({length}):")
+        length = tokens_shown(instruction.text)
+        typer.echo(f"{typer.style(name, bold=True)} ({length} tokens):")
         for utterance in instruction.utterances:
             typer.echo(f"  {utterance.stage:<13} {utterance.text}")
 

@@ -173,7 +173,8 @@ def tasks_in(head: FileFields, where: str) -> Mapping[str, TaskScenarios]:
             mistakes.append(name)
         seen.add(name)
     if mistakes:
-        raise InvalidValueError("\n".join(mistakes))
+        # A sentence that serves several pools or tasks is read for each of them.
+        raise InvalidValueError("\n".join(dict.fromkeys(mistakes)))
     for scenario in filter(None, scenarios):
         needed = scenario.fields.needs.tasks
         kind = f"task of {where}, scenario {scenario.fields.frame!r}, needs.tasks, named"
@@ -323,12 +324,13 @@ def _sentence(
 ) -> Text:
     """Return a sentence, with the rows of the closed table for what points back."""
     parts = _parsed(text, where, mistakes)
-    known = GIVEN | _slots(stated)
+    slots = _slots(stated)
+    rivals = {f"rival {name}" for name in slots if name.isalpha() and name != AMOUNT_FIELD}
+    known = GIVEN | slots | rivals
     mistakes += [
-        f"{where} has the slot {name!r}; known: {', '.join(sorted(known))}. Fields of the command "
-        "have their words in stated."
+        f"{where} has the slot {name!r}; known: {', '.join(sorted(known))}."
         for name in slots_in(parts)
-        if name.removeprefix("rival ") not in known
+        if name not in known
     ]
     said = re.sub(r"<[^:<>]+: ", "<", str(text))  # as the table has it: without class and slot
     return tuple(

@@ -352,12 +352,17 @@ class Speech:
         """Yield the scenario's remarks about other values, in any order, for ever."""
         found = dict.fromkeys(
             self.phrase(text, values)
-            for text in scenario.texts.get("competing", ())
+            for text in scenario.texts["competing"]
             for values in rival_values(self._request, self._introduced)
             if set(slots_in(text)) <= set(values.values)
         )
         if not found:
-            raise InvalidValueError("no competing remark has another value than the goal's")
+            said = itertools.chain(*map(slots_in, scenario.texts["competing"]))
+            lacking = sorted(set(said) - set(self._introduced.values))
+            raise InvalidValueError(
+                f"no competing remark has a value for {' or '.join(lacking)}; the goal and the "
+                "introduction have all values that are possible"
+            )
         return self._request.sampler.cycle("competing distractor", list(found))
 
 

@@ -47,18 +47,21 @@ def read_wordings(path: str | Path) -> Wordings:
 
 def parse_wordings(text: str, where: str) -> Wordings:
     """Return the content of a wording file; `where` names it in messages."""
-    return _wordings(read_head(text, where), text, where)
+    head = read_head(text, where)
+    check_name(head.name, where)
+    return _wordings(head, text, where)
 
 
-def read_words(path: Path) -> Mapping[str, TaskScenarios]:
-    """Return the words of each task that a file serves: a wording file, or one like ours."""
+def read_words(path: Path) -> Wordings:
+    """Return the content of a wording file, or of a file like ours, which has no name."""
     text, where = text_of(path), path.name
     head = read_head(text, where)
-    return _wordings(head, text, where).tasks if head.name else tasks_in(head, where)
+    if head.name:
+        check_name(head.name, where)
+    return _wordings(head, text, where)
 
 
 def _wordings(head: FileFields, text: str, where: str) -> Wordings:
-    check_name(head.name, where)
     tasks = tasks_in(head, where)
     for task, words in tasks.items():
         has_commands = {ALL, task} & {*head.commands, *head.stated}

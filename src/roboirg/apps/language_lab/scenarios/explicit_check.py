@@ -1,11 +1,11 @@
-"""Check commands and whole sentences: each goal of the published scenes has one that means it."""
+"""Check commands and whole sentences: what is said of a goal of the published scenes means it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from roboirg.apps.language_lab.scenarios.scenario_check import SHOWN, tokens_of
+from roboirg.apps.language_lab.scenarios.scenario_check import SHOWN
 from roboirg.core.episode import Episode, Goal, describe_goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
@@ -13,11 +13,11 @@ from roboirg.core.word_pools import PoolName, pool_of
 from roboirg.language.generator import request_of, spoken_instruction
 from roboirg.language.goal_fields import goal_fields
 from roboirg.language.instruction import Instruction
-from roboirg.language.scenarios.literals import literal_refusal, say_literal
+from roboirg.language.scenarios.literals import say_literal
 from roboirg.language.scenarios.scenario import TaskScenarios
 from roboirg.language.scenarios.scenario_file import task_scenarios
 from roboirg.language.scenarios.spoken import say_explicit
-from roboirg.language.token_counts import USUAL_LIMIT
+from roboirg.language.token_counts import USUAL_LIMIT, tokens_of, tokens_shown
 from roboirg.shortcuts.command_chance import is_right, understood_goals
 from roboirg.tasks import goals_of, with_goal
 
@@ -27,16 +27,18 @@ class ExplicitReport:
     """What was found about the explicit words of a task.
 
     Attributes:
-        goals: number of goals that have a sentence.
+        goals: number of goals that are stated.
+        unstated: the goals of which the file, of whole sentences, has none.
         renderings: a few sentences.
         broken: what is wrong, each once.
-        longest: the text with most tokens, after their number.
+        longest: the text with most tokens.
     """
 
     goals: int = 0
+    unstated: dict[str, None] = field(default_factory=dict)
     renderings: list[str] = field(default_factory=list)
     broken: dict[str, None] = field(default_factory=dict)
-    longest: tuple[int, str] = (0, "")
+    longest: str = ""
 
 
 def has_explicit_words(words: TaskScenarios, task: str) -> bool:
@@ -52,6 +54,10 @@ def check_explicit(words: TaskScenarios, scenes: Iterable[Episode]) -> ExplicitR
     report = ExplicitReport()
     said: set[Goal] = set()
     for episode in _goals_once(scenes):
+        goal = describe_goal(episode.goal.as_mapping())
+        if words.literals and episode.goal not in words.literals:
+            report.unstated[goal] = None
+            continue
         try:
             instruction = _explicit(episode, words)
         except InvalidValueError as error:
@@ -59,17 +65,19 @@ def check_explicit(words: TaskScenarios, scenes: Iterable[Episode]) -> ExplicitR
             continue
         text = instruction.text
         meant = understood_goals(instruction, episode)
-        if not meant or not all(is_right(goal, episode) for goal in meant):
-            goal = describe_goal(episode.goal.as_mapping())
+        if not meant or not all(is_right(other, episode) for other in meant):
             report.broken[f"says {text!r} of the goal {goal}, and of others or none"] = None
         said.add(episode.goal)
-        report.longest = max(report.longest, (tokens_of(text), text))
+        report.longest = max(report.longest, text, key=tokens_of)
         if text not in report.renderings and len(report.renderings) < SHOWN:
             report.renderings.append(text)
     report.goals = len(said)
-    tokens, text = report.longest
-    if tokens > USUAL_LIMIT:
-        report.broken[f"needs {tokens} tokens; at most {USUAL_LIMIT} are heard: {text}"] = None
+    longest = report.longest
+    if tokens_of(longest) > USUAL_LIMIT:
+        tokens = tokens_shown(longest)
+        report.broken[f"needs {tokens} tokens; only {USUAL_LIMIT} are heard: {longest}"] = None
+    if not said:
+        report.broken["states no goal of the published scenes"] = None
     return report
 
 
@@ -85,11 +93,8 @@ def _goals_once(scenes: Iterable[Episode]) -> Iterable[Episode]:
 
 
 def _explicit(episode: Episode, words: TaskScenarios) -> Instruction:
-    """Return what is said of an episode; raises if nothing is."""
+    """Return what is said of an episode; raises if a command lacks a field."""
     request = request_of(episode, InstructionOptions(language=4))
-    if not words.literals:
-        return spoken_instruction(request, say_explicit(request, words))
-    reason = literal_refusal(request, words.literals, "the file")
-    if reason is not None:
-        raise InvalidValueError(reason)
-    return spoken_instruction(request, say_literal(request, words.literals))
+    if words.literals:
+        return spoken_instruction(request, say_literal(request, words.literals))
+    return spoken_instruction(request, say_explicit(request, words))

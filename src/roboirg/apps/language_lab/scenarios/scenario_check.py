@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import functools
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from importlib.resources import files
 
 from roboirg.apps.language_lab.scenarios.sentence_rules import blanked, broken_sentences
 from roboirg.apps.language_lab.scenarios.text_rules import broken_text
 from roboirg.apps.language_lab.validation.episode_checks import leaking, places_of
-from roboirg.core.episode import SPLITS, Episode
+from roboirg.core.episode import SPLITS, Episode, describe_goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
@@ -25,7 +24,7 @@ from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.scenario_file import task_scenarios
 from roboirg.language.scenarios.spoken import say_chosen
 from roboirg.language.settings import all_settings
-from roboirg.language.token_counts import ADDED_TOKENS, USUAL_LIMIT, count_tokens
+from roboirg.language.token_counts import USUAL_LIMIT, tokens_of, tokens_shown
 from roboirg.shortcuts.command_chance import goals_of_command, is_right
 from roboirg.tasks import all_tasks, get_task, goals_of, with_goal
 from roboirg.tasks.splits.splits import get_episode
@@ -47,7 +46,8 @@ class ScenarioReport:
         competing: a text with a competing remark; empty if the setting has none.
         fitting: the keys of the scenes that it fits.
         open: number of these where its command alone leaves several goals.
-        longest: the text with most tokens, after their number.
+        longest: the text with most tokens.
+        resolved: those of its texts that are resolved forms.
     """
 
     scenario: Scenario
@@ -57,7 +57,8 @@ class ScenarioReport:
     competing: str = ""
     fitting: list[str] = field(default_factory=list)
     open: int = 0
-    longest: tuple[int, str] = (0, "")
+    longest: str = ""
+    resolved: set[str] = field(default_factory=set)
 
     @property
     def scenes(self) -> int:
@@ -68,23 +69,6 @@ class ScenarioReport:
         """Count a broken rule."""
         self.broken[rule] += 1
         self.examples.setdefault(rule, text)
-
-
-@functools.cache
-def _tokenizer() -> Callable[[str], list[int]] | None:
-    """Return the tokenizer with 32,000 pieces; None if it is not installed."""
-    try:
-        from sentencepiece import SentencePieceProcessor
-    except ImportError:
-        return None
-    model = files("mistral_common").joinpath("data/tokenizer.model.v1")
-    return SentencePieceProcessor(model_file=str(model)).encode
-
-
-def tokens_of(text: str) -> int:
-    """Return the number of tokens of a text; without the tokenizer, new words are counted high."""
-    encode = _tokenizer()
-    return count_tokens(text) if encode is None else len(encode(text)) + ADDED_TOKENS
 
 
 @functools.cache
@@ -127,10 +111,17 @@ def unserved_settings(
         refusal = all_settings()[name].refusal
         lacking = [episode for episode in left if refusal(request_of(episode, options)) is None]
         if lacking:
+            scene = lacking[0]
             yield (
                 f"{name} has no scenario that fits {counted(len(lacking), 'scene')}, such as "
-                f"{lacking[0].key}"
+                f"{_with_goal(scene)}; look at it with `roboirg show {scene.task} {scene.index} "
+                f"--split {scene.split}`"
             )
+
+
+def _with_goal(episode: Episode) -> str:
+    """Return the key of an episode with its goal: ``PickXtimes/train/3 (red, twice)``."""
+    return f"{episode.key} ({describe_goal(episode.goal.as_mapping())})"
 
 
 def _in_both_pools(scenario: Scenario, words: TaskScenarios) -> Iterator[str]:
@@ -156,9 +147,9 @@ def _checked(
         report.add(complaint, "")
     for episode in episodes:
         _check_episode(report, words, episode)
-    tokens, text = report.longest
-    if tokens > USUAL_LIMIT:
-        report.add(f"needs {tokens} tokens; at most {USUAL_LIMIT} are heard", text)
+    longest = report.longest
+    if tokens_of(longest) > USUAL_LIMIT:
+        report.add(f"needs {tokens_shown(longest)} tokens; only {USUAL_LIMIT} are heard", longest)
     if not report.scenes:
         report.add("fits none of the scenes", "")
     elif not report.open:
@@ -176,7 +167,7 @@ def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episod
         if fields.setting == "spatial":
             _check_texts(report, words, episode, replace(usual, frame="camera"))
     except (InvalidValueError, LookupError) as error:
-        report.add(f"cannot be said: {error}", episode.key)
+        report.add(f"cannot be said: {error}", _with_goal(episode))
         return
     if not told:
         return
@@ -207,9 +198,11 @@ def _check_texts(
     for options in variants:
         request = request_of(episode, options)
         said = _said(request, words, chosen)
+        if request.resolved:
+            report.resolved.add(said.text)
         for rule in _broken(request, chosen, said):
             report.add(rule, said.text)
-        report.longest = max(report.longest, (tokens_of(said.text), said.text))
+        report.longest = max(report.longest, said.text, key=tokens_of)
         if options.distractor == "competing":
             report.competing = report.competing or said.text
         told.append(said)

@@ -74,6 +74,8 @@ _POINTED_AT = {
     "remarks.not_former": "list.0", "remarks.not_latter": "list.1",
 }  # fmt: skip
 """What a remark of direct-rival points at first."""
+_DESCRIBED = ("place", "clue", "rest")
+"""Slots that can stand for a container itself."""
 
 
 def broken_sentences(scenario: Scenario, pointed: str) -> Iterator[str]:
@@ -85,10 +87,22 @@ def broken_sentences(scenario: Scenario, pointed: str) -> Iterator[str]:
     never = {**NEVER, _PLACED.format(noun): f"a place follows {noun!r} or 'one'"}
     if pointed == "container":
         never[COVERED] = "the cube is under a container"
+    is_lifted = pointed in ("container", "hidden_cube")
     for name, texts in scenario.texts.items():
         for text in texts:
             for complaint in _wrong(name, text, never):
                 yield f"{name}: {complaint}"
+            if is_lifted and name.startswith("say.") and not _names_container(text):
+                yield (
+                    f"{name}: says {literal(text)!r} of a cube, but a container is lifted; write "
+                    "'the container over <...>' or 'the one over <...>'"
+                )
+
+
+def _names_container(text: Text) -> bool:
+    """Return whether words are for a container: *the one over it*, not *it* of a cube."""
+    slots = {pointer.of.partition(".")[0] for pointer in pointers_in(text)}
+    return "over " in literal(text) or not slots.isdisjoint(_DESCRIBED)
 
 
 def _wrong(name: str, text: Text, never: Mapping[str, str]) -> Iterator[str]:
