@@ -45,7 +45,7 @@ def test_the_file_holds_what_is_measured_and_is_read_as_it_was_written():
 def test_floors_are_those_of_the_words_of_a_language():
     """Tasks that it does not speak of have no rows, and others not those of the usual one."""
     pytest.importorskip("sklearn")
-    rows = measure_floors.measure(("BinFill", "StopCube"), scenes=1, learning=0, language=4)
+    rows = measure_floors.measure(("VideoRepick", "StopCube"), scenes=1, learning=0, language=4)
     found = read_floors(measure_floors.file_text(rows))
     assert {key.task for key in found} == {"", "StopCube"}
     kept = stored.measured_floors(LANGUAGE_VERSION) or {}

@@ -59,7 +59,8 @@ def test_a_new_setting_does_not_change_which_seeds_are_accepted(
         all_settings()["direct"], name="mute", order=9, refusal=lambda _request: "it is mute"
     )
     every = {**all_settings(), "mute": mute}
-    monkeypatch.setattr("roboirg.language.settings.all_settings", lambda: every)
+    for module in ("settings", "generator"):
+        monkeypatch.setattr(f"roboirg.language.{module}.all_settings", lambda: every)
     episode = get_episode("VideoUnmask", "val", 0)
     assert "mute" in settings_of(get_task("VideoUnmask"))
     assert "mute" not in expressible(episode)

@@ -101,11 +101,14 @@ class Meaning(NamedTuple):
         settled: the fields that the last utterance settles alone, as it has all that their terms
             need.
         goals: of a whole sentence without fields, all that it can mean; empty if terms say it.
+        agrees: by slot of the goal, whether the last utterance speaks of one (*once for that
+            take*) or of several (*once for each take*); only where its words agree with it.
     """
 
     terms: Mapping[str, Term]
     settled: frozenset[str] = frozenset()
     goals: tuple[Goal, ...] = ()
+    agrees: Mapping[str, bool] = {}
 
 
 @dataclass(frozen=True, slots=True)

@@ -72,10 +72,28 @@ def _goals_with(
             own = {value.field: value.value for value in values}
             if not is_any and own.keys() != meaning.terms.keys():
                 continue  # it asks for two containers, and the words for one
-            if all(own[field] in values for field, values in possible.items()):
+            fits = all(own[field] in values for field, values in possible.items())
+            if fits and _agrees(own, meaning.agrees):
                 found.append(goal)
                 break
     return tuple(found)
+
+
+def _agrees(own: Mapping[str, Value], agrees: Mapping[str, bool]) -> bool:
+    """Return whether a goal has one or several where the words speak of one or of several."""
+    for slot, is_one in agrees.items():
+        number = _number_in(slot, own)
+        if number and (number == 1) != is_one:
+            return False
+    return True
+
+
+def _number_in(slot: str, own: Mapping[str, Value]) -> int:
+    """Return the number of a slot, or how many values it has; 0 if the goal does not have it."""
+    values = [value for field, value in own.items() if slot in (field, field.partition(".")[0])]
+    if len(values) == 1 and isinstance(values[0], int):
+        return values[0]
+    return len(values)
 
 
 def _in_every_order(goal: Goal) -> Iterator[GoalValues]:

@@ -55,6 +55,13 @@ class Chosen(NamedTuple):
     remark: str
 
 
+class _Fitting(NamedTuple):
+    """A scenario that fits an episode, and the fields of the goal that it leaves to its context."""
+
+    scenario: Scenario
+    hidden: frozenset[str]
+
+
 class _Sayable(NamedTuple):
     """A way to lead to the goal, and the scenarios that can say it."""
 
@@ -67,7 +74,11 @@ def choose(
 ) -> Chosen | None:
     """Return what is said in a setting that does not refuse; None if no scenario fits."""
     sampler, offers = request.sampler, all_settings()[setting].offers
-    fitting = [scenario for scenario in scenarios if _fits(scenario, request)]
+    fitting = [
+        _Fitting(scenario, _hidden_by(scenario, request))
+        for scenario in scenarios
+        if _fits(scenario, request)
+    ]
     sayable: list[_Sayable] = []
     if isinstance(offers, str):
         check_names(f"way to the goal for the offers of {setting}, named", [offers], _OFFERS)
@@ -75,7 +86,7 @@ def choose(
     else:
         ways = offers
     for offer in ways(request):
-        saying = [scenario for scenario in fitting if _says(scenario, offer, request)]
+        saying = [found.scenario for found in fitting if _says(found, offer)]
         if saying:
             sayable.append(_Sayable(offer, saying))
     if not sayable:
@@ -128,13 +139,19 @@ def _fits(scenario: Scenario, request: InstructionRequest) -> bool:
     return not scenario.fields.list or bool(_lengths(request, scenario))
 
 
-def _says(scenario: Scenario, offer: Offer, request: InstructionRequest) -> bool:
-    """Return whether a scenario points back in exactly the fields of an offer, by its way."""
-    derive, notes = scenario.fields.derive, offer.notes
+def _hidden_by(scenario: Scenario, request: InstructionRequest) -> frozenset[str]:
+    """Return the fields of the goal that a scenario leaves to its context."""
     hidden: set[str] = set()
     for name in scenario.said:
         hidden.update(hidden_fields(scenario.text(f"say.{name}"), request.fields_in(name)))
-    if hidden != set(offer.fields) or offer.listed not in (None, scenario.fields.list):
+    return frozenset(hidden)
+
+
+def _says(found: _Fitting, offer: Offer) -> bool:
+    """Return whether a scenario points back in exactly the fields of an offer, by its way."""
+    scenario = found.scenario
+    derive, notes = scenario.fields.derive, offer.notes
+    if found.hidden != set(offer.fields) or offer.listed not in (None, scenario.fields.list):
         return False
     if derive is not None:
         relations = (None, *derive.relations)

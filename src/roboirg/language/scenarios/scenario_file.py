@@ -123,6 +123,8 @@ def read_task_scenarios(text: str, where: str) -> Mapping[str, TaskScenarios]:
     return tasks_in(read_head(text, where), where)
 
 
+# Cached: each task that a file serves asks for its head.
+@functools.lru_cache(maxsize=8)
 def read_head(text: str, where: str) -> FileFields:
     """Return the content of a file with its tables as they were written."""
     data = data_of(text, where)
@@ -337,12 +339,17 @@ def _sentence(
     )
 
 
+@functools.cache
+def _pattern(words: str) -> re.Pattern[str]:
+    """Return a pattern for the words of a row of the table, with any noun for ``*``."""
+    return re.compile(re.escape(words).replace(r"\*", "[a-z]+"))
+
+
 def _is_said(row: PointerRow, words: str, sentence: str) -> bool:
-    """Return whether a row of the table is for the words of a pointer, with any noun for ``*``."""
-    pattern = re.escape(row.words).replace(r"\*", "[a-z]+")
+    """Return whether a row of the table is for the words of a pointer."""
     if "<" in row.words:  # with the words around them
-        return f"<{words}>" in row.words and re.search(pattern, sentence) is not None
-    return re.fullmatch(pattern, words) is not None
+        return f"<{words}>" in row.words and _pattern(row.words).search(sentence) is not None
+    return _pattern(row.words).fullmatch(words) is not None
 
 
 def _pointing(pointer: Pointer, said: str, kind: str, where: str, mistakes: list[str]) -> Pointer:

@@ -168,6 +168,7 @@ def say_chosen(
         name: request.sampler.pick(f"{name} words", scenario.texts[f"say.{name}"])
         for name in scenario.said
     }
+    speech.begin_command()
     lead, remark = _lead(request, chosen)
     before = speech.phrase(lead, resolved=request.resolved)
     fields = {name: speech.field(name, text, remark) for name, text in said.items()}
@@ -224,6 +225,11 @@ class Speech:
         self._said = SaidValues(request.frame)
         self._terms: dict[str, Term] = {}
         self._hidden: set[str] = set()
+        self._agrees: dict[str, bool] = {}
+
+    def begin_command(self) -> None:
+        """Forget with what the words before agree: the last utterance begins."""
+        self._agrees.clear()
 
     def phrase(
         self, text: Text, introduced: Introduced | None = None, *, resolved: bool = False
@@ -237,8 +243,9 @@ class Speech:
             elif isinstance(part, Slot):
                 pieces.extend(self._slot(part, values))
             elif isinstance(part, Agreement):
-                words = part.one if values.count(part.controller) == 1 else part.many
-                pieces.append(TaggedText(words))
+                is_one = values.count(part.controller) == 1
+                self._agrees[part.controller] = is_one
+                pieces.append(TaggedText(part.one if is_one else part.many))
                 if part.controller == "step":  # *right before*, *two before*
                     self._said.add("step", values.values["step"])
             else:
@@ -304,7 +311,7 @@ class Speech:
         settled = set(self._terms)
         if not self._request.resolved:
             settled -= self._hidden
-        return Meaning(dict(self._terms), frozenset(settled))
+        return Meaning(dict(self._terms), frozenset(settled), agrees=dict(self._agrees))
 
     def command(self, fields: Mapping[str, Phrase], lead: Phrase) -> Phrase:
         """Return the command with the words for some fields; the others state their values."""
