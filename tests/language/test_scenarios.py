@@ -308,7 +308,7 @@ def test_every_published_scene_has_words_in_both_pools(task):
 def test_instructions_of_language_4_keep_the_rules_of_every_language(task):
     commands = {}
     for episode, options, told in spoken(task):
-        assert told.metadata["language_version"] == "4.3.0"
+        assert told.metadata["language_version"] == "4.4.0"
         assert told == instruct_with(episode, options)
         assert not re.search(r"[{}<>|\[\]]|  | [.,]|[.]{2}", told.text), told.text
         for one in told.mentions:
