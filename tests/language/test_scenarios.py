@@ -194,7 +194,7 @@ def test_every_mistake_of_a_file_is_named_by_scenario_and_field():
     ],
 )  # fmt: skip
 def test_the_checker_names_the_rule_that_a_scenario_breaks(text, before, after, rule):
-    scenes = scenes_of("PickXtimes", 0)[::20]
+    scenes = scenes_of("PickXtimes", 0)[::10]
     assert not check_scenarios(read(text), None, scenes)[0].broken
     assert before in text
     try:
