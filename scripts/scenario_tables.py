@@ -20,13 +20,12 @@ from roboirg.core.word_pools import TRAINING_SPLITS, PoolName
 from roboirg.language.instruction import Instruction
 from roboirg.language.places import PlaceClass
 from roboirg.language.scenarios.scenario import Scenario
-from roboirg.language.scenarios.scenario_file import task_scenarios
+from roboirg.language.scenarios.scenario_file import written_words
 from roboirg.language.settings import all_settings
 from roboirg.language.templates import LANGUAGE_VERSIONS
 from roboirg.language.token_counts import USUAL_LIMIT, count_tokens
 from roboirg.language.variants import instructions
 from roboirg.shortcuts.command_chance import goals_of_command, is_right
-from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import split_episodes
 
 LANGUAGE = 4
@@ -102,7 +101,7 @@ def scenario_part() -> str:
     spatial = told[told.setting == "spatial"].groupby("task", sort=False)
     return _PAGE.format(
         version=LANGUAGE_VERSIONS[LANGUAGE],
-        tasks=", ".join(_tasks()),
+        tasks=", ".join(written_words()),
         limit=USUAL_LIMIT,
         texts=_table(texts.unstack(sort=False)),
         tokens=_table(tokens.unstack(sort=False)),
@@ -116,10 +115,6 @@ def scenario_part() -> str:
     )
 
 
-def _tasks() -> list[str]:
-    return [task for task in all_tasks() if task_scenarios(task) is not None]
-
-
 @functools.cache
 def _told(splits: tuple[str, ...]) -> pd.DataFrame:
     """Return a row for each implicit text of some splits."""
@@ -127,7 +122,7 @@ def _told(splits: tuple[str, ...]) -> pd.DataFrame:
     options = InstructionOptions(language=LANGUAGE)
     rows = []
     for episode, said in instructions(
-        split_episodes(_tasks(), splits), settings, ["implicit"], options
+        split_episodes([*written_words()], splits), settings, ["implicit"], options
     ):
         goals = goals_of_command(said, episode)
         classes = cast("list[int]", said.metadata.get("landmark_classes") or [])
@@ -155,9 +150,8 @@ def _expressions(said: Sequence[Instruction]) -> str:
 
 def _scenarios() -> Iterator[tuple[str, Scenario]]:
     """Yield the scenarios of the test pool, with their tasks."""
-    for task in _tasks():
-        words = task_scenarios(task)
-        for scenario in words.scenarios if words else ():
+    for task, words in written_words().items():
+        for scenario in words.scenarios:
             if scenario.fields.pool == "test":
                 yield task, scenario
 
@@ -182,9 +176,8 @@ def _missing() -> Iterator[str]:
     """Yield the frames that do not come up, each with the reason."""
     for (task, setting), frames in _frames().missing.items():
         for frame in frames:
-            words = task_scenarios(task)
             scenes = list(split_episodes([task], TEST))
-            reports = check_scenarios(words, frame, scenes) if words else []
+            reports = check_scenarios(written_words()[task], frame, scenes)
             fits = sum(report.scenes for report in reports)
             reason = f"fits {fits} of {len(scenes)} scenes, where others were drawn"
             if not fits:
@@ -196,7 +189,7 @@ def _words(told: pd.DataFrame) -> str:
     """Return the vocabulary of each task, and what of it training does not have."""
     learned = _told(TRAIN)
     rows = {}
-    for task in _tasks():
+    for task in written_words():
         test, train = (_vocabulary(part[part.task == task].text) for part in (told, learned))
         new = sorted(set(test) - set(train))
         rows[task] = {

@@ -26,18 +26,17 @@ from roboirg.core.word_pools import POOLS
 from roboirg.extension.commands import known_name
 from roboirg.extension.sight import class_of
 from roboirg.language.landmarks import WORK_AREA
-from roboirg.language.scenarios.scenario_file import task_scenarios
+from roboirg.language.scenarios.scenario_file import written_words
 from roboirg.language.settings import all_settings
 from roboirg.language.variants import instructions
 from roboirg.shortcuts.goal_learner import Told
 from roboirg.shortcuts.shortcut_scores import counted_slots
-from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
 if TYPE_CHECKING:
     from roboirg_learn.listener.reader_training import Lesson
 
-TASKS = tuple(name for name in all_tasks() if task_scenarios(name))
+TASKS = tuple(written_words())
 LEARNED, TESTED = 800_000, 900_000
 """Numbers of the first random scene to learn from, and to test on."""
 GROUP = ["setting", "task", "pool"]

@@ -14,6 +14,7 @@ from roboirg.core.episode import Episode, Goal, SceneObject
 from roboirg.language.grounded import spoken_clues
 from roboirg.language.instruction import Described, Meaning, Term
 from roboirg.language.landmarks import candidates_in, things_of_color
+from roboirg.language.number_words import agreeing_number
 from roboirg.language.places import things_at
 from roboirg.language.request import GoalValues, values_of_goal
 from roboirg.tasks import get_task, goals_of
@@ -82,18 +83,11 @@ def _goals_with(
 def _agrees(own: Mapping[str, Value], agrees: Mapping[str, bool]) -> bool:
     """Return whether a goal has one or several where the words speak of one or of several."""
     for slot, is_one in agrees.items():
-        number = _number_in(slot, own)
+        values = [value for field, value in own.items() if slot in (field, field.partition(".")[0])]
+        number = agreeing_number(values)  # 0 if the goal does not have the slot
         if number and (number == 1) != is_one:
             return False
     return True
-
-
-def _number_in(slot: str, own: Mapping[str, Value]) -> int:
-    """Return the number of a slot, or how many values it has; 0 if the goal does not have it."""
-    values = [value for field, value in own.items() if slot in (field, field.partition(".")[0])]
-    if len(values) == 1 and isinstance(values[0], int):
-        return values[0]
-    return len(values)
 
 
 def _in_every_order(goal: Goal) -> Iterator[GoalValues]:

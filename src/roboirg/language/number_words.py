@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 CARDINALS = (
     "zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten",
 )  # fmt: skip
@@ -10,6 +12,13 @@ ORDINALS = (
     "tenth",
 )  # fmt: skip
 ADVERBS = {1: "once", 2: "twice"}
+
+
+def agreeing_number(values: Sequence[str | int]) -> int:
+    """Return the number with which words agree: the only value, or how many there are."""
+    if len(values) == 1 and isinstance(values[0], int):
+        return values[0]
+    return len(values)
 
 
 def plural(noun: str) -> str:

@@ -34,10 +34,10 @@ def tokens_of(text: str) -> int:
 
 def tokens_shown(text: str) -> str:
     """Return the number of tokens of any text for a user: ``51``; a bound is ``at most 51``."""
+    if split_words(text) <= _pieces().keys():
+        return str(count_tokens(text))  # exact, without loading a tokenizer
     number = str(tokens_of(text))
-    if _tokenizer() or split_words(text) <= _pieces().keys():
-        return number
-    return f"at most {number}"
+    return number if _tokenizer() else f"at most {number}"
 
 
 @functools.cache

@@ -212,10 +212,9 @@ def check_scenario_file(
     from roboirg.language.scenarios.wording_file import read_words
 
     wordings = read_words(path)
-    by_task = wordings.tasks
     if scenario is not None:
         frames: set[str] = set()
-        for words in by_task.values():
+        for words in wordings.tasks.values():
             frames.update(written.fields.frame for written in words.scenarios)
         known_name("scenario", scenario, sorted(frames))
     if not wordings.name:
@@ -224,7 +223,7 @@ def check_scenario_file(
             'with --wordings, begin it with a line such as name = "mine".\n'
         )
     broken = 0
-    for task, words in by_task.items():
+    for task, words in wordings.tasks.items():
         if scenario is None and has_explicit_words(words, task):
             explicit = check_explicit(words, scenes_of(task, 0))
             typer.echo("\n".join(explicit_lines(explicit, task)))

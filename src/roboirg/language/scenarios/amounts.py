@@ -8,6 +8,7 @@ are stated after its words: *two of that color and one green one*.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 
 from roboirg.language.instruction import Term
@@ -32,6 +33,7 @@ def amount_texts(numbers: str, size: int) -> list[Text]:
     return [amount_text(numbers, at, _NOUNS[at]) for at in range(size)]
 
 
+@functools.cache  # the same few for every episode
 def amount_text(numbers: str, at: int, noun: str = "cube") -> Text:
     """Return a color with its number and a noun, to be filled: *two red cubes*."""
     number = f"{numbers}.{at}"

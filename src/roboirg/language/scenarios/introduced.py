@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from roboirg.language.instruction import REFERENCE, Expression
-from roboirg.language.number_words import cardinal, ordinal, plural, times
+from roboirg.language.number_words import agreeing_number, cardinal, ordinal, plural, times
 from roboirg.language.phrases import Mentionable, MentionedValue, Phrase, antecedent, listed, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.scenarios.markup import Slot
@@ -64,9 +64,7 @@ class Introduced:
 
     def count(self, controller: str) -> int:
         """Return the number with which words agree: that of a slot, or how many values it has."""
-        found = self.values[controller]
-        value = found[0].value
-        return value if len(found) == 1 and isinstance(value, int) else len(found)
+        return agreeing_number([introduced.value for introduced in self.values[controller]])
 
     def phrase(self, slot: Slot) -> Phrase:
         """Return the words for a slot, each value a mention."""

@@ -33,7 +33,7 @@ from roboirg.language.scenarios.scenario import (
 from roboirg.language.scenarios.written import converted, data_of, text_of
 from roboirg.language.settings import all_settings
 from roboirg.language.settings.setting import Setting
-from roboirg.tasks import Task, every_task
+from roboirg.tasks import Task, all_tasks, every_task
 
 FOLDER = Path(__file__).parent
 ALL = "all"
@@ -73,6 +73,16 @@ def task_scenarios(task: str) -> TaskScenarios | None:
     """Return the words of a task; None if none have been written."""
     path = own_file(task)
     return read_scenario_file(path).get(task) if path else None
+
+
+def written_words() -> Mapping[str, TaskScenarios]:
+    """Return the words of each of our tasks that has some."""
+    found: dict[str, TaskScenarios] = {}
+    for task in all_tasks():
+        words = task_scenarios(task)
+        if words is not None:
+            found[task] = words
+    return found
 
 
 @functools.cache

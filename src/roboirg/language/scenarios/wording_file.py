@@ -24,14 +24,12 @@ class Wordings(NamedTuple):
         name: of the wordings.
         fingerprint: of the file's content.
         tasks: the words of each task; settings without scenarios have ours.
-        source: where the words come from, in a sentence.
         needs_language_4: whether there are commands or scenarios.
     """
 
     name: str
     fingerprint: str
     tasks: Mapping[str, TaskScenarios]
-    source: str
     needs_language_4: bool
 
     @property
@@ -69,7 +67,7 @@ def _wordings(head: FileFields, text: str, where: str) -> Wordings:
             raise InvalidValueError(f"{where} has no words of {task}, which stands in its tasks.")
         check_robomme_name(head.name, task, words.literals, where)
     is_spoken = bool(head.scenario or head.commands or head.stated)
-    return Wordings(head.name, short_hash(text)[:8], tasks, head.source, is_spoken)
+    return Wordings(head.name, short_hash(text)[:8], tasks, is_spoken)
 
 
 def check_name(name: str, where: str) -> None:

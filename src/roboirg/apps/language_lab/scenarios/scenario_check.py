@@ -21,12 +21,12 @@ from roboirg.language.request import InstructionRequest
 from roboirg.language.scenarios.choice import Chosen, choose
 from roboirg.language.scenarios.markup import slots_in
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
-from roboirg.language.scenarios.scenario_file import task_scenarios
+from roboirg.language.scenarios.scenario_file import written_words
 from roboirg.language.scenarios.spoken import say_chosen
 from roboirg.language.settings import all_settings
 from roboirg.language.token_counts import USUAL_LIMIT, tokens_of, tokens_shown
 from roboirg.shortcuts.command_chance import goals_of_command, is_right
-from roboirg.tasks import all_tasks, get_task, goals_of, with_goal
+from roboirg.tasks import get_task, goals_of, with_goal
 from roboirg.tasks.splits.splits import get_episode
 
 RANDOM_SCENES = 200
@@ -89,10 +89,8 @@ def check_scenarios(
 def our_scenarios() -> tuple[Scenario, ...]:
     """Return the scenarios of all tasks; one that several tasks say is there for each of them."""
     found: list[Scenario] = []
-    for task in all_tasks():
-        words = task_scenarios(task)
-        if words is not None:
-            found += words.scenarios
+    for words in written_words().values():
+        found += words.scenarios
     return tuple(found)
 
 
@@ -107,9 +105,12 @@ def unserved_settings(
             fitting.setdefault(fields.setting, set()).update(report.fitting)
     for name, keys in fitting.items():
         options = InstructionOptions(name, language=4)
-        left = [episode for episode in scenes if episode.key not in keys]
         refusal = all_settings()[name].refusal
-        lacking = [episode for episode in left if refusal(request_of(episode, options)) is None]
+        lacking = [
+            episode
+            for episode in scenes
+            if episode.key not in keys and refusal(request_of(episode, options)) is None
+        ]
         if lacking:
             scene = lacking[0]
             yield (

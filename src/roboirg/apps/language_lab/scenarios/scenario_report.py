@@ -28,8 +28,7 @@ def explicit_lines(report: ExplicitReport, task: str) -> Iterator[str]:
 def report_lines(report: ScenarioReport, task: str) -> Iterator[str]:
     """Yield what an author wants to know of a scenario in a task: texts, length, broken rules."""
     fields, fits = report.scenario.fields, report.scenes
-    pool = fields.pool or "both pools"
-    yield f"{fields.frame} ({task}, {fields.setting}, {pool})"
+    yield f"{fields.frame} ({task}, {fields.setting}, {fields.pool or 'both pools'})"
     yield from (f"  {text}" for text in report.renderings)
     if report.competing:
         yield f"  With a competing remark: {report.competing}"
