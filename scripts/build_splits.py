@@ -15,7 +15,7 @@ import typer
 from roboirg.cli.options import Tasks, Workers
 from roboirg.cli.progress_bar import progress_bars
 from roboirg.core.errors import InvalidValueError, RoboIRGError
-from roboirg.evaluation.plan.option_parsing import parse_names, parse_splits
+from roboirg.runs.plan.option_parsing import parse_names, parse_splits
 from roboirg.tasks import find_tasks
 from roboirg.tasks.splits import splits
 from roboirg.util.atomic_write import write_atomically

@@ -30,9 +30,9 @@ from roboirg.core.motions import Shuttle, Swap
 from roboirg.core.observations import Demonstration
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.factory import make
-from roboirg.evaluation.plan.option_parsing import parse_names, parse_splits
 from roboirg.policies import play
 from roboirg.policies.builtin.oracle_policy import OraclePolicy
+from roboirg.runs.plan.option_parsing import parse_names, parse_splits
 from roboirg.simulation.motion_player import shuttle_position
 from roboirg.tasks import find_tasks
 from roboirg.tasks.splits.published_episodes import published_episode

@@ -11,14 +11,13 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
 from sentencepiece import SentencePieceProcessor
 
 from roboirg.core.word_pools import POOLS
-from roboirg.language.generator import find_refusal, instruct_with
+from roboirg.language.generator import instruct_with
 from roboirg.language.number_words import CARDINALS, ORDINALS, plural
 from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text
 from roboirg.language.scenarios.scenario import PERSON, Scenario
@@ -47,17 +46,15 @@ def texts() -> Iterator[str]:
     """Yield instructions of random scenes in both pools, with all settings, forms and options."""
     for task in every_task():
         for index in range(EPISODES):
-            episode = get_episode(task, "random", index)
-            for options in expressible_options(episode, POOLS[index % len(POOLS)]):
+            episode, pool = get_episode(task, "random", index), POOLS[index % len(POOLS)]
+            for options in expressible_options(episode, pool):
                 yield instruct_with(episode, options).text
-                scenario = replace(options, language=4)
-                if find_refusal(episode, scenario) is None:
-                    yield instruct_with(episode, scenario).text
 
 
 def scenario_words() -> frozenset[str]:
     """Return all words and marks that scenarios can say, but those for colors and places."""
-    words = {*CARDINALS[1:], *ORDINALS[1:], "once", "twice", "times"}
+    numbers = [*CARDINALS[1:], *ORDINALS[1:]]
+    words = {*numbers, *map(str.capitalize, numbers), "once", "twice", "times"}
     for pool in POOLS:
         for remark in general().distractors[pool]:
             words |= split_words(remark)

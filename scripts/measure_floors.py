@@ -1,10 +1,10 @@
 """Measure the floors of every setting and task, and write them where they are read.
 
-python scripts/measure_floors.py [--scenes 400] [--language 4]
+python scripts/measure_floors.py [--scenes 400]
 
 Writes the file of the installed version of the language, with the settings that count for the
-headline number, and the tables of docs/floors.md, which are of the usual language. With --tables
-only the tables, from that file. Tasks that the language does not speak of are left out.
+headline number, and the tables of docs/floors.md. With --tables only the tables, from that file.
+Tasks without words are left out.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from pathlib import Path
 
 from written_parts import with_part
 
-from roboirg.core.instruction_options import DEFAULT_LANGUAGE, InstructionOptions
+from roboirg.analysis.measures import measured_floors as stored
+from roboirg.analysis.measures.measured_floors import FloorKey, Floors
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.stats import measured_floors as stored
-from roboirg.evaluation.analysis.stats.measured_floors import FloorKey, Floors
 from roboirg.language.settings import all_settings
-from roboirg.language.templates import LANGUAGE_VERSION, LANGUAGE_VERSIONS
+from roboirg.language.word_sampler import LANGUAGE_VERSION
 from roboirg.shortcuts import SURFACE_RULES
-from roboirg.shortcuts.goal_learner import Told
+from roboirg.shortcuts.goal_learner import InstructedEpisode
 from roboirg.shortcuts.shortcut_scores import counted_slots
 from roboirg.shortcuts.shortcut_tables import (
     LEARNING_SCENES,
@@ -42,12 +42,10 @@ SCENES = 400
 """Random scenes of each task that are tested."""
 
 
-def measure(
-    tasks: Sequence[str], scenes: int, learning: int, language: int = DEFAULT_LANGUAGE
-) -> list[ShortcutRow]:
+def measure(tasks: Sequence[str], scenes: int, learning: int) -> list[ShortcutRow]:
     """Return the rows of all settings of some tasks, on random scenes and on the test split."""
 
-    def groups_of(told: Told) -> Iterator[tuple[Group, Sequence[str]]]:
+    def groups_of(told: InstructedEpisode) -> Iterator[tuple[Group, Sequence[str]]]:
         episode, instruction = told
         slots, split, setting = counted_slots(told), episode.split, instruction.setting
         if slots:
@@ -57,8 +55,9 @@ def measure(
             yield FloorKey(split, setting, episode.task, slot), (slot,)
 
     names = tuple(name for name, one in all_settings().items() if one.implicit)
-    options = InstructionOptions(language=language)
-    scored = score_texts(tasks, ("test",), names, options, seeds=scenes, learning=learning)
+    scored = score_texts(
+        tasks, ("test",), names, InstructionOptions(), seeds=scenes, learning=learning
+    )
     rows = tabulate(scored, groups_of)
     places = {name: place for place, name in enumerate(names)}
     return sorted(rows, key=lambda row: (row.group[0], places[row.group[1]], bool(row.group[2])))
@@ -165,15 +164,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=int, default=SCENES)
     parser.add_argument("--learning", type=int, default=LEARNING_SCENES)
-    parser.add_argument("--language", type=int, default=DEFAULT_LANGUAGE, choices=LANGUAGE_VERSIONS)
     parser.add_argument("--tables", action="store_true")
     given = parser.parse_args()
     if not given.tables:
         begin = time.perf_counter()
-        rows = measure(tuple(all_tasks()), given.scenes, given.learning, given.language)
-        file = Path(stored.__file__).with_name(
-            stored.floors_name(LANGUAGE_VERSIONS[given.language])
-        )
+        rows = measure(tuple(all_tasks()), given.scenes, given.learning)
+        file = Path(stored.__file__).with_name(stored.floors_name(LANGUAGE_VERSION))
         file.write_text(file_text(rows), encoding="utf-8")
         stored.measured_floors.cache_clear()
         print(f"{file}: {len(rows)} lines in {time.perf_counter() - begin:.0f} s")

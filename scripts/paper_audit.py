@@ -9,7 +9,6 @@ differs, and returns what it found.
 
 from __future__ import annotations
 
-import itertools
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -20,21 +19,11 @@ from typing import Any, NamedTuple
 import write_published_figures as figures
 import yaml
 
-from roboirg.apps.language_lab.corpus_statistics import (
-    PAPER_PHRASES,
-    metadata_counts,
-    phrase_counts,
-)
 from roboirg.apps.real.study.study_plan import DEFAULT_DEMONSTRATIONS, DEFAULT_TRIALS
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.word_pools import POOLS
-from roboirg.language.instruction import Instruction
-from roboirg.language.variants import instructions
 from roboirg.policies import make_policy
 from roboirg.policies.planners.systems import all_systems, find_system
-from roboirg.tasks import LEFT_OUT, all_tasks, every_task, find_tasks
-from roboirg.tasks.splits.splits import split_episodes
+from roboirg.tasks import LEFT_OUT, every_task, find_tasks
 
 ROOT = Path(__file__).parents[1]
 LIMITS = ROOT / "docs" / "paper.md"
@@ -271,47 +260,6 @@ def _() -> str:
     if figures.PAGE.read_text(encoding="utf-8") != figures.page():
         raise AssertionError("run: python scripts/write_published_figures.py")
     return str(figures.PAGE.relative_to(ROOT))
-
-
-@item("phrases", "every phrase that the paper quotes comes up in its own setting, in both pools")
-def _() -> str:
-    counts = {pool: phrase_counts(_told("implicit", pool)) for pool in POOLS}
-    lacking = [
-        (pool, setting, phrase)
-        for pool, setting in itertools.product(POOLS, PAPER_PHRASES)
-        for phrase, _ in PAPER_PHRASES[setting]
-        if not counts[pool][setting][phrase]
-    ]
-    same(lacking, [])
-    return ", ".join(f"{name} {sum(one.values())}" for name, one in counts["test"].items())
-
-
-@item("resolved-phrases", "resolved commands say 'at the far right' and 'different from blue'")
-def _() -> str:
-    counts = phrase_counts(_told("resolved"))
-    far = counts["spatial, resolved"]["at the far right"]
-    different = counts["reasoning, resolved"]["different from blue"]
-    if not far or not different:
-        raise AssertionError(f"{far} and {different} times")
-    return f"{far} and {different} times"
-
-
-@item("patterns", "contextual logic in every task, color exclusion where cubes have colors")
-def _() -> str:
-    told = (one for one in _told("implicit") if one.setting == "reasoning")
-    counts = metadata_counts(told, "pattern")
-    found = {task: set(by_pattern) for task, by_pattern in counts.items()}
-    same({task for task, names in found.items() if "contextual logic" not in names}, set())
-    colorless = {task for task, names in found.items() if "color exclusion" not in names}
-    return same(colorless, {"StopCube", "VideoRepick"})
-
-
-def _told(form: str, pool: str | None = None) -> Iterator[Instruction]:
-    """Yield the instructions of the test split in the settings that the paper quotes."""
-    episodes = split_episodes(tuple(all_tasks()), ("test",))
-    options = InstructionOptions(wordings=pool)
-    told = instructions(episodes, tuple(PAPER_PHRASES), (form,), options)
-    yield from (instruction for _, instruction in told)
 
 
 def main(word: str = "") -> int:

@@ -16,11 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from roboirg.evaluation.analysis.stats.intervals import without_spread
+from roboirg.stats.intervals import without_spread
 
 DRAWS = 10_000
 LOWEST, HIGHEST = 1, 5
-LANGUAGE = "4"
 HEAD = "| words | texts | rated | 95 % interval | worst frame |\n| --- | ---: | ---: | --- | --- |"
 
 
@@ -68,22 +67,18 @@ def interval(means: Sequence[float]) -> tuple[float, float]:
 
 
 def rows(key: Mapping[str, Mapping[str, str]], sheets: Sequence[Mapping[str, float]]) -> list[str]:
-    """Return a row for each setting, and one for the anchors of each."""
-    groups: dict[tuple[str, str], dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    """Return a row for each setting."""
+    groups: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     for number, row in key.items():
-        of = (row["setting"], row["language"])
         frame = f"{row['task']}: {row['frame']}" if row["frame"] else f"text {number}"
-        groups[of][frame] += [sheet[number] for sheet in sheets]
+        groups[row["setting"]][frame] += [sheet[number] for sheet in sheets]
     found = []
-    for (setting, language), frames in sorted(
-        groups.items(), key=lambda one: one[0][::-1], reverse=True
-    ):
+    for setting, frames in sorted(groups.items()):
         means = {frame: float(np.mean(ratings)) for frame, ratings in frames.items()}
         low, high = interval(list(means.values()))
         worst = min(means, key=lambda frame: means[frame])
-        name = setting if language == LANGUAGE else f"{setting}, language {language}"
         found.append(
-            f"| {name} | {len(means)} | {np.mean(list(means.values())):.1f} | {low:.1f} to "
+            f"| {setting} | {len(means)} | {np.mean(list(means.values())):.1f} | {low:.1f} to "
             f"{high:.1f} | {means[worst]:.1f} ({worst}) |"
         )
     return found

@@ -1,4 +1,4 @@
-"""The part of the language card about language 4: what its scenarios say, measured.
+"""The part of the language card with what scenarios say, measured.
 
 The texts are those of the published test split; what training has is that of train and val.
 """
@@ -14,28 +14,25 @@ import pandas as pd
 
 from roboirg.apps.language_lab.corpus_statistics import expression_counts, expression_order
 from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, our_scenarios
-from roboirg.apps.language_lab.scenarios.sentence_rules import blanked
+from roboirg.apps.language_lab.scenarios.sentence_rules import sentences_of
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.word_pools import TRAINING_SPLITS, PoolName
+from roboirg.core.word_pools import TRAINING_SPLITS
 from roboirg.language.instruction import Instruction
 from roboirg.language.places import PlaceClass
 from roboirg.language.scenarios.scenario import Scenario
-from roboirg.language.scenarios.scenario_file import written_words
+from roboirg.language.scenarios.scenario_file import pointer_table, written_words
 from roboirg.language.settings import all_settings
-from roboirg.language.templates import LANGUAGE_VERSIONS
 from roboirg.language.token_counts import USUAL_LIMIT, count_tokens
 from roboirg.language.variants import instructions
 from roboirg.shortcuts.command_chance import goals_of_command, is_right
 from roboirg.tasks.splits.splits import split_episodes
 
-LANGUAGE = 4
 TEST, TRAIN = ("test",), TRAINING_SPLITS
 DASH = "–"
 
 _PAGE = """\
-## Language 4
+## What is said, measured
 
-Version {version}, whole [scenarios](add-scenario.md), of {tasks}.
 Texts are the implicit ones of the published test split; those of training are of train and val.
 
 ### Texts
@@ -56,6 +53,12 @@ Scenes with each class.
 
 {expressions}
 
+### The paper's examples
+
+Where its implicit expressions are said, with other nouns and numbers.
+
+{quotations}
+
 ### Frames
 
 How many of those written come up, each task and setting alone; contextual has those of direct.
@@ -74,11 +77,11 @@ Words of test that no text of training has.
 
 {shared}
 
-### Landmarks
+### Places
 
-Spatial texts, and how many of them have a landmark that no one says, where a scene has no other.
+Spatial texts by the class of the place that they name.
 
-{landmarks}
+{places}
 
 ### Scenes that leave one goal
 
@@ -88,7 +91,7 @@ Scenes in which the command alone leaves one goal, so that nothing needs to be r
 
 ### Ratings and readings
 
-[Validity](validity.md#what-language-4-shows-so-far) says how natural the texts were rated, and how
+[Validity](validity.md#how-natural-the-words-are) says how natural the texts were rated, and how
 often readers named the goal. Authors, raters and readers are language models."""
 
 
@@ -98,19 +101,19 @@ def scenario_part() -> str:
     cells = told.groupby(["task", "setting"], sort=False)
     texts = cells.text.agg(lambda column: f"{len(column)} ({column.nunique()})")
     tokens = cells.tokens.agg(lambda column: f"{column.mean():.0f}, {column.max()}")
-    spatial = told[told.setting == "spatial"].groupby("task", sort=False)
+    spatial = told[told.setting == "spatial"]
+    places = pd.crosstab(spatial.task, spatial.place).reindex(spatial.task.unique())
     return _PAGE.format(
-        version=LANGUAGE_VERSIONS[LANGUAGE],
-        tasks=", ".join(written_words()),
         limit=USUAL_LIMIT,
         texts=_table(texts.unstack(sort=False)),
         tokens=_table(tokens.unstack(sort=False)),
         expressions=_expressions(told.said),
+        quotations=_quotations(told),
         frames=_table(_frames().came_up.unstack(sort=False)),
         missing="\n".join(_missing()),
         words=_words(told),
         shared=_shared(told),
-        landmarks=_table(spatial.unusual.agg(texts="size", unusual="sum")),
+        places=_table(places),
         alone=_table(cells.alone.sum().unstack(sort=False).astype("Int64")),
     )
 
@@ -119,13 +122,14 @@ def scenario_part() -> str:
 def _told(splits: tuple[str, ...]) -> pd.DataFrame:
     """Return a row for each implicit text of some splits."""
     settings = [name for name, setting in all_settings().items() if setting.implicit]
-    options = InstructionOptions(language=LANGUAGE)
+    options = InstructionOptions()
     rows = []
     for episode, said in instructions(
         split_episodes([*written_words()], splits), settings, ["implicit"], options
     ):
         goals = goals_of_command(said, episode)
         classes = cast("list[int]", said.metadata.get("landmark_classes") or [])
+        places = [PlaceClass(number).name.lower().replace("_", " ") for number in classes]
         rows.append(
             {
                 "task": said.task,
@@ -134,7 +138,7 @@ def _told(splits: tuple[str, ...]) -> pd.DataFrame:
                 "text": said.text,
                 "tokens": count_tokens(said.text),
                 "alone": all(is_right(goal, episode) for goal in goals),
-                "unusual": int(PlaceClass.UNUSUAL) in classes,
+                "place": places[0] if places else None,
                 "said": said,
             }
         )
@@ -146,6 +150,27 @@ def _expressions(said: Sequence[Instruction]) -> str:
     settings = [name for name in all_settings() if name in counts]
     known = pd.DataFrame(counts, index=expression_order(counts), columns=settings)
     return _table(known.rename_axis("class").astype("Int64"))
+
+
+def _quotations(told: pd.DataFrame) -> str:
+    """Return in which tasks each expression of the paper is said."""
+    tasks: dict[str, set[str]] = {}
+    for row in pointer_table():
+        if row.quote:
+            is_said = told.text.str.contains(_spoken(row.words), regex=True)
+            tasks.setdefault(row.quote, set()).update(told.task[is_said])
+    said = {
+        quote: ", ".join(task for task in written_words() if task in own)
+        for quote, own in tasks.items()
+    }
+    return _table(pd.DataFrame({"tasks": said}).rename_axis("example"))
+
+
+def _spoken(words: str) -> str:
+    """Return a pattern for what a pointer's words become in a text."""
+    many = re.sub(r"\[[^|]*\|(.*?)\]", r"\1", words)
+    named = many.translate(str.maketrans("", "", "<>"))
+    return r"\b" + re.sub(r"\{[^}]*\}|\*", r"[a-z]+(?: [a-z]+)?", named) + r"\b"
 
 
 def _scenarios() -> Iterator[tuple[str, Scenario]]:
@@ -206,7 +231,7 @@ def _vocabulary(texts: pd.Series[str]) -> pd.Series[str]:
 
 def _shared(told: pd.DataFrame) -> str:
     """Return how many frames, blanked sentences and texts are in both pools, over all tasks."""
-    test, train = _sentences("test"), _sentences("train")
+    test, train = (sentences_of(our_scenarios(), pool) for pool in ("test", "train"))
     frames = [name for name in test if name.startswith("frame ")]
     texts, known = set(told.text), set(_told(TRAIN).text)
     shares = {
@@ -218,14 +243,6 @@ def _shared(told: pd.DataFrame) -> str:
         "texts": (len(texts), len(texts & known)),
     }
     return _table(pd.DataFrame(shares, index=["of test", "in training, too"]).T.rename_axis("what"))
-
-
-def _sentences(pool: PoolName) -> set[str]:
-    found: set[str] = set()
-    for scenario in our_scenarios():
-        if scenario.fields.pool == pool:
-            found.update(blanked(scenario))
-    return found
 
 
 def _table(frame: pd.DataFrame) -> str:

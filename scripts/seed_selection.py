@@ -13,9 +13,10 @@ from roboirg.core.errors import (
     MotionPlanningError,
     SceneRejectedError,
 )
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.envs.factory import make
-from roboirg.language import find_refusals
-from roboirg.language.settings import ACCEPTANCE_SETTINGS
+from roboirg.language.generator import request_of
+from roboirg.language.settings import ACCEPTANCE_SETTINGS, all_settings, settings_of
 from roboirg.policies import make_policy, play
 from roboirg.tasks import every_task, get_task
 from roboirg.tasks.splits.published_episodes import published_episode
@@ -98,8 +99,14 @@ def check_words(slot: EpisodeSlot, seed: int) -> Rejection | None:
         episode = _episode(slot, seed)
     except SceneRejectedError as error:
         return Rejection(seed, "no room", str(error))
-    refused = find_refusals(episode)
-    causes = [f"{name}: {refused[name]}" for name in ACCEPTANCE_SETTINGS if name in refused]
+    causes: list[str] = []
+    for name in ACCEPTANCE_SETTINGS:
+        if name in settings_of(get_task(slot.task)):
+            request = request_of(episode, InstructionOptions(name))
+            # The setting's own reason: which words are written must not change the splits.
+            reason = all_settings()[name].refusal(request)
+            if reason is not None:
+                causes.append(f"{name}: {reason}")
     return Rejection(seed, "not expressible", "; ".join(causes)) if causes else None
 
 

@@ -11,8 +11,8 @@ import typer.main
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
-from roboirg.evaluation.plan.plan import plan_options
 from roboirg.main import app
+from roboirg.runs.plan.plan import plan_options
 
 ROOT = Path(__file__).parents[1]
 COMMAND_LINE = "command-line.md"
@@ -21,7 +21,7 @@ PAGES = {
     "README.md": "index.md",
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changes.md",
-    "src/roboirg/evaluation/analysis/published_results/README.md": "published-results.md",
+    "src/roboirg/analysis/published_results/README.md": "published-results.md",
 }
 """The site's name of each page outside docs/."""
 LINK = re.compile(r"(\]\()([^)\s#]+)")

@@ -1,4 +1,4 @@
-"""Try out language 4: what a listener learns of it, and what gives its goals away.
+"""Try out scenarios: what a listener learns of it, and what gives its goals away.
 
 `listener` trains a listener on the scenarios of the train pool, and prints which percentage of
 goals it gets in scenes that it never saw, in known scenarios and in those of the test pool. It is
@@ -29,7 +29,7 @@ from roboirg.language.landmarks import WORK_AREA
 from roboirg.language.scenarios.scenario_file import written_words
 from roboirg.language.settings import all_settings
 from roboirg.language.variants import instructions
-from roboirg.shortcuts.goal_learner import Told
+from roboirg.shortcuts.goal_learner import InstructedEpisode
 from roboirg.shortcuts.shortcut_scores import counted_slots
 from roboirg.tasks.splits.splits import get_episode
 
@@ -55,16 +55,16 @@ named for more."""
 app = typer.Typer(help=__doc__)
 
 
-def told_in(pool: str, first: int, scenes: int) -> Iterator[Told]:
+def told_in(pool: str, first: int, scenes: int) -> Iterator[InstructedEpisode]:
     """Yield the texts of random scenes of each task, in all settings."""
-    options = InstructionOptions(wordings=pool, language=4)
+    options = InstructionOptions(wordings=pool)
     episodes = (
         get_episode(task, "random", first + number) for task in TASKS for number in range(scenes)
     )
     yield from instructions(episodes, tuple(all_settings()), ("implicit",), options)
 
 
-def clues_of(pool: str, one: Told) -> dict[str, object]:
+def clues_of(pool: str, one: InstructedEpisode) -> dict[str, object]:
     """Return what a text can be guessed from, and its goal: the values of the open slots."""
     said = one[1]
     goal = {slot: values_in(one[0].goal[slot]) for slot in counted_slots(one)}
@@ -109,7 +109,9 @@ def frames(scenes: int = 2000) -> None:
     )
 
 
-def lessons_of(texts: Sequence[Told], classes: Sequence[str], without: str) -> Iterator[Lesson]:
+def lessons_of(
+    texts: Sequence[InstructedEpisode], classes: Sequence[str], without: str
+) -> Iterator[Lesson]:
     """Yield texts with their goals and what is seen; hidden things are seen before they are."""
     from roboirg_learn.listener.learned_model import WITHOUTS, hide
     from roboirg_learn.listener.object_relations import corners_of, rank
@@ -138,8 +140,9 @@ def listener(
     """Train a listener on random scenes, and print what it gets; `kept` has what is unfinished."""
     import torch
 
+    from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.listener.reader_training import train_reader
-    from roboirg_learn.listener.vocabulary import USUAL_ENCODERS, make_vocabulary
+    from roboirg_learn.listener.vocabulary import make_vocabulary
     from roboirg_learn.trainer import KeptTraining
 
     torch.set_num_threads(1)
@@ -149,8 +152,9 @@ def listener(
     classes = sorted({class_of(one) for told in learned for one in told[0].scene.objects})
     made_of = [hashlib.sha256("\n".join(words).encode()).hexdigest(), without, passes]
     reader = train_reader(
-        list(lessons_of(learned, classes, without)), make_vocabulary(words, classes, TASKS), passes,
-        0, lambda *done: print(*done, flush=True), USUAL_ENCODERS, KeptTraining(kept, made_of),
+        list(lessons_of(learned, classes, without)), make_vocabulary(words, classes, TASKS),
+        ReaderPlan(TASKS, reader_epochs=passes),
+        lambda *done: print(*done, flush=True), KeptTraining(kept, made_of),
     )  # fmt: skip
     answers = []
     for pool in POOLS:

@@ -1,34 +1,38 @@
-"""Write docs/language-card.md: an example of every variant, and what language 4 says.
+"""Write docs/language-card.md: an example of every variant, and what is said, measured.
 
 python scripts/write_language_card.py
+
+It also writes the examples on the pages of the settings.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
+from language_examples import harder_page, language_page, marked
 from scenario_tables import scenario_part
 
-from roboirg.apps.language_lab.corpus_statistics import (
-    PAPER_PHRASES,
-    metadata_counts,
-    phrase_counts,
-)
+from roboirg.apps.language_lab.corpus_statistics import metadata_counts
 from roboirg.core.episode import Episode
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import find_refusal, instruct
-from roboirg.language.instruction import Instruction, Mention
-from roboirg.language.patterns import PATTERNS
-from roboirg.language.settings import all_settings, settings_of
-from roboirg.language.templates import LANGUAGE_VERSION
-from roboirg.language.variants import all_variants
+from roboirg.language.instruction import Instruction
+from roboirg.language.scenarios.scenario import PATTERNS
+from roboirg.language.settings import all_settings, plain_settings, settings_of
+from roboirg.language.word_sampler import LANGUAGE_VERSION
 from roboirg.tasks import Task, all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode, split_size
 
 SPLIT = "test"
-PAGE = Path(__file__).parent.parent / "docs" / "language-card.md"
+DOCS = Path(__file__).parent.parent / "docs"
+PAGE = DOCS / "language-card.md"
+EXAMPLES: Mapping[Path, Callable[[str], str]] = {
+    DOCS / "language.md": language_page,
+    DOCS / "harder-settings.md": harder_page,
+}
+"""Pages with examples, and how each is written."""
 
 _INTRODUCTION = """\
 # Language card
@@ -38,7 +42,8 @@ _INTRODUCTION = """\
 One episode for each of the {variants} variants: the explicit command, the instruction of the
 variant, and its resolved form, in which the command names the referents of its referring
 expressions. An *antecedent* introduces a value, **an anaphor** points back at it.
-[The language](language.md) explains the settings. [Language 4](#language-4) stands at the end."""
+[The language](language.md) explains the settings; [what is said, measured](#what-is-said-measured)
+stands at the end."""
 
 
 def whole_page() -> str:
@@ -47,16 +52,24 @@ def whole_page() -> str:
 
 
 def language_card() -> str:
-    """Return the page without language 4."""
-    variants = all_variants()
-    parts = [_INTRODUCTION.format(version=LANGUAGE_VERSION, variants=len(variants))]
+    """Return the examples."""
+    parts = [
+        _INTRODUCTION.format(
+            version=LANGUAGE_VERSION, variants=sum(map(len, map(_variants, all_tasks().values())))
+        )
+    ]
     for task in all_tasks().values():
         parts.append(f"## {task.name}")
-        parts += [_example(task.name, one.setting) for one in variants if one.task == task.name]
-    parts += [_patterns_by_task(), _phrases()]
+        parts += [_example(task.name, setting) for setting in _variants(task)]
+    parts.append(_patterns_by_task())
     parts.append("## Harder settings\n\nWith a rival, and grounded in what is seen.")
     parts += [_harder_example(*one) for one in _harder_variants()]
     return "\n\n".join(parts) + "\n"
+
+
+def _variants(task: Task) -> list[str]:
+    """Return the settings of a task that leave something implicit, without the harder ones."""
+    return [name for name in plain_settings(task) if all_settings()[name].implicit]
 
 
 def _patterns_by_task() -> str:
@@ -73,29 +86,6 @@ def _patterns_by_task() -> str:
     for task in all_tasks():
         cells = (str(counts[task].get(pattern) or "–") for pattern in PATTERNS)
         lines.append(f"| {task} | {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-def _phrases() -> str:
-    """Return how often the phrases of the paper occur in the commands of the test split."""
-    lines = [
-        "## Phrases of the paper",
-        "",
-        (
-            "Commands of the test split that have a phrase that the paper quotes or lists. *it* "
-            "counts, too, where it stands for a thing that the same command names, which is no "
-            "mention."
-        ),
-        "",
-        "| setting | phrase | texts |",
-        "| --- | --- | --- |",
-    ]
-    told = [one for setting in PAPER_PHRASES for one in _told(setting)]
-    resolved = [one for setting in ("reasoning", "spatial") for one in _told(setting, "resolved")]
-    for setting, by_phrase in phrase_counts([*told, *resolved]).items():
-        lines += [
-            f"| {setting} | *{name}* | {count} |" for name, count in by_phrase.items() if count
-        ]
     return "\n".join(lines)
 
 
@@ -171,23 +161,7 @@ def _about(instruction: Instruction) -> Iterator[str]:
         yield f"{instruction.metadata['rival_reference']}"
 
 
-def marked(instruction: Instruction) -> str:
-    """Return the prompt in Markdown, with antecedents in italics and anaphors in bold."""
-    turns: list[str] = []
-    for number, utterance in enumerate(instruction.utterances):
-        text = utterance.text
-        for mention in reversed(instruction.mentions):
-            if mention.utterance == number:
-                sign = _sign(mention)
-                span = f"{sign}{text[mention.start : mention.end]}{sign}"
-                text = f"{text[: mention.start]}{span}{text[mention.end :]}"
-        turns.append(text)
-    return " ".join(turns)
-
-
-def _sign(mention: Mention) -> str:
-    return "**" if mention.role == "anaphor" else "*"
-
-
 if __name__ == "__main__":
     PAGE.write_text(whole_page(), encoding="utf-8")
+    for path, write in EXAMPLES.items():
+        path.write_text(write(path.read_text(encoding="utf-8")), encoding="utf-8")

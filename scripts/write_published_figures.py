@@ -17,15 +17,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.evaluation.analysis.published import (
+from roboirg.analysis.published import (
     TRIALS,
     PublishedRow,
     RateTable,
     published_rows,
     published_tasks,
 )
-from roboirg.evaluation.analysis.results.option_labels import staged_options
-from roboirg.evaluation.analysis.stats.intervals import (
+from roboirg.analysis.results.option_labels import staged_options
+from roboirg.language.settings import EXPLICIT
+from roboirg.stats.intervals import (
     SEED,
     Z_95,
     Interval,
@@ -33,7 +34,6 @@ from roboirg.evaluation.analysis.stats.intervals import (
     resampled_rates,
     wilson_interval,
 )
-from roboirg.language.settings import EXPLICIT
 
 PAGE = Path(__file__).parent.parent / "docs" / "published-figures.md"
 IMPLICIT = ("direct", "reasoning", "contextual", "spatial")
@@ -206,7 +206,7 @@ The paper prints success rates without intervals. This page computes from these 
 statistics of our own tables, what can be said from them. It is no criticism of the experiments:
 those who build on a number need to know how firm it is. The rates are the paper's, from its systems
 in its simulator; all are in the
-[published results](../src/roboirg/evaluation/analysis/published_results/README.md).
+[published results](../src/roboirg/analysis/published_results/README.md).
 
 Intervals are 95 %, by the [bootstrap](statistics.md) of our tables. Single trials are not
 published, so rows are compared unpaired, and the 150 trials of a cell (50 episodes, each with three

@@ -1,14 +1,8 @@
-"""Rates and parts of pages; a part is between ``<!-- NAME -->`` and ``<!-- end of NAME -->``."""
+"""Parts of pages; a part is between ``<!-- NAME -->`` and ``<!-- end of NAME -->``."""
 
 from __future__ import annotations
 
 import re
-
-
-def rate_text(rate: float, interval: tuple[float, float]) -> str:
-    """Return a rate, 0 to 1, and its interval in percent."""
-    low, high = interval
-    return f"{100 * rate:.0f} ({100 * low:.0f} to {100 * high:.0f})"
 
 
 def with_part(page: str, name: str, text: str) -> str:

@@ -29,18 +29,19 @@ CHANGES = {
         ("    delivery: str\n", "    delivery: str\n    greeting: str\n"),
     ],
     "language/settings/direct.py": [
+        ('reads=frozenset({"delivery"', 'reads=frozenset({"greeting", "delivery"'),
+    ],
+    "language/scenarios/spoken.py": [
         (
-            "    return InstructionSpec((introduction(request), command(request)))",
+            '    utterances = [UtteranceSpec("introduction", speech.phrase(',
             (
-                "    first = introduction(request)\n"
+                "    first: Phrase = ()\n"
                 '    if request.options.greeting == "hello":\n'
-                '        greeting = plain("Hello, robot. ")\n'
-                '        first = UtteranceSpec("introduction", (*greeting, *first.phrase))\n'
-                "    return InstructionSpec((first, command(request)))"
+                '        first = plain("Hello, robot. ")\n'
+                '    utterances = [UtteranceSpec("introduction", first + speech.phrase('
             ),
         ),
-        ("phrases import sentences", "phrases import plain, sentences"),
-        ('reads=frozenset({"delivery", ', 'reads=frozenset({"greeting", "delivery", '),
+        ("phrases import Phrase", "phrases import Phrase, plain"),
     ],
 }
 """All that is changed in the package to add it: texts and what they become, by file."""
@@ -84,7 +85,7 @@ def test_an_added_option_reaches_words_commands_plans_records_and_tables(
     plan = plan_file(greeting="hello", max_steps=2, episodes=1)
     run, rows = tmp_path / "run", tmp_path / "rows.jsonl"
     commands = [
-        ("show", "PickXtimes", 0, "--words", "--greeting", "hello"),
+        ("show", "PickXtimes", 0, "--words", "--settings", "direct", "--greeting", "hello"),
         ("run", "--plan", plan, "--show-plan"),
         ("run", "--plan", plan, *few, "--policy", "random", "--workers", 0, "--out", run),
         ("tables", run),

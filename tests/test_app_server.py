@@ -14,10 +14,10 @@ from starlette.applications import Starlette
 from starlette.responses import PlainTextResponse
 from starlette.routing import Route
 
+from roboirg.analysis.page.page_server import run_server
 from roboirg.apps.real.pages.score_server import ScoreServer
 from roboirg.apps.real.study.study_plan import make_study, write_study
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.page.page_server import run_server
 from roboirg.util.web.app_server import AppServer, read_body
 
 VIDEO_BYTES = 64 << 20

@@ -119,7 +119,7 @@ def test_a_kill_while_writing_leaves_no_bad_entry(tmp_path, caplog, monkeypatch)
     assert caught_writing
     assert caplog.records == []
     # What was left unfinished is swept out in time.
-    monkeypatch.setattr(cache_module, "_ABANDONED", -1.0)
+    monkeypatch.setattr(cache_module, "_ABANDONED_S", -1.0)
     cache.write("0", b"0")
     assert not any(name.endswith(".part") for name in entries(tmp_path))
 

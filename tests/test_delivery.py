@@ -18,10 +18,10 @@ from roboirg.core.delivery import (
 )
 from roboirg.core.errors import UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.records.store import read_records
 from roboirg.language.settings import all_settings
 from roboirg.main import app
 from roboirg.policies import make_policy, play
+from roboirg.records.store import read_records
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 

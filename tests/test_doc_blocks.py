@@ -21,11 +21,11 @@ import pytest
 import typer.main
 from made_records import make_record
 
-from roboirg.evaluation.plan.plan_file import read_plan_file
-from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.records.store import RecordStore
 from roboirg.main import app, main
+from roboirg.records.store import RecordStore
+from roboirg.runs.plan.plan_file import read_plan_file
+from roboirg.runs.plan.plan_maker import make_plan
+from roboirg.runs.plan.stored_plans import write_plan
 
 ROOT = Path(__file__).parent.parent
 ELSEWHERE = dict.fromkeys(

@@ -12,21 +12,20 @@ import weakref
 import gymnasium
 import numpy as np
 import pytest
+from flat_jobs import job_of
 from gymnasium.utils.env_checker import check_env
 
 import roboirg
 from roboirg.core.actions import ACTION_SPACES
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
-from roboirg.core.instruction_options import OPTION_NAMES, InstructionOptions
+from roboirg.core.instruction_options import OPTION_NAMES
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.envs.env_settings import EnvOptions, EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
-from roboirg.evaluation.play.job_instruction import PreparedJob
-from roboirg.evaluation.play.policy_environment import make_env
-from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy, play
-from roboirg.policies.by_name.finding import read_policy
+from roboirg.runs.job_instruction import PreparedJob
+from roboirg.runs.play.policy_environment import make_env
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.physics_settings import HOME_ACTION
 
@@ -174,14 +173,7 @@ def test_an_environment_without_what_a_policy_looks_at_is_refused(attribute):
 
 
 def test_runs_give_policies_their_action_space():
-    job = Job(
-        policy="random",
-        ref=read_policy("random"),
-        task="PickXtimes",
-        split="test",
-        episode=2,
-        options=InstructionOptions("direct"),
-    )
+    job = job_of(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
     for space in ACTION_SPACES.values():
         env = make_env(PreparedJob(job), PolicyNeeds(cameras=(), actions=space.name))
         assert env.actions == space.name
@@ -215,32 +207,13 @@ def test_the_frame_hook_is_called_at_its_period_and_at_the_end():
     assert [demonstration for step, demonstration in calls] == [step <= 66 for step in expected]
 
 
-def test_a_chunk_does_what_its_rows_do_and_stops_with_the_episode():
-    rng = np.random.default_rng(0)
-    actions = HOME_ACTION + np.append(rng.normal(0, 0.3, (40, 7)), rng.normal(0, 1, (40, 1)), 1)
-    single, chunked = (roboirg.make("PickXtimes", cameras=(), max_steps=35) for _ in range(2))
-    single.reset()
-    chunked.reset()
-    for action in actions[:35]:
-        last = single.step(action)
-    first, *_, begun = chunked.step_chunk(actions[:20])
-    both = chunked.step_chunk(actions[20:])
-    assert (begun["status"], begun["steps"]) == ("ongoing", 20)
-    assert first["joint_positions"].tolist() != both[0]["joint_positions"].tolist()
-    assert both[1:4] == last[1:4] == (0.0, False, True)
-    assert both[4]["status"] == last[4]["status"] == "timeout"
-    for key, value in last[0].items():
-        assert np.array_equal(both[0][key], value), key
-    assert chunked.events == single.events
-
-
-def test_history_holds_every_nth_observation_of_a_chunk():
+def test_a_chunk_does_what_its_rows_do_keeps_every_nth_observation_and_stops_at_the_end():
     rng = np.random.default_rng(0)
     actions = HOME_ACTION + np.append(rng.normal(0, 0.1, (27, 7)), rng.normal(0, 1, (27, 1)), 1)
     options = {"cameras": ("wrist",), "depth": True, "max_steps": 25}
     single = roboirg.make("PickXtimes", **options)
     single.reset()
-    steps = {step: single.step(action)[0] for step, action in enumerate(actions[:25], 1)}
+    steps = {step: single.step(action) for step, action in enumerate(actions[:25], 1)}
     env = roboirg.make("PickXtimes", **options, observe_every=4)
     first, _ = env.reset()
     assert first["history"] == ()
@@ -250,16 +223,21 @@ def test_history_holds_every_nth_observation_of_a_chunk():
         (actions[10:20], [12, 16, 20]),
         (actions[20:], [24]),
     ):
-        observation, *_ = env.step_chunk(rows)
+        observation, *ended, info = env.step_chunk(rows)
         assert observation in env.observation_space
-        history = observation["history"]
+        _, *alone_ended, alone_info = steps[info["steps"]]
+        assert (ended, info["status"]) == (alone_ended, alone_info["status"])
+        seen = dict(observation)
+        history = seen.pop("history")
         assert len(history) == len(due)
-        for seen, step in zip(history, due, strict=True):
-            assert list(seen) == list(steps[step])
-            for key, value in steps[step].items():
-                assert np.array_equal(seen[key], value), (step, key)
-    assert env.status == "timeout"
-    assert "history" not in first["history"]
+        for some, step in ((seen, info["steps"]), *zip(history, due, strict=True)):
+            expected = steps[step][0]
+            assert list(some) == list(expected)
+            for key, value in expected.items():
+                assert np.array_equal(some[key], value), (step, key)
+    assert ended == [0.0, False, True]
+    assert info["status"] == "timeout"
+    assert env.events == single.events
 
 
 def test_history_may_have_fewer_cameras(monkeypatch):
@@ -298,14 +276,8 @@ def test_policies_are_shown_what_they_ask_for():
     wrong = roboirg.make("PickXtimes", cameras=(), demonstration_frames="none")
     with pytest.raises(InvalidValueError, match=r"needs observe_every=5, but .* has None"):
         play(wrong, policy)
-    job = Job(
-        policy="mine",
-        ref=read_policy(f"{__name__}:Choosy"),
-        task="PickXtimes",
-        split="test",
-        episode=2,
-        options=InstructionOptions("direct"),
-    )
+    name = f"{__name__}:Choosy"
+    job = job_of(policy=name, task="PickXtimes", split="test", episode=2, setting="direct")
     env = make_env(
         PreparedJob(job), PolicyNeeds(cameras=(), demonstration_frames="none", observe_every=5)
     )

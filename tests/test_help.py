@@ -15,10 +15,10 @@ from roboirg.core.instruction_options import (
     OPTION_NAMES,
     InstructionKeywords,
 )
-from roboirg.evaluation.plan.plan import plan_options
-from roboirg.evaluation.plan.plan_file import plan_text, read_plan_file
-from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.main import app
+from roboirg.runs.plan.plan import plan_options
+from roboirg.runs.plan.plan_file import plan_text, read_plan_file
+from roboirg.runs.plan.plan_maker import make_plan
 
 LINES, LINES_OF_RUN, COLUMNS = 45, 60, 100
 

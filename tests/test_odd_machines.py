@@ -10,8 +10,8 @@ from roboirg import main as cli
 from roboirg.cli import doctor
 from roboirg.cli.doctor import Check
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.evaluation.play.watchdog import Watchdog
 from roboirg.policies.vlm.models import ModelOptions, make_model
+from roboirg.runs.play.watchdog import Watchdog
 from roboirg.util.child_process import ChildProcess
 from roboirg.util.proxies import proxy_of
 from roboirg.util.user_folders import temporary_folder, user_folder

@@ -99,7 +99,7 @@ def test_the_reference_has_the_public_names(pages):
     wanted |= {
         "roboirg.envs.environment.RoboIRGEnv.step",
         "roboirg.policies.Policy.act",
-        "roboirg.evaluation.records.record.Record",
+        "roboirg.records.record.Record",
     }
     assert wanted <= names
 

@@ -60,6 +60,7 @@ RIGHT = {
     "score grounding": ["nowhere", "--data", "nowhere"],
     "learn listener": ["--out", "out"],
     "learn policy": ["--out", "out"],
+    "learn reader": ["--body", "a", "--out", "out"],
 }
 """Words for commands whose work needs what is not there: files, or a library."""
 
@@ -92,16 +93,27 @@ def home(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize(("name", "words"), CASES)
-def test_a_wrong_invocation_is_one_sentence(name, words, home, monkeypatch, capsys):
+@pytest.fixture
+def refused(home, monkeypatch, capsys):
+    """Call a command that ends with exit code 2, and return what it prints."""
     monkeypatch.chdir(home)
     monkeypatch.setattr(sys, "path", list(sys.path))
+
+    def call(name, words):
+        monkeypatch.setattr(sys, "argv", ["roboirg", *name.split(), *words])
+        with pytest.raises(SystemExit) as left:
+            cli.main()
+        told = capsys.readouterr()
+        assert left.value.code == 2, told
+        return told
+
+    return call
+
+
+@pytest.mark.parametrize(("name", "words"), CASES)
+def test_a_wrong_invocation_is_one_sentence(name, words, home, refused):
     before = sorted(home.rglob("*"))
-    monkeypatch.setattr(sys, "argv", ["roboirg", *name.split(), *words])
-    with pytest.raises(SystemExit) as left:
-        cli.main()
-    told = capsys.readouterr()
-    assert left.value.code == 2, told
+    told = refused(name, words)
     assert told.out == ""
     assert told.err.startswith("roboirg: ")
     assert told.err.count("\n") == 1
@@ -120,11 +132,5 @@ WRITING = [
 
 
 @pytest.mark.parametrize(("name", "words"), WRITING)
-def test_a_place_that_cannot_be_written_is_one_sentence(name, words, home, monkeypatch, capsys):
-    monkeypatch.chdir(home)
-    monkeypatch.setattr(sys, "argv", ["roboirg", *name.split(), *words])
-    with pytest.raises(SystemExit) as left:
-        cli.main()
-    told = capsys.readouterr()
-    assert left.value.code == 2, told
-    assert told.err.splitlines()[-1].startswith("roboirg: ")
+def test_a_place_that_cannot_be_written_is_one_sentence(name, words, refused):
+    assert refused(name, words).err.splitlines()[-1].startswith("roboirg: ")

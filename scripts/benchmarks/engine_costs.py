@@ -11,17 +11,17 @@ from pathlib import Path
 
 import msgspec
 
-from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.play.episode_record import begin_record
-from roboirg.evaluation.play.job_instruction import PreparedJob
-from roboirg.evaluation.play.rollout import EpisodeRunner
-from roboirg.evaluation.records.record import EventRecord, Job, Record
-from roboirg.evaluation.records.record_codec import encode
-from roboirg.evaluation.records.store import RECORDS_FILE, RecordStore
-from roboirg.evaluation.run.executor import LocalProcesses
-from roboirg.evaluation.run.progress import Reporter
-from roboirg.evaluation.run.runner import run_plan
+from roboirg.records.record import EventRecord, Job, Record
+from roboirg.records.record_codec import encode
+from roboirg.records.store import RECORDS_FILE, RecordStore
+from roboirg.runs.job_instruction import PreparedJob
+from roboirg.runs.plan.plan import Plan
+from roboirg.runs.plan.plan_maker import make_plan
+from roboirg.runs.play.episode_record import begin_record
+from roboirg.runs.play.rollout import EpisodeRunner
+from roboirg.runs.run.executor import LocalProcesses
+from roboirg.runs.run.progress import Reporter
+from roboirg.runs.run.runner import run_plan
 
 MANY_RECORDS = 100_000
 _EVENTS = 60

@@ -16,10 +16,10 @@ from benchmarks.worker_rates import WavingPolicy
 from roboirg.core.observations import CAMERAS
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.envs.factory import make
-from roboirg.evaluation.hosting.host_pool import HostPool, HostSettings
-from roboirg.evaluation.hosting.hosted_policy import HostedPolicy
 from roboirg.policies import Policy, make_policy, play
 from roboirg.policies.by_name.finding import read_policy
+from roboirg.runs.hosting.host_pool import HostPool, HostSettings
+from roboirg.runs.hosting.hosted_policy import HostedPolicy
 
 CHUNKS = 12
 EPISODES = 7

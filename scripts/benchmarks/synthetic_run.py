@@ -15,14 +15,14 @@ import numpy as np
 
 from roboirg.core.conditions import Fact, FactCount, OccurrenceCount, facts_of
 from roboirg.core.episode import Episode, Stage
-from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.play.episode_record import begin_record
-from roboirg.evaluation.play.job_instruction import PreparedJob
-from roboirg.evaluation.records.record import Attribution, EventRecord, Job, Outcome, Record
-from roboirg.evaluation.records.record_codec import encode
-from roboirg.evaluation.records.store import RECORDS_FILE
+from roboirg.records.record import Attribution, EventRecord, Job, Outcome, Record
+from roboirg.records.record_codec import encode
+from roboirg.records.store import RECORDS_FILE
+from roboirg.runs.job_instruction import PreparedJob
+from roboirg.runs.plan.plan import Plan
+from roboirg.runs.plan.plan_maker import make_plan
+from roboirg.runs.plan.stored_plans import write_plan
+from roboirg.runs.play.episode_record import begin_record
 from roboirg.tasks.splits.splits import get_episode
 
 POLICIES = tuple(f"policy-{letter}=random" for letter in "abcd")

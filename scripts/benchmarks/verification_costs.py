@@ -8,10 +8,10 @@ from pathlib import Path
 
 from benchmarks.engine_costs import temporary_folder
 from roboirg.apps.leaderboard.run_verification import verify_run
-from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.play.rollout import EpisodeRunner
-from roboirg.evaluation.run.executor import InProcess
-from roboirg.evaluation.run.runner import run_plan
+from roboirg.runs.plan.plan_maker import make_plan
+from roboirg.runs.play.rollout import EpisodeRunner
+from roboirg.runs.run.executor import InProcess
+from roboirg.runs.run.runner import run_plan
 
 
 def verify_time() -> float:

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from benchmarks.step_times import CHUNK
 from roboirg.core.observations import CAMERAS, FRONT, Demonstration, Observation
-from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.play.rollout import EpisodeRunner
-from roboirg.evaluation.run.executor import LocalProcesses
+from roboirg.runs.plan.plan_maker import make_plan
+from roboirg.runs.play.rollout import EpisodeRunner
+from roboirg.runs.run.executor import LocalProcesses
 
 MAX_STEPS = 20 * CHUNK
 FEW_STEPS = 5 * CHUNK

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING
 from roboirg.core.version import __version__
 
 if TYPE_CHECKING:
+    from roboirg.analysis.measures.measure import measure
+    from roboirg.analysis.run_results import results
+    from roboirg.api.evaluate import evaluate
     from roboirg.envs.factory import make
-    from roboirg.evaluation.analysis.stats.measure import measure
-    from roboirg.evaluation.api.evaluate import evaluate
-    from roboirg.evaluation.api.results import results
     from roboirg.policies.by_name.finding import Privileged
 
 __all__ = ["Privileged", "__version__", "evaluate", "make", "measure", "results"]
 
 _HOMES = {
     "Privileged": "roboirg.policies.by_name.finding",
-    "evaluate": "roboirg.evaluation.api.evaluate",
+    "evaluate": "roboirg.api.evaluate",
     "make": "roboirg.envs.factory",
-    "measure": "roboirg.evaluation.analysis.stats.measure",
-    "results": "roboirg.evaluation.api.results",
+    "measure": "roboirg.analysis.measures.measure",
+    "results": "roboirg.analysis.run_results",
 }
 
 

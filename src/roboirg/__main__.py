@@ -9,13 +9,13 @@ from types import FrameType
 
 def main() -> None:
     """Run the command; before and after it, Ctrl-C ends the process at once."""
-    handled = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
-    if handled:
+    is_handled = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
+    if is_handled:
         signal.signal(signal.SIGINT, _stop)
     from roboirg.main import main as run
 
     try:
-        if handled:
+        if is_handled:
             signal.signal(signal.SIGINT, _interrupt)
         run()
     except BaseException as error:
@@ -24,7 +24,7 @@ def main() -> None:
             _stop()
         raise
     finally:
-        if handled:
+        if is_handled:
             signal.signal(signal.SIGINT, _stop)
 
 

@@ -118,20 +118,20 @@ def _add_commands() -> None:
 
 def _add_outside(entry: importlib.metadata.EntryPoint) -> None:
     """Add what another package offers; one that is broken takes no other command away."""
-    own = typer.Typer()
+    offered = typer.Typer()
     try:
         found = entry.load()
         if isinstance(found, typer.Typer):
-            own.add_typer(found, name=entry.name)
+            offered.add_typer(found, name=entry.name)
         else:
-            own.command(entry.name)(found)
-        typer.main.get_command(own)  # which reads the parameters
+            offered.command(entry.name)(found)
+        typer.main.get_command(offered)  # which reads the parameters
     except (Exception, SystemExit) as error:  # noqa: BLE001 - a stranger's code
         words = printable(one_line(error))
         typer.echo(f"roboirg: no command {entry.name}: {entry.value}: {words}", err=True)
         return
-    app.registered_groups += own.registered_groups
-    app.registered_commands += own.registered_commands
+    app.registered_groups += offered.registered_groups
+    app.registered_commands += offered.registered_commands
 
 
 _add_commands()
@@ -154,12 +154,7 @@ def main() -> None:
     except typer.Abort:
         code = INTERRUPTED
     except Exception as error:
-        message = describe_missing(error)
-        if message is None and not sys.flags.dev_mode:
-            if is_of_others(error):
-                message = f"{printable(one_line(error))}; PYTHONDEVMODE=1 shows the traceback."
-            elif isinstance(error, OSError):
-                message = _describe_refused(error)
+        message = _describe(error)
         if message is None:
             raise
         typer.echo(f"roboirg: {message}", err=True)
@@ -168,6 +163,16 @@ def main() -> None:
     if code == INTERRUPTED:
         typer.echo("roboirg: stopped.", err=True)
     sys.exit(code)
+
+
+def _describe(error: Exception) -> str | None:
+    """Return one sentence about an error that is no bug of ours; None if it may be one."""
+    missing = describe_missing(error)
+    if missing is not None or sys.flags.dev_mode:
+        return missing
+    if is_of_others(error):
+        return f"{printable(one_line(error))}; PYTHONDEVMODE=1 shows the traceback."
+    return _describe_refused(error) if isinstance(error, OSError) else None
 
 
 def _print_usage_error(error: Exception) -> int:
@@ -199,8 +204,9 @@ def _describe_refused(error: OSError) -> str | None:
 
 def describe_missing(error: Exception) -> str | None:
     """Return one sentence that names the extra with a missing module; None if none has it."""
-    missing = error.name if isinstance(error, ModuleNotFoundError) else None
-    module = (missing or "").partition(".")[0]
+    if not isinstance(error, ModuleNotFoundError) or error.name is None:
+        return None
+    module, _, _ = error.name.partition(".")
     for extra, modules in _MODULES.items():
         if module in modules:
             return (

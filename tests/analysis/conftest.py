@@ -1,27 +1,11 @@
-"""Made-up results, without simulator, language or files."""
+"""Sockets that wait for a busy machine."""
 
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
-from flat_jobs import make_result
-from published_results import like_published
-
-from roboirg.evaluation.records.record import Summary
-
-MakeResult = Callable[..., Summary]
-
-
-@pytest.fixture(scope="session")
-def result() -> MakeResult:
-    return make_result
-
-
-@pytest.fixture(scope="session")
-def published_like() -> Callable[..., list[Summary]]:
-    return like_published
 
 
 @pytest.fixture(scope="module")

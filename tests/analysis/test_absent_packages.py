@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from evaluation_fakes import FakePlay, small_plan
 from msgspec.structs import replace
 from page_text import call
+from run_fakes import FakePlay, small_plan
 
-from roboirg.evaluation.records.store import RecordStore
+from roboirg.records.store import RecordStore
 
 THEIRS = {"PickXtimes": "TheirTask", "direct": "theirs", "random": "their_package:Policy"}
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import pytest
-from flat_jobs import make_result
+from flat_jobs import frame_of, make_result
 from syrupy.assertion import SnapshotAssertion
 
+from roboirg.analysis.measures.arm_figures import ArmFigure, arm_figures
+from roboirg.analysis.measures.chance import silent_chance
+from roboirg.analysis.measures.measure import mean_rate
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.tables.arm_table import language_use_sentences, make_arm_table
+from roboirg.analysis.tables.rendering import get_format
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.results.frame import make_frame
-from roboirg.evaluation.analysis.stats.arm_figures import ArmFigure, arm_figures
-from roboirg.evaluation.analysis.stats.chance import silent_chance
-from roboirg.evaluation.analysis.stats.measure import mean_rate
-from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.arm_table import language_use_sentences, make_arm_table
-from roboirg.evaluation.analysis.tables.rendering import get_format
-from roboirg.evaluation.records.record import GoalOutcomes, Summary
+from roboirg.records.record import GoalOutcomes, Summary
 
 TASKS = ("PickXtimes", "VideoUnmask")
 SCENES = range(12)
@@ -53,7 +52,7 @@ FIXED = {"told": "other", "other-goal": "other", "silent": "other", "scrambled":
 
 
 def data_of(*results: list[Summary]) -> RunData:
-    return RunData(make_frame([("", [one for each in results for one in each])]))
+    return RunData(frame_of(*results))
 
 
 def rates(one: ArmFigure) -> tuple[float, float]:

@@ -12,11 +12,11 @@ from flat_jobs import job_of
 from made_records import make_record
 from page_text import call, store
 
+from roboirg.analysis.tables.facts_table import NOT_APPLICABLE, NOT_REPORTED, RUN
 from roboirg.core.inference_facts import InferenceFacts, inference_facts
-from roboirg.evaluation.analysis.tables.facts_table import NOT_APPLICABLE, NOT_REPORTED, RUN
-from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.records.record import Record
+from roboirg.records.record import Record
+from roboirg.runs.plan.plan_maker import make_plan
+from roboirg.runs.plan.stored_plans import write_plan
 
 Facts = dict[str, dict[str, str]]
 

@@ -5,23 +5,22 @@ from __future__ import annotations
 import itertools
 from pathlib import Path
 
-import pandas as pd
 import pytest
+from flat_jobs import frame_of, make_result
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_records import make_record
 from page_text import store
 
 import roboirg
-from roboirg.apps.leaderboard.packing import pack_run
+from roboirg.analysis.measures.measure import summarize
+from roboirg.analysis.results.frame import COLUMNS, make_frame
+from roboirg.analysis.results.reading import WORD_COLUMNS, with_columns
+from roboirg.analysis.results.run_cells import cells_of
+from roboirg.analysis.results.sources import opened_sources
 from roboirg.core.versions import Versions
-from roboirg.evaluation.analysis.results.frame import COLUMNS, make_frame
-from roboirg.evaluation.analysis.results.reading import WORD_COLUMNS, with_columns
-from roboirg.evaluation.analysis.stats.cells import cells_of
-from roboirg.evaluation.analysis.stats.measure import summarize
-from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.plan.sources import opened_sources
-from roboirg.evaluation.records.store import iterate_records
+from roboirg.records.store import iterate_records
+from roboirg.runs.plan.plan_maker import make_plan
 
 OUTCOMES = ("success", "failure", "error")
 
@@ -43,15 +42,13 @@ def test_columns_have_their_types_and_lack_what_they_may_lack(run: Path) -> None
     found = roboirg.results(run)
     declared = {**COLUMNS, **WORD_COLUMNS}
     assert list(found) == list(declared)
-    kinds = {
-        "text": "string",
-        "texts": "object",
-        "number": "Int64",
-        "decimal": "Float64",
-        "flag": "boolean",
-    }
-    assert found.dtypes.astype(str).to_dict() == {
-        name: kinds[one.kind] for name, one in declared.items()
+    kinds = found.dtypes.astype(str).to_dict()
+    assert {(one.kind, kinds[name]) for name, one in declared.items()} == {
+        ("text", "string"),
+        ("texts", "object"),
+        ("number", "Int64"),
+        ("decimal", "Float64"),
+        ("flag", "boolean"),
     }
     assert {name for name, one in declared.items() if not one.missing} <= {
         name for name in found if found[name].notna().all()
@@ -66,33 +63,28 @@ def test_columns_have_their_types_and_lack_what_they_may_lack(run: Path) -> None
     assert set(found["suite"]) == {"counting"}
 
 
-def test_a_pack_has_the_results_of_its_folder(run: Path, tmp_path: Path) -> None:
-    pack_run(run, pack := tmp_path / "shipped.roboirg.zip")
-    whole = roboirg.results(run)
-    pd.testing.assert_frame_equal(roboirg.results(pack), whole)
-    pd.testing.assert_frame_equal(roboirg.results(f"{pack}:oracle"), whole)
-
-
-def test_policies_of_their_own_versions_are_called_by_their_names(result) -> None:
-    both = [result(policy=name, policy_version=name) for name in "ba"]
-    assert list(make_frame([("run", both)]).names.values()) == ["a", "b"]
-    assert list(make_frame([("run", both)]).names_as_played.values()) == ["b", "a"]
+def test_policies_of_their_own_versions_are_called_by_their_names() -> None:
+    both = [make_result(policy=name, policy_version=name) for name in "ba"]
+    assert list(frame_of(both).names.values()) == ["a", "b"]
+    assert list(frame_of(both).names_as_played.values()) == ["b", "a"]
     planned = [one.identity for one in both]
-    assert list(make_frame([("run", both)], planned).names.values()) == ["b", "a"]
+    assert list(frame_of(both, planned=planned).names.values()) == ["b", "a"]
 
 
-def test_rows_are_sorted_by_task_then_episode_then_seed(result) -> None:
+def test_rows_are_sorted_by_task_then_episode_then_seed() -> None:
     """In the order of the benchmark; unknown tasks come last."""
     rows = [("StopCube", 0, 0), ("StopCube", 0, 1), ("StopCube", 1, 0), ("BinFill", 2, 0),
             ("Another", 0, 0)]  # fmt: skip
-    found = [result("success", at, task=task, policy_seed=seed) for task, at, seed in rows[::-1]]
-    frame = make_frame([("run", found)])
+    found = [
+        make_result("success", at, task=task, policy_seed=seed) for task, at, seed in rows[::-1]
+    ]
+    frame = frame_of(found)
     assert [*zip(frame["task"], frame["episode"], frame["policy_seed"], strict=True)] == rows
 
 
-def test_what_is_missing_belongs_to_the_version_that_played_first(result) -> None:
-    two = [result("success", at, policy_version=name) for at, name in enumerate("ba")]
-    cells = cells_of(make_frame([("run", two)], [result("success", 2).identity]))
+def test_what_is_missing_belongs_to_the_version_that_played_first() -> None:
+    two = [make_result("success", at, policy_version=name) for at, name in enumerate("ba")]
+    cells = cells_of(frame_of(two, planned=[make_result("success", 2).identity]))
     assert {key.policy_run.versions.policy_version: one.missing for key, one in cells.items()} == {
         "a": 0, "b": 1,
     }  # fmt: skip
@@ -111,19 +103,14 @@ PLAYS = st.dictionaries(
 
 @settings(max_examples=25)
 @given(PLAYS, st.randoms(use_true_random=False))
-def test_order_and_runs_of_the_records_make_no_difference(result, plays, random) -> None:
+def test_order_and_runs_of_the_records_make_no_difference(plays, random) -> None:
     """Two runs complete each other, and what neither played is missing."""
-    planned = [
-        result("success", episode, setting=setting, task=task, policy_seed=seed).identity
-        for setting, task, episode, seed in plays
+    found = [
+        make_result(outcome, episode, setting=setting, task=task, policy_seed=seed)
+        for (setting, task, episode, seed), outcome in plays.items()
     ]
-    results = [
-        result(
-            outcome, job.episode, setting=job.setting, task=job.task, policy_seed=job.policy_seed
-        )
-        for job, outcome in zip(planned, plays.values(), strict=True)
-        if outcome != "missing"
-    ]
+    planned = [one.identity for one in found]
+    results = [one for one in found if one.outcome != "missing"]
     whole = make_frame([("whole", results)], planned)
     mixed = random.sample(results, len(results))
     at = random.randint(0, len(mixed))
@@ -134,8 +121,8 @@ def test_order_and_runs_of_the_records_make_no_difference(result, plays, random)
     assert summarize(cells_of(parts)) == summarize(cells_of(whole))
 
 
-def test_the_same_episode_in_two_runs_stays_apart(result) -> None:
-    both = [result(outcome, 0, started_at=outcome) for outcome in OUTCOMES[:2]]
+def test_the_same_episode_in_two_runs_stays_apart() -> None:
+    both = [make_result(outcome, 0, started_at=outcome) for outcome in OUTCOMES[:2]]
     twice = make_frame([("a", both[:1]), ("none", []), ("b", both[1:])])
     reads = {"cause": lambda one: one.outcome, "one": lambda _: 1, "true": lambda _: True}
     found = with_columns(twice, both[::-1], reads)
@@ -145,8 +132,8 @@ def test_the_same_episode_in_two_runs_stays_apart(result) -> None:
     assert [cell.rate for cell in cells_of(twice).values()] == [1, 0]
 
 
-def test_a_policy_that_has_not_begun_is_there(result) -> None:
-    frame = make_frame([], [result(policy="late").identity], named="mine")
+def test_a_policy_that_has_not_begun_is_there() -> None:
+    frame = make_frame([], [make_result(policy="late").identity], run_name="mine")
     ((key, cell),) = cells_of(frame).items()
     expected = ("late", Versions(), "mine", 1)
     assert (key.policy_run[0], *key.policy_run[2:4], cell.missing) == expected

@@ -3,73 +3,50 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from flat_jobs import frame_of, make_result, make_results
 from made_records import make_record
 from page_text import call, store
 
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.tables.diagnostic_tables import make_heard_table
+from roboirg.analysis.tables.run_tables import make_run_tables
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.results.frame import make_frame
-from roboirg.evaluation.analysis.stats.heard_rates import count_heard
-from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.diagnostic_tables import make_heard_table
-from roboirg.evaluation.analysis.tables.run_tables import make_run_tables
-from roboirg.evaluation.play.episode_record import audit_record
-from roboirg.evaluation.play.job_instruction import PreparedJob
-from roboirg.evaluation.records.record import Job, Record, Summary
 from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
-
-VERDICTS = st.sampled_from(["heard", "cut", "unknown"])
-OUTCOMES = st.sampled_from(["success", "failure", "error"])
-
-
-MakeResult = Callable[..., Summary]
+from roboirg.records.record import Job, Record, Summary
+from roboirg.runs.job_instruction import PreparedJob
+from roboirg.runs.play.episode_record import audit_record
 
 
-def results(make: MakeResult, *rows: tuple[str, str], **fields: object) -> list[Summary]:
+def results(*rows: tuple[str, str], **fields: object) -> list[Summary]:
     return [
-        make(outcome, number, prompt_verdict=verdict, **fields)
+        make_result(outcome, number, prompt_verdict=verdict, **fields)
         for number, (outcome, verdict) in enumerate(rows)
     ]
 
 
-@settings(max_examples=30)
-@given(st.lists(st.tuples(OUTCOMES, VERDICTS), min_size=1))
-def test_counts_add_up(result: MakeResult, rows: list[tuple[str, str]]) -> None:
-    found = count_heard(make_frame([("", results(result, *rows))]), ())
-    expected = {"episodes": len(rows), **Counter(verdict for _, verdict in rows)}
-    is_declared = any(verdict != "unknown" for _, verdict in rows)
-    assert list(found.values()) == [Counter(expected)] * is_declared
-
-
-def sample(result: MakeResult) -> list[Summary]:
+def sample() -> list[Summary]:
     contextual = {"setting": "contextual"}
     return [
-        *results(result, ("success", "heard"), ("failure", "heard")),
+        *results(("success", "heard"), ("failure", "heard")),
         *results(
-            result,
             ("failure", "cut"),
             ("failure", "cut"),
             ("success", "heard"),
             ("error", "cut"),
             **contextual,
         ),
-        *results(
-            result, ("failure", "unknown"), ("success", "heard"), task="BinFill", **contextual
-        ),
-        *results(result, ("success", "unknown"), policy="other"),
+        *results(("failure", "unknown"), ("success", "heard"), task="BinFill", **contextual),
+        *results(("success", "unknown"), policy="other"),
     ]
 
 
-def test_tables_have_rates_over_what_was_heard_next_to_rates_over_all(result: MakeResult) -> None:
+def test_tables_have_rates_over_what_was_heard_next_to_rates_over_all() -> None:
     """Of all tasks the means over tasks, not over trials: 50–67, 40.00."""
-    data = RunData(make_frame([("", sample(result))]))
+    data = RunData(frame_of(sample()))
     table = make_heard_table(data)
     rows = {(row.group, row.name): [entry.text for entry in row.entries] for row in table.rows}
     assert rows == {
@@ -127,11 +104,11 @@ def test_the_page_strikes_out_what_was_cut(open_page: Any, run: Path) -> None:
         assert found == {"whole": ("", False), "silent": ("", False), "cutting": cut}
 
 
-def test_a_guess_without_a_meaning_stands_next_to_the_rate(result: MakeResult) -> None:
-    known = [result("success", number) for number in range(3)]
-    guess = result("failure", 3, guessed=True)
-    (table,) = make_run_tables(make_frame([("", [*known, guess])]))
+def test_a_guess_without_a_meaning_stands_next_to_the_rate() -> None:
+    known = make_results("111")
+    guess = make_result("failure", 3, guessed=True)
+    (table,) = make_run_tables(frame_of([*known, guess]))
     words = "guessed a goal in 1 of 4 episodes, whose words have no meaning for it."
     assert [note for note in table.notes if words in note]
-    (table,) = make_run_tables(make_frame([("", known)]))
+    (table,) = make_run_tables(frame_of(known))
     assert not [note for note in table.notes if "guessed" in note]

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 import shutil
 import subprocess
-from collections.abc import Callable
 from decimal import Decimal
 from pathlib import Path
 
 import pytest
+from flat_jobs import frame_of
 from msgspec.structs import replace
+from published_results import like_published
 
-from roboirg.evaluation.analysis.published import RATE_TABLES
-from roboirg.evaluation.analysis.results.frame import make_frame
-from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.paper_tables import WHICH, make_table
-from roboirg.evaluation.analysis.tables.rendering.latex import latex
-from roboirg.evaluation.analysis.tables.table import Column, Entry, Row, Table
-from roboirg.evaluation.records.record import Summary
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.tables.paper_tables import WHICH, make_table
+from roboirg.analysis.tables.rendering.latex import latex
+from roboirg.analysis.tables.table import Column, Entry, Row, Table
 
 DOCUMENT = r"""
 \documentclass%s
@@ -62,13 +59,13 @@ FACTS = Table(
 
 
 @pytest.fixture(scope="module")
-def text(published_like: Callable[..., list[Summary]]) -> str:
+def text() -> str:
     """All tables."""
-    like = published_like
-    data = RunData(make_frame([("run", [*like("main"), *like("real"), *like("context")])]))
+    like = like_published
+    data = RunData(frame_of([*like("main"), *like("real"), *like("context")]))
     perfect = [replace(one, outcome="success") for one in like("main", "MemER")]
     tables = [
-        make_table("main", RunData(make_frame([("run", perfect)])), published=True),
+        make_table("main", RunData(frame_of(perfect)), published=True),
         *(make_table(one, data, published=True) for one in WHICH if one != "other"),
         crowded(policies=2, tasks=7),
         crowded(policies=40, tasks=2),
@@ -90,32 +87,6 @@ def test_every_name_and_rate_is_there_once() -> None:
     assert set(names) == {9}  # in three settings, and the columns in three parts
     assert text.count("folder") == 30
     assert text.rindex(r"\bottomrule") < text.index("folder")
-
-
-CELL = re.compile(r"(?:\\textbf\{)?([\d.]+|--|yes|no|partial)\}?(?:\\roboirg(\w+)\{([\d.]+)\})?")
-ARROWS = {"up": "↑", "down": "↓", "same": "→", None: ""}
-
-
-@pytest.mark.parametrize("which", [*RATE_TABLES, "coverage"])
-def test_a_published_table_is_one_and_has_every_figure_in_its_place(which: str) -> None:
-    table = make_table(which, None, published=True)
-    (body,) = re.findall(r"\\midrule(.*)\\bottomrule", latex(table), re.DOTALL)
-    printed = []
-    for line in body.splitlines():
-        if "&" in line:
-            cells = map(
-                CELL.fullmatch, line.removesuffix(r" \\").split(" & ")[len(table.heads) - 1 :]
-            )
-            printed.append([(cell[1], ARROWS[cell[2]] + (cell[3] or "")) for cell in cells if cell])
-    kept = [not (column.averages and column.group) for column in table.columns]
-    assert printed == [
-        [
-            (entry.text.replace("–", "--"), entry.change_text)
-            for entry in itertools.compress(row.entries, kept)
-        ]
-        for group in table.groups()
-        for row in group
-    ]
 
 
 @pytest.mark.skipif(

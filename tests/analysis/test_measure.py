@@ -4,25 +4,22 @@ from __future__ import annotations
 
 from fractions import Fraction
 
-import numpy as np
 import pandas as pd
 import pytest
+from flat_jobs import frame_of, make_results
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_records import make_record
 from page_text import store
 
 import roboirg
+from roboirg.analysis.measures.measure import ALL_TASKS, summarize
+from roboirg.analysis.results.option_labels import REFERENCE_OPTIONS
+from roboirg.analysis.results.run_cells import cells_of
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.results.frame import make_frame
-from roboirg.evaluation.analysis.results.option_labels import reference_of
-from roboirg.evaluation.analysis.stats.cells import cells_of
-from roboirg.evaluation.analysis.stats.intervals import wilson_interval
-from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, summarize
-from roboirg.evaluation.plan.plan_maker import make_plan
-
-Trials = dict[tuple[str, float], dict[float, bool]]
+from roboirg.runs.plan.plan_maker import make_plan
+from roboirg.stats.intervals import wilson_interval
 
 
 @pytest.fixture(scope="module")
@@ -35,26 +32,6 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     )  # fmt: skip
     store(folder, [make_record(job, "success") for job in plan.jobs()])
     return roboirg.results(folder)
-
-
-def trials(rows: pd.DataFrame) -> Trials:
-    """Return the verdicts of each task and episode by seed."""
-    return {
-        at: dict(zip(own["policy_seed"], own["outcome"] == "success", strict=True))
-        for at, own in rows.groupby(["task", "episode"])
-    }
-
-
-def plain_gap(ours: Trials, theirs: Trials) -> float | None:
-    """First less second on the seeds of an episode that both have, on all if they share none."""
-    sides: dict[str, tuple[list[bool], list[bool]]] = {}
-    for at in ours.keys() & theirs.keys():
-        shared = ours[at].keys() & theirs[at].keys()
-        for number, one in enumerate((ours[at], theirs[at])):
-            own = sides.setdefault(at[0], ([], []))[number]
-            own.extend(won for seed, won in one.items() if seed in shared or not shared)
-    gaps = [np.mean(first) - np.mean(second) for first, second in sides.values()]
-    return float(np.mean(gaps)) if gaps else None
 
 
 @settings(max_examples=8)
@@ -71,17 +48,12 @@ def test_measure_is_what_pandas_gives(played: pd.DataFrame, data: st.DataObject)
     judged = frame[frame["outcome"] != "error"].assign(won=lambda one: one["outcome"] == "success")
     rates = judged.groupby([*by, "task"])["won"].mean().groupby(list(by)).mean()
     for one in found:
-        own, explicit = (
-            judged[(judged["policy"] == one.key[0]) & (judged["setting"] == setting)]
-            for setting in (one.key[1], "explicit")
-        )
+        own = judged[(judged["policy"] == one.key[0]) & (judged["setting"] == one.key[1])]
         assert (one.counts.trials, one.counts.successes) == (len(own), own["won"].sum())
         assert one.counts.errors == 3 * 2 * 2 - len(own)
         assert (
             one.rate is None if own.empty else float(one.rate or 0) == pytest.approx(rates[one.key])
         )
-        gap = None if one.key[1] == "explicit" else plain_gap(trials(own), trials(explicit))
-        assert (one.gap and one.gap.value) == (None if gap is None else pytest.approx(gap))
     for policy in ("listener", "forgetful"):
         tested = [one for one in found if one.gap and one.key[0] == policy]
         if tested:
@@ -153,14 +125,14 @@ def test_a_column_that_stands_twice_is_refused(played: pd.DataFrame) -> None:
         roboirg.measure(frame, ["policy", "setting"])
 
 
-def test_averages_are_unweighted_and_suites_stand_by_themselves(result) -> None:
+def test_averages_are_unweighted_and_suites_stand_by_themselves() -> None:
     results = [
-        *(result("success", episode, task="PickXtimes") for episode in range(9)),
-        result("failure", 0, task="BinFill"),
-        result("failure", 0, task="VideoUnmask"),
-        result("success", 0, task="SomethingElse"),
+        *make_results("1" * 9, task="PickXtimes"),
+        *make_results("0", task="BinFill"),
+        *make_results("0", task="VideoUnmask"),
+        *make_results("1", task="SomethingElse"),
     ]
-    found = summarize(cells_of(make_frame([("run", results)])))
+    found = summarize(cells_of(frame_of(results)))
     rates = {key.scope: one.rate for key, one in found.items()}
     tasks = {"PickXtimes": 1, "BinFill": 0, "VideoUnmask": 0, "SomethingElse": 1}
     assert rates == {
@@ -172,32 +144,20 @@ def test_averages_are_unweighted_and_suites_stand_by_themselves(result) -> None:
     assert list(rates)[-1] == ALL_TASKS
 
 
-def test_gaps_are_paired_and_corrected_and_forms_compared(result) -> None:
-    """All of 20 are won in explicit, none in direct, 15 in its resolved form, 19 in reasoning."""
-    won = {
-        reference_of(InstructionOptions()): 20,
-        InstructionOptions("direct"): 0,
-        InstructionOptions("direct", "resolved"): 15,
-        InstructionOptions("reasoning"): 19,
-    }
+def test_gaps_are_corrected_in_three_families_and_forms_compared() -> None:
+    """All of 20 are won in explicit, none in direct, 15 in its resolved form."""
     results = [
-        result("success" if episode < least else "failure", episode, options=options)
-        for options, least in won.items()
-        for episode in range(20)
+        *make_results("1" * 20),
+        *make_results("0" * 20, "direct"),
+        *make_results("1" * 15 + "0" * 5, "direct", form="resolved"),
     ]
-    summaries = summarize(cells_of(make_frame([("run", results)])))
-    found = {key.options: one for key, one in summaries.items() if key.scope == "PickXtimes"}
-    explicit, direct, resolved, reasoning = (found[options] for options in won)
-    assert (explicit.gap, explicit.p_holm, explicit.second_gap) == (None, None, None)
-    assert explicit.interval == wilson_interval(20, 20)
-    gaps = [one.gap.value for one in (direct, resolved, reasoning)]
-    assert gaps == pytest.approx([-1, -0.25, -0.05])
-    # Exact tests of 20, 5 and 1 episodes that differ, all to one side; Holm: by 3, 2 and 1.
-    assert [one.p_holm for one in (direct, resolved, reasoning)] == pytest.approx(
-        [3 * 2 / 2**20, 2 * 2 / 2**5, 1.0]
-    )
-    assert [
-        one.p_holm for key, one in summaries.items() if key.options == InstructionOptions("direct")
-    ] == pytest.approx([3 * 2 / 2**20] * 3), "tasks, suites and all of them are three families"
-    assert direct.second_gap.value == -0.75
-    assert direct.second_gap.overlap == (0, 0, 15, 5)
+    summaries = summarize(cells_of(frame_of(results)))
+    explicit = [one for key, one in summaries.items() if key.options == REFERENCE_OPTIONS]
+    direct = [one for key, one in summaries.items() if key.options == InstructionOptions("direct")]
+    assert [(one.gap, one.p_holm, one.second_gap) for one in explicit] == [(None, None, None)] * 3
+    assert explicit[0].interval == wilson_interval(20, 20)
+    # An exact test of 20 episodes that differ, all to one side, next to that of the resolved form.
+    assert [one.p_holm for one in direct] == pytest.approx([2 * 2 / 2**20] * 3)
+    assert [one.gap.value for one in direct] == [-1] * 3
+    assert direct[0].second_gap.value == -0.75
+    assert direct[0].second_gap.overlap == (0, 0, 15, 5)

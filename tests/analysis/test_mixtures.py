@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import pytest
+from flat_jobs import frame_of, make_result
 
+from roboirg.analysis.measures.comparison import compare
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.results.frame import make_frame
+from roboirg.analysis.tables.paper_tables import make_table
+from roboirg.analysis.tables.table_notes import with_mixtures
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.results.frame import make_frame
-from roboirg.evaluation.analysis.stats.comparison import compare
-from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.paper_tables import make_table
-from roboirg.evaluation.analysis.tables.table_notes import with_mixtures
-from roboirg.evaluation.records.mixing import mixtures
+from roboirg.records.mixing import mixtures
 
 UNFAIR = [
     ({"split": "val"}, "Mixed splits: test, val."),
@@ -37,12 +38,15 @@ AVERAGED = [
 
 @pytest.mark.parametrize("policy", ["listener", "other"])
 @pytest.mark.parametrize(("fields", "sentence"), [*UNFAIR, *APART, *AVERAGED])
-def test_each_difference_is_one_sentence(result, policy, fields, sentence) -> None:
+def test_each_difference_is_one_sentence(policy, fields, sentence) -> None:
     """With the same policy or another."""
     usual = {"render_device": "llvmpipe"}
-    first = [result(episode=episode, **usual) for episode in range(2)]
-    second = [result(episode=episode, policy=policy, **usual | fields) for episode in range(2)]
-    runs = [("a", [*first, result(episode=2)]), ("b", second)]  # nothing was rendered: fits all
+    first = [make_result(episode=episode, **usual) for episode in range(2)]
+    second = [make_result(episode=episode, policy=policy, **usual | fields) for episode in range(2)]
+    runs = [
+        ("a", [*first, make_result(episode=2)]),
+        ("b", second),
+    ]  # nothing was rendered: fits all
     is_of_policy, is_same = "{}" in sentence, policy == "listener"
     expected = [] if is_of_policy and not is_same else [sentence.format(policy)]
     found = mixtures([one for _, results in runs for one in results])
@@ -61,23 +65,17 @@ def test_each_difference_is_one_sentence(result, policy, fields, sentence) -> No
             compare(*sides)
 
 
-def test_other_words_are_refused_where_task_and_pool_are_the_same_and_split_no_rows(result) -> None:
-    first, same_task = (result(words=words, language=4) for words in WORDS)
-    other_task = result(words="StopCube/test@2c", task="StopCube", language=4)
-    no_words = result(episode=1)  # a language whose words are code
-    own_words = result(words="PickXtimes/test/lab@3d", setting="lab", language=4)
-    assert not mixtures([first, other_task, no_words, own_words])
-    (sentence,) = mixtures([own_words, result(words="PickXtimes/test/lab@4e", language=4)])
+def test_other_words_are_refused_where_task_and_pool_are_the_same_and_split_no_rows() -> None:
+    first, same_task = (make_result(words=words) for words in WORDS)
+    other_task = make_result(words="StopCube/test@2c", task="StopCube")
+    own_words = make_result(words="PickXtimes/test/lab@3d", setting="lab")
+    assert not mixtures([first, other_task, own_words])
+    (_,) = mixtures([first, make_result(words=WORDS[1], wordings="mine@0a")])  # that alone
+    (sentence,) = mixtures([own_words, make_result(words="PickXtimes/test/lab@4e")])
     assert sentence.startswith("Mixed words of a task and pool: PickXtimes/test/lab@3d, Pick")
-    unnamed = result(language=4, episode=1)
-    assert mixtures([first, unnamed])[0].startswith("Mixed words of a task and pool: PickX")
     (sentence,) = mixtures([first, other_task, same_task])
-    assert sentence == (
-        "Mixed words of a task and pool: PickXtimes/test@0a, PickXtimes/test@1b. They cannot be "
-        "compared, and rates average over them."
-    )
-    both = [("a", [first, other_task]), ("b", [result(words=WORDS[1], language=4, episode=1)])]
+    both = [("a", [first, other_task]), ("b", [make_result(words=WORDS[1], episode=1)])]
     assert len(make_frame(both).names) == 1
-    frames = [make_frame([("a", [one])]) for one in (first, same_task)]
+    frames = [frame_of([one]) for one in (first, same_task)]
     with pytest.raises(InvalidValueError, match=sentence[:60]):
         compare(*frames)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.results.option_labels import (
+from roboirg.analysis.results.option_labels import (
     has_default_options,
     options_label,
     options_sort_key,
 )
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.settings import plain_settings, setting_names
 
 

@@ -17,8 +17,8 @@ import pytest
 from made_records import make_record
 from page_text import store
 
-from roboirg.evaluation.analysis.page.page_server import run_server
-from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.analysis.page.page_server import run_server
+from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.util.web.app_server import AppServer
 
 pytestmark = pytest.mark.usefixtures("patient_sockets")
@@ -98,7 +98,6 @@ def test_the_command_says_where_and_ends_with_ctrl_c(run: Path, wait_s: float) -
         command, stdout=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
     ) as process:  # fmt: skip
-        assert process.stdout is not None
         line = process.stdout.readline()
         found = re.match(r"http://127\.0\.0\.1:(\d+)/report.html ", line)
         assert found is not None, line

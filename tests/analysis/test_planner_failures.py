@@ -6,10 +6,10 @@ import pytest
 from made_records import make_record
 from msgspec.structs import replace
 
+from roboirg.analysis.measures.planner_failures import IDLE_STEPS, planner_failure
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.subgoal_text import UNKNOWN_WORDS
-from roboirg.evaluation.analysis.stats.planner_failures import IDLE_STEPS, planner_failure
-from roboirg.evaluation.records.record import Attribution, Job, Record, SubgoalRecord
+from roboirg.records.record import Attribution, Job, Record, SubgoalRecord
 
 WRONG = Attribution(kind="grounding", failure="wrong_object", sentence="It took another one.")
 

@@ -8,35 +8,35 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from flat_jobs import make_result
+from flat_jobs import frame_of, make_result, make_results
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import roboirg
-from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.page.matrix import notes as cell_notes
-from roboirg.evaluation.analysis.results.frame import Frame, make_frame
-from roboirg.evaluation.analysis.stats.arm_figures import arm_figures
-from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS, break_down
-from roboirg.evaluation.analysis.stats.comparison import compare
-from roboirg.evaluation.analysis.stats.comparison_text import sentences
-from roboirg.evaluation.analysis.stats.failure_rates import measure_ends
-from roboirg.evaluation.analysis.stats.headline import measure_headline
-from roboirg.evaluation.analysis.stats.intervals import TOO_FEW, Interval
-from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, KEPT_APART, Measured
-from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.arm_table import make_arm_table
-from roboirg.evaluation.analysis.tables.diagnostic_tables import (
+from roboirg.analysis.measures.arm_figures import arm_figures
+from roboirg.analysis.measures.breakdowns import BREAKDOWNS, break_down
+from roboirg.analysis.measures.comparison import compare
+from roboirg.analysis.measures.comparison_text import sentences
+from roboirg.analysis.measures.failure_rates import measure_ends
+from roboirg.analysis.measures.headline import measure_headline
+from roboirg.analysis.measures.measure import ALL_TASKS, KEPT_APART, Measured
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.page.matrix import notes as cell_notes
+from roboirg.analysis.results.frame import Frame
+from roboirg.analysis.run_results import Results
+from roboirg.analysis.tables.arm_table import make_arm_table
+from roboirg.analysis.tables.diagnostic_tables import (
     make_breakdown_table,
     make_failure_table,
     make_forms_table,
     make_heard_table,
 )
-from roboirg.evaluation.analysis.tables.paper_tables import make_table
-from roboirg.evaluation.analysis.tables.run_tables import make_run_tables
-from roboirg.evaluation.analysis.tables.table import Table
-from roboirg.evaluation.api.results import Results
-from roboirg.evaluation.records.record import Summary
+from roboirg.analysis.tables.paper_tables import make_table
+from roboirg.analysis.tables.run_tables import make_run_tables
+from roboirg.analysis.tables.table import Table
+from roboirg.core.errors import InvalidValueError
+from roboirg.records.record import Summary
+from roboirg.stats.intervals import TOO_FEW, Interval
 
 TASKS = ("PickXtimes", "BinFill")
 
@@ -130,7 +130,7 @@ def test_no_rate_is_over_two_forms_arms_policies_words_or_worlds(
         for task, episode in data.draw(places):
             fields = {**words._asdict(), "task": task, "prompt_verdict": prompt}
             results.append(make_result(outcome, episode, **fields))
-    frame = make_frame([("", results)])
+    frame = frame_of(results)
     assert {abs(rate) for rate in rates_of(frame)} <= {0, 100}
     told = [one for one in found if one.arm == "told"] or found
     holder = Results(Path())
@@ -143,15 +143,10 @@ def test_no_rate_is_over_two_forms_arms_policies_words_or_worlds(
 
 def test_all_tasks_are_one_mean_in_the_terminal_on_the_page_and_in_python() -> None:
     """Nine of ten are won in one task and one of two in the other: 70 %, not ten of twelve."""
-    results = [make_result("success" if episode else "failure", episode) for episode in range(10)]
-    results += [
-        make_result("success" if episode else "failure", episode, task="BinFill", policy_seed=1)
-        for episode in range(2)
-    ]
-    frame = make_frame([("", results)])
+    results = [*make_results("0111111111"), *make_results("01", task="BinFill", policy_seed=1)]
+    frame = frame_of(results)
     data = RunData(frame)
     (table,) = make_run_tables(frame)
-    assert table.rows[-1].name == ALL_TASKS
     assert [*numbers(table)][-1] == 70
     (whole,) = (one for key, one in data.summaries.items() if key.scope == ALL_TASKS)
     assert cell_notes(whole, "")[1].startswith("70 % success, mean of 2 tasks")
@@ -181,7 +176,6 @@ TABLES = st.dictionaries(
     max_size=8,
 )
 """The outcomes of episodes by policy, task, setting, form, arm and policy seed."""
-OUTCOMES = {"1": "success", "0": "failure", "!": "error"}
 
 
 @settings(max_examples=150, deadline=None)
@@ -192,9 +186,8 @@ def test_an_interval_has_a_width_or_there_is_a_reason_why_there_is_none(
     results = []
     for (policy, task, setting, form, arm, seed), letters in tables.items():
         words = {"policy": policy, "task": task, "setting": setting, "form": form, "arm": arm}
-        for episode, letter in enumerate(letters):
-            results.append(make_result(OUTCOMES[letter], episode, policy_seed=seed, **words))
-    frame = make_frame([("", results)])
+        results += make_results(letters, policy_seed=seed, **words)
+    frame = frame_of(results)
     data = RunData(frame)
     difficulty = break_down(frame, BREAKDOWNS["difficulty"])
     ends = measure_ends(data, {ALL_TASKS}).values()

@@ -15,21 +15,21 @@ from msgspec.structs import replace
 from page_text import PLAN, broken, played, render, store
 from syrupy.assertion import SnapshotAssertion
 
-from roboirg.evaluation.analysis.page import report
-from roboirg.evaluation.analysis.page.details import EpisodeDetails
-from roboirg.evaluation.analysis.page.report import write_report
-from roboirg.evaluation.plan.sources import Source
-from roboirg.evaluation.play.episode_record import audit_record
-from roboirg.evaluation.play.job_instruction import PreparedJob
-from roboirg.evaluation.records.episode_log import EpisodeLog, log_path
-from roboirg.evaluation.records.record import (
+from roboirg.analysis.page import report
+from roboirg.analysis.page.details import EpisodeDetails
+from roboirg.analysis.page.report import write_report
+from roboirg.analysis.results.sources import Source
+from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
+from roboirg.records.episode_log import EpisodeLog, log_path
+from roboirg.records.record import (
     EventRecord,
     MentionSpan,
     Record,
     SubgoalRecord,
     UtteranceRecord,
 )
-from roboirg.policies.prompt_length.prompt_audit import PromptLimit, most_tokens
+from roboirg.runs.job_instruction import PreparedJob
+from roboirg.runs.play.episode_record import audit_record
 
 pytest.importorskip("jinja2")
 
@@ -172,10 +172,9 @@ def test_a_failed_episode_shows_what_was_named_next_to_what_was_meant(
 ) -> None:
     """Of a planner, the last subgoal up to the failure; of an episode that succeeded, nothing."""
     first = next(one for one in records() if one.attribution)
-    step = first.steps if first.attribution is None else first.attribution.step or 0
     said = tuple(
-        SubgoalRecord(step=step + late, text=text, due="pick it up", verdict="lost")
-        for late, text in ((-9, "sing"), (0, "dance"), (1, "rest"))
+        SubgoalRecord(step=step, text=text, due="pick it up", verdict="lost")
+        for step, text in ((51, "sing"), (60, "dance"), (61, "rest"))  # it failed at step 60
     )
     for fields, expected in (
         ({"policy_metadata": {"understood": understood}}, goal),
@@ -184,16 +183,15 @@ def test_a_failed_episode_shows_what_was_named_next_to_what_was_meant(
     ):
         page = EpisodeDetails(Path(), embeds=False)
         details = page.details_of(replace(first, **fields))
-        texts = list(page.strings)
+        texts = [*page.strings, None]
         assert texts[details["goal"]] == "green, 3 times"
-        assert ("named" in details and texts[details["named"]]) == (expected or False)
+        assert texts[details.get("named", -1)] == expected
 
 
 def test_words_that_differ_stand_apart_and_are_named() -> None:
     first = next(one for one in records() if one.setting == "direct")
     page = Page(render([first, first.with_options(wordings="mine@1a")]))
     assert "Mixed words: our own words, the words of mine@1a." in page.notes
-    assert "our own words, the words of mine@1a" in page.text.split("Mixed words")[0]
     assert page.data["matrix"]["policies"] == [
         "listener, the words of mine@1a (privileged)",
         "listener, our own words (privileged)",
@@ -217,7 +215,6 @@ def test_a_pair_is_of_one_scene_told_alike_under_equal_conditions() -> None:
     assert sorted(scenes.values()) == [1, 5]
     choices = {one["name"]: one["values"] for one in page.data["choices"]}
     assert choices["difficulty"] == [first.difficulty, "odd"]
-    assert "rendered on" not in page.text  # it is not known of any
     assert len(page.data["comparisons"]) == 3, "of the three policy runs that were told"
 
 
@@ -258,10 +255,9 @@ def test_videos_are_in_the_page_or_next_to_it(
 def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
     theirs = tmp_path / "our theirs"
     found = records()
-    again = replace(found[0], policy_seed=7, started_at="2026-02-02T03:04:05")  # its own pair
     runs = (
-        store(tmp_path / "ours", [*found, again], PICKS),
-        store(theirs, [replace(found[0], video=film(theirs)), *found[1:-4], again], PICKS),
+        store(tmp_path / "ours", found, PICKS),
+        store(theirs, [replace(found[0], video=film(theirs)), *found[1:-4]], PICKS),
     )
     with EpisodeLog(log_path(theirs, found[0].slug)) as log:
         os.write(log.descriptor, b"words")
@@ -271,15 +267,11 @@ def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
         "listener, our theirs (privileged)", "forgetful, our theirs (privileged)",
     ]  # fmt: skip
     assert page.data["sides"] == [0, 2]
-    assert "2026-01-02 03:04 to 2026-02-02 03:04 UTC" in page.text
     # Videos and logs of the other run carry a key of their own, and are found from the page.
     key = f"{found[0].slug.rpartition('-')[2]}-2"
     assert page.scripts[f"film-{key}"].startswith("data:video")
     (link,) = [details["log"] for details in page.details if "log" in details]
     assert link == f"../our%20theirs/{log_path(Path(), found[0].slug)}"
-    pairs = page.data["columns"]["pair"]
-    # Both policies of both runs, but for the last four.
-    assert sorted(map(pairs.count, set(pairs))) == [2] + [3] * 4 + [4] * (len(found) // 2 - 4)
     assert "Incomplete: 4 of" in page.notes
     words = next(one for one in page.data["comparisons"] if (one["left"], one["right"]) == (0, 2))
     assert "listener, ours (privileged) against listener, our theirs" in words["sentences"][0]

@@ -3,45 +3,30 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
 
 import pytest
-from flat_jobs import make_result
+from flat_jobs import frame_of, make_result
+from flat_jobs import make_results as play
 from rich.console import Console
 from syrupy.assertion import SnapshotAssertion
 
-from roboirg.evaluation.analysis.results.frame import Frame, make_frame
-from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS
-from roboirg.evaluation.analysis.stats.rates import points
-from roboirg.evaluation.analysis.stats.run_data import RunData
-from roboirg.evaluation.analysis.tables.diagnostic_tables import (
+from roboirg.analysis.measures.breakdowns import BREAKDOWNS
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.results.frame import Frame
+from roboirg.analysis.tables.diagnostic_tables import (
     DIAGNOSTIC_TABLES,
     make_breakdown_table,
     make_failure_table,
 )
-from roboirg.evaluation.analysis.tables.rendering import get_format
-from roboirg.evaluation.analysis.tables.rendering.terminal import print_tables
-from roboirg.evaluation.analysis.tables.run_tables import (
+from roboirg.analysis.tables.rendering import get_format
+from roboirg.analysis.tables.rendering.terminal import print_tables
+from roboirg.analysis.tables.run_tables import (
     failure_text,
     make_run_tables,
     print_failures,
 )
-from roboirg.evaluation.records.record import Attribution, Job, Summary
-
-OUTCOMES = {"1": "success", "0": "failure", "!": "error"}
-
-
-def play(outcomes: str, setting: str = "explicit", **fields: object) -> list[Summary]:
-    """Return a result for each letter, none for a dash."""
-    return [
-        make_result(OUTCOMES[letter], episode, setting=setting, **fields)
-        for episode, letter in enumerate(outcomes)
-        if letter in OUTCOMES
-    ]
-
-
-def frame_of(*results: Sequence[Summary], planned: Sequence[Job] = ()) -> Frame:
-    return make_frame([("", [one for own in results for one in own])], planned)
+from roboirg.records.record import Attribution, Summary
+from roboirg.stats.rates import points
 
 
 def printed(frame: Frame, width: int = 100) -> str:

@@ -11,8 +11,7 @@ import layout
 import pytest
 from selection import slow_but
 
-from roboirg.evaluation.plan.plan_file import named_plans
-from roboirg.util.discovery import entry_names
+from roboirg.runs.plan.plan_file import named_plans
 
 APPLICATIONS = sorted(path.parent.name for path in (layout.PACKAGE / "apps").glob("*/__init__.py"))
 
@@ -55,7 +54,7 @@ print(json.dumps([{name: sorted(own) for name, own in commands.items()}, sorted(
 
 
 @pytest.fixture(scope="module")
-def everything() -> tuple[dict[str, list[str]], set[str]]:
+def everything():
     """The commands and kinds with all applications."""
     # In a process of its own: the program replaces a function of Python's.
     walked = subprocess.run([sys.executable, "-c", WALK], capture_output=True, check=True)
@@ -63,29 +62,16 @@ def everything() -> tuple[dict[str, list[str]], set[str]]:
     return commands, set(kinds)
 
 
-def test_every_kind_of_policy_and_every_application_is_there(everything):
-    commands, kinds = everything
-    assert kinds == set(entry_names("roboirg.policy_kinds")) == {"learned", "trained"}
-    assert len(APPLICATIONS) >= 8
-    assert {
-        "run",
-        "tables",
-        "leaderboard verify",
-        "show",
-    } <= commands.keys()
-
-
 def test_without_what_learns_its_commands_kinds_and_plans_go_and_nothing_else(everything):
-    shown = (
-        f"{WALK}\nfrom roboirg.evaluation.plan.plan_file import named_plans\nprint(named_plans())"
-    )
+    shown = f"{WALK}\nfrom roboirg.runs.plan.plan_file import named_plans\nprint(named_plans())"
     without = shown.replace('left_out = ""', f"left_out = {LEARN!r}", 1)
     walked, plans = subprocess.run(
         [sys.executable, "-c", without], capture_output=True, text=True, check=True
     ).stdout.splitlines()
     commands, kinds = json.loads(walked)
-    assert everything[0].keys() - commands.keys() == {"learn", "learn listener", "learn policy"}
-    assert everything[1] - set(kinds) == {"learned", "trained"}
+    learns = {"learn", "learn listener", "learn policy", "learn reader"}
+    assert everything[0].keys() - commands.keys() == learns
+    assert everything[1] - set(kinds) == {"learned", "trained"} == everything[1]
     assert set(named_plans()) - set(ast.literal_eval(plans)) == {"paper-small"}
 
 

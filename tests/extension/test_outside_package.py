@@ -38,6 +38,7 @@ outside = "roboirg_outside.setting:SETTING"
 outside = "roboirg_outside.protocol"
 """
 LAB = ROOT / "docs" / "add-package.md"
+SETTING_PAGE = ROOT / "docs" / "add-setting.md"
 WITH_SETTING = "PickXtimes"
 """A task of the benchmark to which the recipe's setting applies."""
 NAMES = """\
@@ -61,13 +62,13 @@ for task, expected in list(test_golden.GOLDEN.items())[::4]:
 """
 
 
-def recipe(page: str, heading: str) -> str:
-    """The first Python block of a section, as it stands in the docs."""
+def recipe(page: str, heading: str, kind: str = "python") -> str:
+    """The first block of a section in Python, or of another kind, as it stands in the docs."""
     text = (ROOT / "docs" / page).read_text()
     section = re.search(rf"^#+ {heading}\n(.*?)(?=^##|\Z)", text, flags=re.DOTALL | re.MULTILINE)
     assert section, f"docs/{page} has no section {heading!r}"
-    block = re.search(r"```python\n(.*?)```", section[1], flags=re.DOTALL)
-    assert block, f"the section {heading!r} of docs/{page} has no Python block"
+    block = re.search(rf"```{kind}\n(.*?)```", section[1], flags=re.DOTALL)
+    assert block, f"the section {heading!r} of docs/{page} has no {kind} block"
     return block[1]
 
 
@@ -81,10 +82,15 @@ def outside(tmp_path_factory):
     (package.parent / "pyproject.toml").write_text(PYPROJECT)
     for name, (page, heading) in RECIPES.items():
         (package / f"{name}.py").write_text(recipe(page, heading))
+    (package / "words.toml").write_text(recipe("add-task.md", "Words", "toml"))
+    # The first block in TOML of the section names the entry point.
+    _, colored = re.findall(r"```toml\n(.*?)```", SETTING_PAGE.read_text(), re.DOTALL)
+    (package / "colored.toml").write_text(colored)
     lab = folder / "lab" / "my_lab"
     lab.mkdir(parents=True)
     blocks = re.findall(r"```(toml|python|yaml)\n(.*?)```", LAB.read_text(), re.DOTALL)
-    files = (lab.parent / "pyproject.toml", lab / "__init__.py", lab / "lab-quick.yaml")
+    names = ("__init__.py", "words.toml", "lab-quick.yaml")
+    files = (lab.parent / "pyproject.toml", *(lab / name for name in names))
     for path, (_, text) in zip(files, blocks, strict=True):
         path.write_text(text)
     venv.create(folder / "env", with_pip=False)
@@ -131,20 +137,6 @@ def test_commands_list_what_the_package_adds(roboirg, names):
     assert protocol in roboirg("serve", "--help")
 
 
-def test_words_of_the_new_setting_are_validated(roboirg, names):
-    task, setting, *_ = names
-    tasks = f"{task},{WITH_SETTING}"
-    said = roboirg("language", "validate", "--tasks", tasks, "--split", "none", "--seeds", "6")
-    assert {task, setting} <= set(said.replace("│", " ").split())
-    assert setting in roboirg("show", WITH_SETTING, "0", "--words", "--settings", setting)
-    roboirg(
-        "export", "instructions", "--tasks", tasks, "--settings", setting, "--split", "test",
-        "--out", "words.jsonl",
-    )  # fmt: skip
-    rows = [json.loads(line) for line in (roboirg.folder / "words.jsonl").open()]
-    assert {row["setting"] for row in rows} == {setting}
-
-
 @pytest.mark.sim
 def test_an_episode_of_each_is_played_and_shown(roboirg, names):
     task, setting, *_ = names
@@ -160,11 +152,6 @@ def test_an_episode_of_each_is_played_and_shown(roboirg, names):
     page = (roboirg.folder / "played/report.html").read_text()
     assert task in page
     assert setting in page
-    table = roboirg("tables", "played", "--format", "csv")
-    assert task in table
-    assert setting in table
-    roboirg("figures", "played", "--out", "figures")
-    assert any(setting in path.read_text() for path in (roboirg.folder / "figures").glob("*.svg"))
 
 
 @pytest.mark.sim

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import TypeVar
 
 import msgspec
 
+from roboirg.analysis.results.frame import Frame, make_frame
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.policy_ref import unknown_policy
-from roboirg.evaluation.records.record import Job, Summary
 from roboirg.policies.builtin import BUILTIN
 from roboirg.policies.by_name.finding import read_policy
+from roboirg.records.record import Job, Summary
 
 Stored = TypeVar("Stored", bound=Summary)
 
@@ -49,6 +51,7 @@ def make_result(outcome: str = "success", episode: int = 0, **fields: object) ->
         "difficulty": "easy",
         "privileged": False,
         "language_version": "1",
+        "words": "any@0a",
         "environment_version": 1,
         "package_version": "0",
         "started_at": "now",
@@ -57,6 +60,23 @@ def make_result(outcome: str = "success", episode: int = 0, **fields: object) ->
     })  # fmt: skip
     error = {"error": "policy"} if outcome == "error" else {}
     return Summary(outcome=outcome, episode=episode, **error, **usual)  # type: ignore[arg-type]
+
+
+OUTCOMES = {"1": "success", "0": "failure", "!": "error"}
+
+
+def make_results(outcomes: str, setting: str = "explicit", **fields: object) -> list[Summary]:
+    """Return a result for each letter of `OUTCOMES`, none for another one."""
+    return [
+        make_result(OUTCOMES[letter], episode, setting=setting, **fields)
+        for episode, letter in enumerate(outcomes)
+        if letter in OUTCOMES
+    ]
+
+
+def frame_of(*results: Sequence[Summary], planned: Sequence[Job] = ()) -> Frame:
+    """Return the frame of one run with all these results."""
+    return make_frame([("run", [one for own in results for one in own])], planned)
 
 
 def with_version(record: Stored, version: str) -> Stored:

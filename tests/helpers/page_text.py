@@ -10,15 +10,15 @@ from made_records import make_record
 from msgspec.structs import replace
 from typer.testing import CliRunner
 
+from roboirg.analysis.page.report import write_report
+from roboirg.analysis.results.sources import Source
 from roboirg.core.failures import FAILURES
-from roboirg.evaluation.analysis.page.report import write_report
-from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.plan.sources import Source
-from roboirg.evaluation.plan.stored_plans import write_plan
-from roboirg.evaluation.records.record import Attribution, EventRecord, Record
-from roboirg.evaluation.records.record_codec import encode
-from roboirg.evaluation.records.store import RECORDS_FILE
 from roboirg.main import app
+from roboirg.records.record import Attribution, EventRecord, Record
+from roboirg.records.record_codec import encode
+from roboirg.records.store import RECORDS_FILE
+from roboirg.runs.plan.plan import Plan
+from roboirg.runs.plan.stored_plans import write_plan
 
 PLAN = Plan(
     policies=("listener", "forgetful"),

@@ -9,9 +9,9 @@ from fractions import Fraction
 import numpy as np
 from flat_jobs import make_result
 
+from roboirg.analysis.published import TRIALS, published_rows
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.published import TRIALS, published_rows
-from roboirg.evaluation.records.record import Summary
+from roboirg.records.record import Summary
 
 
 def with_rate(

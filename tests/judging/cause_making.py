@@ -181,21 +181,20 @@ class Hands:
         self,
         what: Stage | Primitive,
         *,
-        beside: float | tuple[float, float] = 0.0,
+        beside: float = 0.0,
         until: float = 1.0,
     ) -> None:
         """Do a stage or a primitive, disturbed.
 
         Args:
             what: a stage of any goal, or a `Primitive("pick_cube", name)` and the like.
-            beside: by how much the whole motion is beside its object or place, m: a distance, in
-                the direction in which the least is in the way, or a vector (x, y).
+            beside: by how much the whole motion is beside its object or place, m, in the direction
+                in which the least is in the way.
             until: share of the motion's pieces after which it is broken off.
         """
         primitive = what.primitive if isinstance(what, Stage) else what
         about = str(primitive.place or primitive.subject)
-        vector = self._free_way(about, beside) if isinstance(beside, float) else beside
-        self._expert.shift = vector
+        self._expert.shift = self._free_way(about, beside)
         pieces = _PIECES.get(primitive.kind, 4)
         for number, rows in enumerate(self._expert.execute(primitive)):
             if number >= until * pieces:
@@ -223,10 +222,10 @@ class Hands:
         """Rest."""
         self.execute(np.repeat(self._expert.here()[None], steps, axis=0))
 
-    def tremble(self, steps: int, size: float = 0.02) -> None:
-        """Shake all joints about where they are, by up to `size`, rad."""
+    def tremble(self, steps: int) -> None:
+        """Shake all joints about where they are, by up to 0.02 rad."""
         rows = np.repeat(self._expert.here()[None], steps, axis=0)
-        rows[:, :-1] += self.rng.uniform(-size, size, rows[:, :-1].shape)
+        rows[:, :-1] += self.rng.uniform(-0.02, 0.02, rows[:, :-1].shape)
         self.execute(rows)
 
     def snatch(self, name: str, times: int = 1, beside: float = 0.03) -> None:
@@ -325,9 +324,7 @@ def play_cause(one: Cause, episode: Episode) -> Course | None:
     )
 
 
-def play_causes(
-    causes: Sequence[Cause], indices: Sequence[int], scenes: int, split: str = "test"
-) -> Iterator[Course]:
+def play_causes(causes: Sequence[Cause], indices: Sequence[int], scenes: int) -> Iterator[Course]:
     """Play each cause in the first scenes of each of its tasks that offer it."""
     for one in causes:
         for task in one.tasks:
@@ -335,7 +332,7 @@ def play_causes(
             for index in indices:
                 if found == scenes:
                     break
-                course = play_cause(one, get_episode(task, split, index))
+                course = play_cause(one, get_episode(task, "test", index))
                 if course is not None and (course.status == "success") <= (
                     course.kind in ("success", "unscored")
                 ):

@@ -15,8 +15,8 @@ import numpy as np
 from cause_making import Course, read_courses
 
 from roboirg.core.failures import FAILURE_KINDS, FAILURES
-from roboirg.evaluation.analysis.stats.intervals import without_spread
 from roboirg.judging import DeclaredIntent, FailureAttribution, attribute_failure
+from roboirg.stats.intervals import without_spread
 
 HERE = Path(__file__).parent
 DOCUMENT = HERE.parents[1] / "docs" / "attribution.md"

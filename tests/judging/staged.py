@@ -6,9 +6,9 @@ more happens after its verdict.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 
-from roboirg.core.conditions import Fact
+from roboirg.core.conditions import Fact, facts_of
 from roboirg.core.episode import Episode, Scene, Stage
 from roboirg.core.motions import Shuttle
 from roboirg.judging import (
@@ -33,6 +33,15 @@ def judged(stages: Sequence[Stage], scene: Scene | None, *steps: Iterable[Fact])
     return judge
 
 
+def named_facts(stages: Iterable[Stage]) -> list[Fact]:
+    """All facts that the conditions of stages name."""
+    found: list[Fact] = []
+    for stage in stages:
+        for condition in (stage.expects, *stage.forbids):
+            found += facts_of(condition)
+    return found
+
+
 class Staged:
     """One episode, its demonstration already shown; the policy's turn begins."""
 
@@ -46,8 +55,7 @@ class Staged:
         self.step = -1
         self.now: set[Fact] = set()
         self.before: frozenset[Fact] = frozenset()
-        self.binned: set[str] = set()
-        self.mirrored: Mapping[str, frozenset[str]] | None = None
+
         self.intent: DeclaredIntent | None = None
         kinds = {"cube": "lying", "tape": "lying", "container": "put_down"}
         for item in episode.scene.objects:
@@ -130,18 +138,10 @@ class Staged:
         """The fingers close on nothing next to it and the hand goes away."""
         return self.attempt(Fact("clutched", name)).tick(5)
 
-    def let_go_of_nothing(self, place: str) -> Staged:
-        return self.attempt(Fact("emptied", "robot", place))
-
-    def press_beside(self, name: str = "button") -> Staged:
-        return self.attempt(Fact("pressed_beside", name))
-
-    def grasp(self, name: str) -> Staged:
-        gone = tuple(f for f in self.now if f.subject == name and f.kind in RESTING)
-        return self.reach(name).set(Fact("held", name), off=gone)
-
     def lift(self, name: str) -> Staged:
-        return self.grasp(name).tick(3).set(self._up(name))
+        gone = tuple(f for f in self.now if f.subject == name and f.kind in RESTING)
+        self.reach(name).set(Fact("held", name), off=gone)
+        return self.tick(3).set(self._up(name))
 
     def _up(self, name: str) -> Fact:
         kind = self.episode.scene[name].kind
@@ -154,13 +154,6 @@ class Staged:
         there = () if place is None else (Fact("placed", name, place),)
         self.set(Fact(rest, name), *there, off=(Fact("held", name),))
         return self.set(off=(Fact("reached", name),))
-
-    def drop(self, name: str, place: str | None = None) -> Staged:
-        """Let go of it in the air."""
-        self.set(off=(self._up(name), Fact("held", name), Fact("reached", name))).tick(2)
-        there = () if place is None else (Fact("placed", name, place),)
-        rest = "put_down" if self.episode.scene[name].kind == "container" else "lying"
-        return self.set(Fact(rest, name), *there)
 
     def fill(self, name: str, place: str) -> Staged:
         """Let it fall in; in a bin it is gone at once."""
@@ -223,7 +216,6 @@ class Staged:
             policy_start_step=self.turn,
             elapsed_steps=self.step,
             cause=self.judge.cause or cause,
-            mirrored=self.mirrored,
             attempts=self.attempts,
             intent=self.intent,
         )

@@ -7,19 +7,20 @@ from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
+from staged import named_facts
 
 import roboirg
+from roboirg.analysis.page.details import event_text
 from roboirg.apps.show.episode_text import fact_words
 from roboirg.core import fact_traits
-from roboirg.core.conditions import Fact, Rule, facts_of
+from roboirg.core.conditions import Fact, Rule
 from roboirg.core.episode import Primitive, Scene, SceneObject, Stage
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.fact_traits import FACT_TRAITS, FactRole, FactTraits, register_fact_kind
 from roboirg.core.motions import Glow, Point, Shuttle, Vanish
-from roboirg.evaluation.analysis.page.details import event_text
-from roboirg.evaluation.records.record import EventRecord
 from roboirg.judging import Judge
 from roboirg.judging.grounding_errors import classify_grounding_error
+from roboirg.records.record import EventRecord
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 
@@ -42,9 +43,7 @@ def test_facts_of_tasks_have_kinds_and_are_about_the_objects_of_their_kinds(task
     for index in range(8):
         episode = get_episode(task, "test", index)
         stages = (*episode.demonstration, *episode.stages)
-        facts = {fact for stage in stages for fact in facts_of(stage.expects)}
-        facts |= {fact for stage in stages for one in stage.forbids for fact in facts_of(one)}
-        facts |= set(episode.scene.past)
+        facts = {*named_facts(stages), *episode.scene.past}
         for motion in episode.scene.motions:
             match motion:
                 case Glow(during=fact) | Vanish(when=fact) | Shuttle(stopped_by=fact):

@@ -5,7 +5,7 @@ from drawn_scenes import drawn_scenes
 from staged import judged
 
 from roboirg.core.conditions import Fact
-from roboirg.core.episode import DIFFICULTIES, Episode, Goal
+from roboirg.core.episode import Episode, Goal
 from roboirg.judging import Judge, Status
 from roboirg.tasks.video_place_button import TASK as VIDEO_PLACE_BUTTON
 from roboirg.tasks.video_place_order import TASK as VIDEO_PLACE_ORDER
@@ -43,37 +43,33 @@ def verdict(episode, *steps):
 def repick(repeats, difficulty="medium"):
     episode = make(VIDEO_REPICK, difficulty, Goal.of(repeats=repeats))
     target = episode.scene.past[0].subject
-    other = next(c.name for c in episode.scene.of_kind("cube") if c.name != target)
-    return episode, Fact("picked", target), Fact("lying", target), Fact("picked", other)
+    return episode, Fact("picked", target), Fact("lying", target)
 
 
 @pytest.mark.parametrize("repeats", [1, 2, 3])
 def test_repick_as_often_as_wanted_then_press(repeats):
-    episode, picked, lying, _ = repick(repeats)
+    episode, picked, lying = repick(repeats)
     cycle = [[lying], [picked], [], [lying]]
     assert verdict(episode, *cycle * repeats, [lying, PRESSED]) is Status.SUCCESS
     assert verdict(episode, *cycle * repeats) is Status.ONGOING
 
 
-@pytest.mark.parametrize("difficulty", DIFFICULTIES)
 @pytest.mark.parametrize("done", [0, 1, 2, 3, 4])
-def test_repick_of_any_other_cube_fails_at_any_time(difficulty, done):
-    episode, picked, lying, _ = repick(2, difficulty)
-    start = [[picked], [lying]] * 2
+def test_repick_of_any_other_cube_fails_at_any_time(done):
+    episode, picked, lying = repick(2, "hard")
+    start = [[picked], [lying], [picked], [lying]][:done]
     others = {cube.name for cube in episode.scene.of_kind("cube")} - {picked.subject}
     for other in others:
-        judge = judge_of(episode, *start[:done], [Fact("picked", other)])
-        assert judge.index == done
-        assert judge.status is Status.FAILURE
-        assert str(judge.cause).startswith("picked up the ")
-        assert verdict(episode, *start[:done], [Fact("lying", other)]) is Status.ONGOING
+        judge = judge_of(episode, *start, [Fact("picked", other)])
+        assert (judge.index, judge.status) == (done, Status.FAILURE)
+        assert verdict(episode, *start, [Fact("lying", other)]) is Status.ONGOING
 
 
 def test_repick_dropping_and_grasping_again_counts_as_what_it_is():
-    episode, picked, lying, _ = repick(1)
+    episode, picked, lying = repick(1)
     # Held low or in the air, neither picked nor lying: nothing happens.
     assert verdict(episode, [picked], [], [], [picked], [lying], [PRESSED]) is Status.SUCCESS
-    episode, picked, lying, _ = repick(2)
+    episode, picked, lying = repick(2)
     # Let go is put down, wherever that is: the next lift is the second one.
     steps = [[picked], [lying], [picked], [lying], [PRESSED]]
     assert verdict(episode, *steps) is Status.SUCCESS
@@ -97,7 +93,7 @@ AGAIN = "pick up the correct cube for the second time"
     ],
 )
 def test_repick_early_press(steps, index, start, due, elapsed, fails):
-    episode, picked, lying, _ = repick(2)
+    episode, picked, lying = repick(2)
     facts = {"": [], "picked": [picked], "lying": [lying]}
     judge = judge_of(episode, *(facts[step] for step in steps))
     judge.update(start + elapsed, frozenset([PRESSED]))
@@ -107,7 +103,7 @@ def test_repick_early_press(steps, index, start, due, elapsed, fails):
 
 
 def test_repick_timers_do_not_start_with_the_video():
-    episode, picked, lying, _ = repick(1)
+    episode, picked, lying = repick(1)
     judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
     step = 0
     while judge.index < len(episode.demonstration):
@@ -122,7 +118,7 @@ def test_repick_timers_do_not_start_with_the_video():
 
 
 def test_repick_press_that_is_ignored_does_not_count():
-    episode, picked, lying, _ = repick(1)
+    episode, picked, lying = repick(1)
     assert verdict(episode, [PRESSED], [picked], [lying]) is Status.ONGOING
     assert verdict(episode, [PRESSED], [picked], [lying], [PRESSED]) is Status.SUCCESS
 
@@ -167,12 +163,9 @@ def test_place_pick_and_place(episode):
 def test_place_on_any_other_disc_fails_even_together_with_the_right_one(episode):
     picked, placed = place_facts(episode)
     others = {disc.name for disc in episode.scene.of_kind("target")} - {placed.place}
-    assert len(others) == 3
     for other in others:
         wrong = Fact("placed", picked.subject, other)
-        judge = judge_of(episode, [picked], [], [wrong])
-        assert judge.status is Status.FAILURE
-        assert "; expected: place the cube onto the correct target" in str(judge.cause)
+        assert verdict(episode, [picked], [], [wrong]) is Status.FAILURE
         assert verdict(episode, [picked], [placed, wrong]) is Status.FAILURE
         # Before it is picked, the cube may be anywhere.
         assert verdict(episode, [wrong], [picked], [placed]) is Status.SUCCESS
@@ -182,7 +175,6 @@ def test_place_on_any_other_disc_fails_even_together_with_the_right_one(episode)
 def test_place_picking_another_cube_fails_until_the_right_one_is_picked(episode):
     picked, placed = place_facts(episode)
     others = {cube.name for cube in episode.scene.of_kind("cube")} - {picked.subject}
-    assert len(others) == 2
     for other in others:
         wrong = Fact("picked", other)
         assert verdict(episode, [wrong]) is Status.FAILURE
@@ -199,22 +191,3 @@ def test_place_press_drop_and_site_do_not_matter(episode):
     steps = [[PRESSED, site, lying], [picked], [PRESSED], [lying], [lying, site], [picked]]
     assert verdict(episode, *steps) is Status.ONGOING
     assert verdict(episode, *steps, [placed, PRESSED]) is Status.SUCCESS
-
-
-# The videos
-
-
-@pytest.mark.parametrize("difficulty", DIFFICULTIES)
-@pytest.mark.parametrize(
-    "task", [VIDEO_REPICK, VIDEO_PLACE_BUTTON, VIDEO_PLACE_ORDER], ids=lambda task: task.name
-)
-def test_videos_and_perfect_runs_succeed(task, difficulty):
-    episode = make(task, difficulty)
-    judge = Judge((*episode.demonstration, *episode.stages), episode.scene)
-    step = 0
-    for stage in judge.stages:
-        assert judge.status is Status.ONGOING
-        for _ in range(stage.lasting + 1):
-            judge.update(step, frozenset([stage.expects]))
-            step += 1
-    assert judge.status is Status.SUCCESS

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from staged import named_facts
 
 from roboirg.core.conditions import facts_of
 from roboirg.core.episode import Episode
@@ -18,8 +19,7 @@ EPISODES = 12
 def random_events(episode: Episode, rng: np.random.Generator) -> list[Event]:
     """Facts that the stages expect, in order and held for long, among any of those they name."""
     stages = (*episode.demonstration, *episode.stages)
-    named = [fact for one in stages for part in (one.expects, *one.forbids)
-             for fact in (facts_of(part) or ())]  # fmt: skip
+    named = named_facts(stages)
     events, step, held = [], 0, set()
     for stage in stages:
         wanted = facts_of(stage.expects)

@@ -43,15 +43,12 @@ def test_what_is_due_is_right_and_another_act_is_lost(task: str) -> None:
         ("PickXtimes", 0, "pick up the green cube for the first time", "right"),
         ("PickXtimes", 0, "pick up the green cube", "right"),
         ("PickXtimes", 0, "pick the green cube up", "right"),
-        ("PickXtimes", 0, "pick up the green cube again", "right"),
         ("PickXtimes", 0, "pick up the green cube for the second time", "wrong_count"),
         ("PickXtimes", 0, "pick up the green cube for the 12th time", "wrong_count"),
         ("PickXtimes", 0, "pick up the blue cube for the first time", "wrong_thing"),
-        ("PickXtimes", 0, "pick up the blue cube", "wrong_thing"),
         ("PickXtimes", 0, "press the button to stop", "lost"),
         ("PickXtimes", 1, "place the green cube onto the target", "right"),
         ("PickXtimes", 1, "put the green cube on the target", "right"),
-        ("PickXtimes", 1, "place the blue cube onto the target", "wrong_thing"),
         ("PickXtimes", 1, "put the blue cube on the target", "wrong_thing"),
         ("PickXtimes", 1, "place the green cube onto the table", "wrong_place"),
         ("PickXtimes", 1, "", "lost"),
@@ -83,18 +80,11 @@ def test_a_point_off_the_thing_is_wrong_whatever_the_words() -> None:
 
 
 def test_equal_cubes_stand_for_each_other_in_any_order_as_often_as_they_are_meant() -> None:
-    episode = next(
-        one
-        for one in (get_episode("BinFill", "test", index) for index in range(50))
-        if len(one.goal.texts("colors")) == 2 and one.goal.numbers("counts")[0] == 1
-    )
-    once, other = episode.goal.texts("colors")
+    episode = get_episode("BinFill", "test", 7)  # one blue cube and four green ones
     first = episode.stages[0]
-    for color in (once, other):
-        cubes = [one.name for one in episode.scene.of_kind("cube") if one.color == color]
+    for color, last in (("blue", "cube_blue_3"), ("green", "cube_green_5")):
         assert verdict(f"pick up the {color} cube", first, episode) == "right"
-        assert verdict("pick up the cube", first, episode, {cubes[-1]}) == "right"
-        if color == once:
-            done = frozenset({Fact("binned", cubes[-1], "bin")})
-    said = f"pick up the {once} cube"
+        assert verdict("pick up the cube", first, episode, {last}) == "right"
+    done = frozenset({Fact("binned", "cube_blue_3", "bin")})
+    said = "pick up the blue cube"
     assert judge_subgoal(said, episode.stages[2], None, episode, done) == "wrong_thing"

@@ -3,8 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from roboirg.apps.language_lab.validation.episode_checks import check_place
-from roboirg.apps.language_lab.validation.validation_results import ValidationResults
 from roboirg.core.episode import SPLITS, Episode, Point
 from roboirg.language.settings import plain_settings, settings_of
 from roboirg.tasks import every_task
@@ -45,11 +43,3 @@ def without_landmark(episode: Episode) -> Episode:
         for index, item in enumerate(episode.scene.objects)
     )
     return replace(episode, scene=replace(episode.scene, objects=objects))
-
-
-def validated(task: str, split: str, episodes: int) -> ValidationResults:
-    """Return the results of validating the first episodes of a split of a task."""
-    found = ValidationResults()
-    for index in range(episodes):
-        found.add(check_place((task, split, index)))
-    return found

@@ -7,12 +7,12 @@ from collections import Counter
 import pytest
 
 from roboirg.core.arms import ARMS, PARAPHRASES, parse_arm
-from roboirg.core.episode import Episode, Goal
+from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language import expressible, instruct_with
 from roboirg.language.arms import FUNCTION_WORDS, say_arm
-from roboirg.reader import interpret
+from roboirg.shortcuts.command_chance import understood_goals
 from roboirg.tasks import all_tasks, get_task, with_goal
 from roboirg.tasks.other_goals import begins_with, draw_other_goal, other_goals
 from roboirg.tasks.splits.splits import get_episode, make_episode
@@ -22,10 +22,6 @@ TASKS = tuple(all_tasks())
 
 def options_of(episode: Episode) -> list[InstructionOptions]:
     return [InstructionOptions(name) for name in expressible(episode)]
-
-
-def reads_as(text: str, episode: Episode) -> tuple[Goal, ...]:
-    return interpret(text, episode.scene, episode.task).goals
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -67,7 +63,7 @@ def test_a_scene_without_another_goal_says_so():
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_the_reader_gets_the_goal_of_every_arm_that_states_one(task):
+def test_the_words_of_every_arm_that_states_a_goal_mean_it(task):
     stated = 0
     for index in (1, 2, 3):
         episode = get_episode(task, "test", index)
@@ -80,7 +76,7 @@ def test_the_reader_gets_the_goal_of_every_arm_that_states_one(task):
                 except InvalidValueError:
                     continue
                 stated += 1
-                assert reads_as(said.instruction.text, episode) == (said.episode.goal,)
+                assert understood_goals(said.instruction, episode) == (said.episode.goal,)
                 if arm == "other-goal":
                     assert said.original == episode
                     assert said.episode.goal != episode.goal

@@ -8,21 +8,21 @@ from language_variants import TASKS, first_episodes
 from roboirg.language import LANGUAGE_VERSION, instruct_with
 from roboirg.language.variants import expressible_options
 
-GOLDEN_VERSION = "3.0.0"
+GOLDEN_VERSION = "4.7.0"
 GOLDEN: dict[str, str] = {
-    "PickXtimes": "c3c00344c37963f4",
-    "StopCube": "d689087999b3007c",
-    "SwingXtimes": "fd42c020dfcb89ef",
-    "BinFill": "a3e450588caff91b",
-    "VideoUnmaskSwap": "b5b36fd905b7c96e",
-    "VideoUnmask": "7779bb75f1ca6586",
-    "ButtonUnmaskSwap": "6daf798c2a6fcfb8",
-    "ButtonUnmask": "51ce49add1b32bd1",
-    "VideoRepick": "754652e050acf1b0",
-    "VideoPlaceButton": "70897df83d79cb59",
-    "VideoPlaceOrder": "b1d923874868ee41",
-    "PutInBox": "8ae0b86252e3f031",
-    "PickByCount": "b191a0c98ba4d05f",
+    "PickXtimes": "0913f31ea2e7861e",
+    "StopCube": "ecbc7dfbb52a7d08",
+    "SwingXtimes": "4b6cf18cc4b76311",
+    "BinFill": "529cf8b4a4fe291d",
+    "VideoUnmaskSwap": "dadee1419e836a4c",
+    "VideoUnmask": "c101c1db6547f424",
+    "ButtonUnmaskSwap": "af0d828cdf13c083",
+    "ButtonUnmask": "5ba5d1ee9368012d",
+    "VideoRepick": "1dfffc63ead9bc75",
+    "VideoPlaceButton": "11032de44ee8f9a6",
+    "VideoPlaceOrder": "0c4a85d9c7b0bb3a",
+    "PutInBox": "f14b96c7dae2578e",
+    "PickByCount": "828bdc9006bf5157",
 }
 
 
@@ -42,5 +42,5 @@ def test_the_words_are_those_of_the_version(task):
     assert LANGUAGE_VERSION == GOLDEN_VERSION, "new version: put its digests here"
     assert digest(task) == GOLDEN[task], (
         "The words (or the scenes) have changed: bump LANGUAGE_VERSION in "
-        "roboirg/language/templates and put the new digests here."
+        "roboirg/language/word_sampler.py and put the new digests here."
     )

@@ -1,4 +1,4 @@
-"""The declared meaning of language 4: which goals the words leave in a scene."""
+"""The declared meaning: which goals the words leave in a scene."""
 
 import itertools
 from fractions import Fraction
@@ -16,7 +16,7 @@ from roboirg.language.instruction import Described, Meaning, Term
 from roboirg.language.landmarks import candidates_in
 from roboirg.language.request import values_of_goal
 from roboirg.language.scenarios import amounts, declared
-from roboirg.language.scenarios.scenario_file import task_scenarios
+from roboirg.language.scenarios.scenario_file import written_words
 from roboirg.language.settings import settings_of
 from roboirg.shortcuts.command_chance import (
     blind_goals,
@@ -25,19 +25,19 @@ from roboirg.shortcuts.command_chance import (
     right_share,
     understood_goals,
 )
-from roboirg.tasks import all_tasks, get_task, goals_of
+from roboirg.tasks import get_task, goals_of
 from roboirg.tasks.splits.splits import get_episode
 
-WRITTEN = [task for task in all_tasks() if task_scenarios(task)]
+WRITTEN = [*written_words()]
 SCENE = get_episode("PickXtimes", "test", 0)
 
 
 def options_of(task):
-    """Yield options of every setting, form, pool and delivery of a task in language 4."""
+    """Yield options of every setting, form, pool and delivery of a task."""
     for setting, form, pool, delivery in itertools.product(
         settings_of(get_task(task)), ("implicit", "resolved"), POOLS, DELIVERIES
     ):
-        yield InstructionOptions(setting, form, language=4, wordings=pool, delivery=delivery)
+        yield InstructionOptions(setting, form, wordings=pool, delivery=delivery)
 
 
 def said_of(task, step):
@@ -118,13 +118,13 @@ def test_another_value_in_the_introduction_is_another_goal(task):
 
 @pytest.mark.parametrize("setting", ["direct", "spatial", "contextual", "reasoning"])
 def test_what_was_not_said_means_nothing(setting):
-    said = instruct_with(SCENE, InstructionOptions(setting, language=4))
+    said = instruct_with(SCENE, InstructionOptions(setting))
     unsaid = {name: term._replace(operands=()) for name, term in said.meaning.terms.items()}
     assert meaning.meant_goals(Meaning(unsaid), SCENE) == ()
 
 
 def test_no_words_leave_all_goals_and_scrambled_ones_have_no_meaning():
-    options = InstructionOptions("direct", language=4)
+    options = InstructionOptions("direct")
     silent = say_arm(SCENE, options, "silent").instruction
     assert understood_goals(silent, SCENE) == goals_of(SCENE)
     scrambled = say_arm(SCENE, options, "scrambled").instruction
@@ -143,7 +143,7 @@ def test_a_rival_is_a_guess_between_two_and_the_command_leaves_more():
     shares = []
     for index in range(12):
         episode = get_episode("PickXtimes", "test", index)
-        options = InstructionOptions("direct-rival", language=4)
+        options = InstructionOptions("direct-rival")
         if find_refusal(episode, options) is None:
             said = instruct_with(episode, options)
             assert right_share(blind_goals(said, episode), episode) == Fraction(1, 2), said.text
@@ -204,7 +204,7 @@ def another_if(kind, described_thing, described, episode):
     thing = described_thing(described, episode)
     if described.kind != kind:
         return thing
-    things = candidates_in(episode.scene, get_task(episode.task).commands.pointed)
+    things = candidates_in(episode.scene, get_task(episode.task).things.pointed)
     return next((other for other in things if other != thing), None)
 
 

@@ -8,8 +8,9 @@ import pytest
 
 from roboirg.core.episode import Episode, SceneObject
 from roboirg.language import instruct, mirrored_objects
-from roboirg.language.landmarks import FRAMES, selectors
+from roboirg.language.landmarks import FRAMES
 from roboirg.language.mirrored_landmarks import exchange_sides
+from roboirg.language.places import things_at
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 
@@ -41,16 +42,13 @@ def test_the_mirrored_object_is_what_the_exchanged_words_select(task: str, frame
     seen: Counter[bool] = Counter()
     for index in range(24):
         episode = get_episode(task, "test", index)
-        scene, thing = episode.scene, every_task()[task].commands.pointed
+        scene, thing = episode.scene, every_task()[task].things.pointed
         found = mirrored_objects(episode, instruct(episode, "spatial", frame=frame))
         resolved = instruct(episode, "spatial", "resolved", frame=frame)
         assert mirrored_objects(episode, resolved) == found
         assert not mirrored_objects(episode, instruct(episode, "direct"))
         assert not found.keys() & frozenset().union(*found.values())  # what is meant is not
-        selected = {
-            one.landmark.phrase: one.select()
-            for one in reversed(list(selectors(scene, thing, frame)))  # type: ignore[arg-type]
-        }
+        selected = things_at(scene, thing, frame)  # type: ignore[arg-type]
         for place in chosen(episode, frame):
             target, other = selected[place], selected.get(exchange_sides(place))
             assert target is not None

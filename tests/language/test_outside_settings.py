@@ -1,42 +1,36 @@
-"""A setting from outside: one file is enough for validation, card, statistics and export."""
+"""A setting from outside: one file is enough for lists, plans, statistics and export."""
 
 import dataclasses
 import io
-import re
-import sys
-from pathlib import Path
 
 import pytest
 import seed_selection
-from language_variants import validated
 from rich.console import Console
 from seed_selection import EpisodeSlot, check_words
 
 from roboirg.apps.language_lab import statistics_tables
-from roboirg.apps.language_lab.validation import episode_checks
-from roboirg.apps.language_lab.validation.episode_checks import check_episode
-from roboirg.apps.language_lab.validation.validation_tables import validation_tables
 from roboirg.apps.show.episode_text import instructions_table
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.plan.plan_maker import make_plan
 from roboirg.language import (
     FORMS,
-    LANGUAGE_VERSIONS,
     expressible,
     find_refusals,
     instruct,
-    instruct_with,
     setting_names,
     settings,
 )
+from roboirg.language.generator import find_refusal
 from roboirg.language.instruction_row import row
-from roboirg.language.phrases import plain
-from roboirg.language.request import InstructionSpec, UtteranceSpec
+from roboirg.language.number_words import times
+from roboirg.language.scenarios import spoken
 from roboirg.language.scenarios.scenario_file import FOLDER, setting_scenarios
-from roboirg.language.settings import all_settings, direct
+from roboirg.language.scenarios.wording_file import parse_wordings
+from roboirg.language.scenarios.wording_store import register_wordings
+from roboirg.language.settings import all_settings, contextual, direct, settings_of
 from roboirg.language.settings.setting import Setting
-from roboirg.language.variants import all_variants, instructions
+from roboirg.language.variants import instructions
+from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.shortcuts.command_chance import understood_goals
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
@@ -50,7 +44,7 @@ DUMMY = Setting(
     order=9,
     summary="direct, but not in easy scenes",
     color="#123456",
-    say=direct.say,
+    offers="contextual",
     applies_to=lambda task: task.suite == "counting",
     refusal=lambda request: REASON if request.episode.difficulty == "easy" else None,
     example=0,
@@ -79,12 +73,10 @@ def printed(*tables):
 
 
 def test_a_setting_is_in_the_lists_of_its_tasks(register):
-    before = len(all_variants())
     register(DUMMY)
     counting = [task.name for task in all_tasks().values() if task.suite == "counting"]
     assert setting_names()[-1] == "dummy"
-    assert len(all_variants()) == before + len(counting)
-    assert {one.task for one in all_variants() if one.setting == "dummy"} == set(counting)
+    assert [name for name, task in all_tasks().items() if "dummy" in settings_of(task)] == counting
     with pytest.raises(InvalidValueError, match="has no dummy setting"):
         instruct(get_episode("VideoUnmask", "test", 0), "dummy")
 
@@ -101,37 +93,13 @@ def test_a_refusal_says_why_wherever_it_shows(register):
     assert ["dummy" in plan.settings_of("PickXtimes", index) for index in (0, 3)] == [False, True]
 
 
-def test_validation_counts_what_a_setting_refuses(register):
-    register(DUMMY)
-    results = validated("PickXtimes", "test", 4)
-    assert not results.failures
-    assert results.texts["PickXtimes", "dummy"] == 2 * 2
-    assert results.refused["PickXtimes", "dummy", "", "easy"] == 2
-    text = printed(*validation_tables(results))
-    assert re.search(r"PickXtimes\s+dummy\s+2 of 2\b", text)
-    assert f"dummy: {REASON}: 2 refusals" in text
-
-
-def test_a_pairing_rule_of_a_setting_can_fail(register):
-    def must_be_explicit(instruct):
-        if instruct(InstructionOptions("dummy")).text != instruct(InstructionOptions()).text:
-            yield "not explicit"
-
-    register(dataclasses.replace(DUMMY, pairing_rules=must_be_explicit))
-    (failure,) = check_episode(HARD).failures
-    assert (failure.rule, failure.setting, failure.words) == ("pairing", "dummy", "not explicit")
-
-
 def test_a_new_setting_does_not_change_the_splits(register, monkeypatch):
     slot = EpisodeSlot("PickXtimes", "test", 0)
     register(DUMMY)
     assert check_words(slot, EPISODE.seed) is None
-    for module in (seed_selection, episode_checks):
-        monkeypatch.setattr(module, "ACCEPTANCE_SETTINGS", ("direct", "dummy"))
+    monkeypatch.setattr(seed_selection, "ACCEPTANCE_SETTINGS", ("direct", "dummy"))
     rejection = check_words(slot, EPISODE.seed)
     assert (rejection.reason, rejection.cause) == ("not expressible", f"dummy: {REASON}")
-    strict = check_episode(EPISODE, must_be_expressible=True)
-    assert [(one.rule, one.words) for one in strict.failures] == [("expressible", REASON)]
 
 
 def test_statistics_and_export_have_the_setting(register):
@@ -144,18 +112,6 @@ def test_statistics_and_export_have_the_setting(register):
     assert "dummy" in printed(*statistics_tables.overview_tables(said))
 
 
-def test_language_4_leaves_a_setting_that_has_no_scenarios_its_own_words(register):
-    def say(request):
-        words = f"language {request.options.language}"
-        return InstructionSpec((UtteranceSpec("command", plain(words)),))
-
-    register(dataclasses.replace(DUMMY, say=say, reads=frozenset({"language"})))
-    for language in (3, 4):
-        said = instruct(HARD, "dummy", language=language)
-        assert said.text == f"Language {language}"
-        assert said.metadata["language_version"] == LANGUAGE_VERSIONS[language]
-
-
 @pytest.mark.parametrize("name", ["direct", "reasoning", "spatial", "grounded", "direct-rival"])
 def test_a_setting_says_scenarios_of_its_own_in_the_ways_of_one_of_ours(name, register, tmp_path):
     lab, episode = f"lab-{name}", get_episode("PickXtimes", "test", 6)
@@ -166,11 +122,11 @@ def test_a_setting_says_scenarios_of_its_own_in_the_ways_of_one_of_ours(name, re
     register(setting)
     unwritten = r"\): color_and_number\.toml has no lab-\S+ scenario for it in the pool test; leave"
     with pytest.raises(InvalidValueError, match=unwritten):
-        instruct(episode, lab, language=4)
+        instruct(episode, lab)
     register(dataclasses.replace(setting, words=str(path)))
     setting_scenarios.cache_clear()
     for form in FORMS:
-        said = instruct(episode, lab, form, language=4)
+        said = instruct(episode, lab, form)
         assert understood_goals(said, episode) == (episode.goal,)
         (scenario,) = [
             one
@@ -190,41 +146,96 @@ def test_settings_made_from_explicit_and_contextual_say_what_these_do(register):
     ]
     register(*made)
     for setting in made:
-        usual = instruct(HARD, setting.name.removeprefix("my-"), language=4)
-        assert instruct(HARD, setting.name, language=4).turns == usual.turns
+        usual = instruct(HARD, setting.name.removeprefix("my-"))
+        assert instruct(HARD, setting.name).turns == usual.turns
 
 
-def test_a_setting_with_scenarios_reads_the_language():
-    sentence = r"^The setting dummy has offers, so 'language' must be in its reads\.$"
-    with pytest.raises(InvalidValueError, match=sentence):
-        dataclasses.replace(DUMMY, offers="direct")
+LAB = """
+tasks = ["PickXtimes"]
+[commands]
+all = ["Lab: lift {color} {repeats}."]
+[stated.all]
+color = "the lab's {color} cube"
+[[scenario]]
+frame = "lab"
+pool = "test"
+setting = "lab"
+introduction = "The lab says {repeats:times}."
+say.repeats = ["<each repeats: [repeats: once for that lap|once for each of them]>"]
+"""
+MINE = 'name = "mine"\ntasks = ["PickXtimes"]\n'
+MY_COMMAND = '[commands]\nall = ["Mine: lift {color} {repeats}."]\n'
+MY_VALUE = '[stated.all]\ncolor = "my {color} cube"\n'
+MY_SCENARIO = """
+[[scenario]]
+frame = "mine"
+setting = "lab"
+introduction = "I say {repeats:times}."
+say.repeats = ["<each repeats: [repeats: once for that lap|once for each of them]>"]
+"""
 
 
-def recipe():
-    """The file that docs/add-setting.md shows under "Add a setting"."""
-    page = (Path(__file__).parents[2] / "docs" / "add-setting.md").read_text()
-    section = page[page.index("## Add a setting") :]
-    return re.search(r"```python\n(.*?)```", section, re.DOTALL)[1]
+@pytest.fixture
+def lab(register, tmp_path):
+    """A setting with a file of its own, of which the test gives the text."""
+
+    def add(text, **changes):
+        path = tmp_path / "lab.toml"
+        path.write_text(text)
+        made = dataclasses.replace(direct.SETTING, name="lab", words=str(path), **changes)
+        register(made)
+        setting_scenarios.cache_clear()
+        return made
+
+    yield add
+    setting_scenarios.cache_clear()
 
 
-def test_the_recipe_of_the_docs_is_a_setting_of_an_installed_package(tmp_path, monkeypatch):
-    (tmp_path / "my_setting.py").write_text(recipe())
-    info = tmp_path / "my_package-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[roboirg.settings]\ninterrupted = my_setting:SETTING\n")
-    monkeypatch.syspath_prepend(tmp_path)
-    all_settings.cache_clear()
-    try:
-        assert setting_names()[-1] == "interrupted"
-        for index in range(4):
-            for task in ("PickXtimes", "BinFill"):
-                assert not check_episode(get_episode(task, "test", index)).failures
-        said = instruct_with(HARD, InstructionOptions("interrupted"))
-        assert [one.stage for one in said.utterances] == ["introduction", "distractor", "command"]
-        assert "interrupted" not in expressible(get_episode("VideoUnmask", "test", 0))
-    finally:
-        monkeypatch.undo()
-        sys.modules.pop("my_setting", None)
-        all_settings.cache_clear()
-    assert "interrupted" not in setting_names()
+@pytest.mark.parametrize(
+    ("mine", "introduction", "command"),
+    [
+        ("", "The lab says {}.", "Lab: lift the lab's {} cube "),
+        (MY_COMMAND, "The lab says {}.", "Mine: lift the lab's {} cube "),
+        (MY_VALUE, "The lab says {}.", "Lab: lift my {} cube "),
+        (MY_SCENARIO, "I say {}.", "Lab: lift the lab's {} cube "),
+        (MY_COMMAND + MY_VALUE + MY_SCENARIO, "I say {}.", "Mine: lift my {} cube "),
+    ],
+)
+def test_a_wording_file_comes_before_the_file_of_a_setting_and_this_before_the_task_s(
+    lab, mine, introduction, command
+):
+    lab(LAB)
+    wordings = register_wordings(parse_wordings(MINE + mine, "mine.toml")) if mine else None
+    said = instruct(HARD, "lab", wordings=wordings)
+    color = HARD.goal.text("color")
+    assert said.turns[0] == introduction.format(times(HARD.goal["repeats"]))
+    assert said.command.startswith(command.format(color))
+    explicit = instruct(HARD, wordings=wordings).command
+    assert "Lab" not in explicit
+    assert explicit.startswith("Mine: ") == (MY_COMMAND in mine)
+
+
+@pytest.mark.parametrize(
+    "wrong", ['name = "lab"\n', '[[literal]]\ntask = "PickXtimes"\ntext = "x"\n']
+)
+def test_the_file_of_a_setting_has_neither_name_nor_whole_sentences(lab, wrong):
+    lab(wrong + LAB if "name" in wrong else LAB + wrong)
+    with pytest.raises(InvalidValueError, match=r"^lab\.toml has a name or a \[\[literal"):
+        instruct(HARD, "lab")
+
+
+def test_a_setting_made_from_contextual_refuses_by_its_own_rule_whatever_came_before(register):
+    calm = dataclasses.replace(contextual.SETTING, name="calm", refusal=lambda _: "never calm")
+    register(calm)
+    options = {name: InstructionOptions(name) for name in ("direct", "calm")}
+    for names in (("direct", "calm", "direct"), ("calm", "direct", "calm")):
+        spoken._CHOICES.clear()
+        refused = {name: find_refusal(HARD, options[name]) for name in names}
+        assert refused == {"direct": None, "calm": "never calm"}
+
+
+def test_direct_and_contextual_choose_once():
+    spoken._CHOICES.clear()
+    for name in ("direct", "contextual"):
+        instruct(HARD, name)
+        assert len(spoken._CHOICES) == 1

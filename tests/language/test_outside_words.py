@@ -1,4 +1,4 @@
-"""Words of language 4 from another package, in a process where it is installed."""
+"""Words from another package, in a process where it is installed."""
 
 import json
 import os
@@ -94,9 +94,8 @@ def all_words() -> str:
 TASK_PAGE = (DOCS / "add-task.md").read_text()
 TASK, *_ = re.findall(r"```python\n(.*?)```", TASK_PAGE, re.DOTALL)
 TASK_PROJECT, *_ = re.findall(r"```toml\n(.*?)```", TASK_PAGE, re.DOTALL)
-(TASK_WORDS,) = blocks("add-task.md", "Words of language 4")
-OWN_SAY, OWN_SAY_PROJECT = blocks("add-setting.md", "Add a setting")
-COLORED, COLORED_PROJECT, COLORED_WORDS = blocks("add-setting.md", "Let it speak language 4")
+(TASK_WORDS,) = blocks("add-task.md", "Words")
+COLORED, COLORED_PROJECT, COLORED_WORDS = blocks("add-setting.md", "Add a setting")
 
 
 class Package:
@@ -116,7 +115,6 @@ class Package:
             "__init__.py": "",
             "place_and_press.py": TASK,
             "words.toml": TASK_WORDS,
-            "my_setting.py": OWN_SAY,
             "colored.py": COLORED,
             "colored.toml": COLORED_WORDS,
         }
@@ -124,7 +122,7 @@ class Package:
             (self.files / name).write_text(text)
         (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
         entries = ""
-        for project in (TASK_PROJECT, OWN_SAY_PROJECT, COLORED_PROJECT):
+        for project in (TASK_PROJECT, COLORED_PROJECT):
             for group, points in tomllib.loads(project)["project"]["entry-points"].items():
                 lines = [f"{name} = {place}" for name, place in points.items()]
                 entries += "\n".join([f"[{group}]", *lines, ""])
@@ -175,7 +173,7 @@ found = []
 
 def refused(task, setting):
     try:
-        return instruct(get_episode(task, "test", 0), setting, language=4).text
+        return instruct(get_episode(task, "test", 0), setting).text
     except InvalidValueError as error:
         return str(error)
 """
@@ -190,12 +188,12 @@ def test_the_page_s_setting_says_scenarios_of_its_own_file(package):
     found = package.run("""
 for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
     episode = get_episode(task, "test", 1)
-    options = InstructionOptions("colored", language=4, wordings=pool)
+    options = InstructionOptions("colored", wordings=pool)
     said = instruct_with(episode, options)
     stated = instruct_with(episode, replace(options, form="resolved"))
     explicit = instruct_with(episode, replace(options, setting="explicit"))
     assert stated.turns == (said.turns[0], explicit.text)
-    assert said.metadata["words"] == words_of(task, pool, 4, "colored")
+    assert said.metadata["words"] == words_of(task, pool, "colored")
     assert understood_goals(said, episode) == (episode.goal,)
     found.append(said.metadata["scenario"])
     reports = check_scenarios(setting_scenarios("colored")[task], None, scenes_of(task, 0)[::20])
@@ -207,28 +205,18 @@ for task, pool in itertools.product(("PickXtimes", "SwingXtimes"), POOLS):
 def test_its_file_counts_in_the_words_of_that_setting_alone(package):
     found = package.run("""
 for task, pool, setting in itertools.product(all_tasks(), POOLS, all_settings()):
-    found.append([task, pool, setting, words_of(task, pool, 4, setting)])
-found.append(language_label(["PickXtimes"], "test", 4, ["direct", "colored"]))
+    found.append([task, pool, setting, words_of(task, pool, setting)])
+found.append(language_label(["PickXtimes"], "test", ["direct", "colored"]))
 """)
     label = found.pop()
-    own = [row for row in found if row[-1] != words_of(row[0], row[1], 4)]
+    own = [row for row in found if row[-1] != words_of(row[0], row[1])]
     assert [row[:3] for row in own] == [
         [task, pool, "colored"] for task in ("PickXtimes", "SwingXtimes") for pool in POOLS
     ]
     name = r"PickXtimes/test/colored@[0-9a-f]{12}"
     assert re.fullmatch(name, own[1][-1])
-    assert label.split()[1:] == [words_of("PickXtimes", "test", 4), own[1][-1]]
+    assert label.split()[1:] == [words_of("PickXtimes", "test"), own[1][-1]]
     assert {task for task, *_ in found} == set(all_tasks())
-
-
-def test_a_setting_that_does_not_read_the_language_says_the_same_in_each(package):
-    (usual, new) = package.run("""
-for language in (3, 4):
-    said = instruct(get_episode("BinFill", "test", 1), "interrupted", language=language)
-    found.append([said.text, said.metadata["language_version"], said.metadata.get("words")])
-""")
-    assert usual == new
-    assert usual[2] is None
 
 
 def test_the_page_s_task_speaks_with_the_words_of_its_own_file(package):
@@ -256,7 +244,7 @@ for report in check_scenarios(task_scenarios(task.name), None, scenes_of(task.na
 spoken = set()
 for split, index, name in itertools.product(("train", "test"), range(12), settings_of(task)):
     episode = get_episode(task.name, split, index)
-    options = InstructionOptions(name, language=4)
+    options = InstructionOptions(name)
     if find_refusal(episode, options) is not None:
         continue
     spoken.add((name, split))
@@ -300,7 +288,7 @@ found.append(sorted(spoken))
         ),
         (
             "colored.toml", 'setting = "colored"', 'setting = "colorful"', "PickXtimes", "colored",
-            " 'new coat' has the setting 'colorful'; the settings are direct, direct-rival, ",
+            " 'new coat': There is no setting 'colorful'; known: colored, direct, direct-rival, ",
         ),
         (
             "colored.py", "offers=offers", 'offers="drect"', "PickXtimes", "colored",
@@ -312,7 +300,7 @@ found.append(sorted(spoken))
         ),
         (
             "words.toml", 'color = "the', 'colour = "the', "PlaceAndPress", "explicit",
-            "words.toml, stated has the slot 'color'; known: ",
+            "words.toml, stated colour has other marks than those of {{colour}}.",
         ),
         (
             "words.toml", "train = [", "train = [] # [", "PlaceAndPress", "explicit",

@@ -11,15 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from language_variants import random_episodes, split_episodes
 from selection import slow_but
+from wording_stand_ins import WOBBLY
 
-from roboirg.core.episode import COLORS, Point, Scene, SceneObject
+from roboirg.core.episode import COLORS, ROBOT_BASE, Point, Scene, SceneObject
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.motions import Away
 from roboirg.core.object_sizes import BESIDE
+from roboirg.language import instruct
+from roboirg.language.clues import thing_clues
 from roboirg.language.generator import find_refusal, request_of
-from roboirg.language.grounded import spoken_clues
 from roboirg.language.landmarks import FRAMES, MARGIN, candidates_in, selectors
-from roboirg.language.places import USUAL, PlaceClass, spoken_places, things_at
+from roboirg.language.places import PlaceClass, spoken_places, things_at
 from roboirg.language.scenarios.choice import choose
 from roboirg.language.scenarios.scenario_file import read_task_scenarios
 from roboirg.tasks import all_tasks, get_task
@@ -28,19 +30,16 @@ from roboirg.tasks.splits.splits import get_episode
 UNMASK = ("VideoUnmask", "VideoUnmaskSwap", "ButtonUnmask", "ButtonUnmaskSwap")
 WRITTEN = ("PickXtimes", "SwingXtimes", "StopCube", *UNMASK)
 SPATIAL = ("PickXtimes", *UNMASK)
+NEAR_AND_FAR = {
+    f"{words} {whom}"
+    for words in ("closest to", "close to", "far from", "farthest from")
+    for whom in ("you", "the robot")
+} | {"in the front", "in the back", "all the way in the front", "all the way in the back"}
 GRID = st.integers(-17, 17).map(lambda step: step / 100)
 PLACES = st.lists(st.tuples(GRID, GRID), min_size=1, max_size=7, unique=True)
 """Centimeter grid: ties, exact margins and collinear rows are common."""
 MOST_WORDS = 12
-WOBBLY = """
-tasks = ["PickXtimes"]
-[[scenario]]
-frame = "wobbly"
-pool = "train"
-setting = "spatial"
-introduction = "The table wobbles {place:spot}."
-say.color = ["the cube <there place: there>"]
-"""
+UNSEEN = "nothing to see in this scene singles out a slot's value"
 
 
 def table(places, *fixtures):
@@ -76,14 +75,14 @@ def things_by_phrase(scene, kind="container", frame="robot"):
     return found
 
 
+def usual_places(scene, kind="container", frame="robot"):
+    return [place for place in spoken_places(scene, kind, frame) if place.kind < PlaceClass.UNUSUAL]
+
+
 def usual(scene, name, kind="container", frame="robot"):
     """Return the usual words after a noun for a thing."""
-    places = spoken_places(scene, kind, frame)
-    return {
-        place.attributive
-        for place in places
-        if place.thing.name == name and place.attributive and place.kind <= USUAL
-    }
+    places = usual_places(scene, kind, frame)
+    return {place.attributive for place in places if place.thing.name == name and place.attributive}
 
 
 def spots(scene, kind="container", frame="robot"):
@@ -98,8 +97,8 @@ def scenes_of(task):
 
 
 @pytest.mark.parametrize("task", slow_but(WRITTEN, all_tasks()))
-def test_each_phrase_of_a_scene_belongs_to_one_thing_in_both_languages_and_frames(task):
-    kind = get_task(task).commands.pointed
+def test_each_phrase_of_a_scene_belongs_to_one_thing_in_both_frames(task):
+    kind = get_task(task).things.pointed
     for scene in scenes_of(task):
         robot, camera = (things_by_phrase(scene, kind, frame) for frame in FRAMES)
         shared = robot.keys() & camera.keys()
@@ -112,7 +111,7 @@ def test_each_phrase_of_a_scene_belongs_to_one_thing_in_both_languages_and_frame
             assert {words: known[words].name for words in found} == found
             for selector in selectors(scene, kind, frame):
                 assert known[selector.landmark.phrase] is selector.select()
-            said = [place for place in spoken_places(scene, kind, frame) if place.kind <= USUAL]
+            said = usual_places(scene, kind, frame)
             assert all(len(words.split()) <= MOST_WORDS for words, _ in words_of(said))
 
 
@@ -124,14 +123,68 @@ def test_no_phrase_goes_over_to_another_thing_when_one_moves_by_less_than_the_ma
     fixtures = (("button", (-0.2, button)), ("target", (0.0, -button)))
     mover %= len(places)
     x, y = places[mover]
-    # Both distances change if the one that moves is what others are near.
-    for step, last in ((0.49 * MARGIN, PlaceClass.NEIGHBOR), (0.98 * MARGIN, USUAL)):
-        moved = list(places)
-        moved[mover] = (x + step * math.cos(turn), y + step * math.sin(turn))
-        after = things_by_phrase(table(moved, *fixtures), frame=frame)
-        before = spoken_places(table(places, *fixtures), "container", frame)
-        for words, thing in words_of(place for place in before if place.kind <= last):
-            assert after.get(words, thing.name) == thing.name, words
+    step = 0.98 * MARGIN
+    moved = list(places)
+    moved[mover] = (x + step * math.cos(turn), y + step * math.sin(turn))
+    after = things_by_phrase(table(moved, *fixtures), frame=frame)
+    before = usual_places(table(places, *fixtures), frame=frame)
+    for words, thing in words_of(before):
+        assert after.get(words, thing.name) == thing.name, words
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_near_and_far_are_not_said_where_depth_and_distance_from_the_robot_disagree(frame):
+    """One container stands 6 cm deeper than the other, which is 1 cm farther away."""
+    disagreeing = table([(-0.2, 0.25), (-0.14, 0.0)])
+    distances = [math.dist(item.position[:2], ROBOT_BASE[:2]) for item in disagreeing.objects]
+    assert distances == pytest.approx([0.484, 0.475], abs=0.001)
+    found = things_by_phrase(disagreeing, frame=frame)
+    assert NEAR_AND_FAR.isdisjoint(found)
+    agreeing = table([(-0.2, 0.0), (-0.14, 0.25)])
+    found = things_by_phrase(agreeing, frame=frame)
+    robot = "you" if frame == "robot" else "the robot"
+    assert found[f"closest to {robot}"] == "container_0"
+
+
+@pytest.mark.parametrize("task", SPATIAL)
+def test_the_first_from_near_to_far_is_so_in_depth_and_by_distance(task):
+    measures = (
+        lambda item: item.position.x,
+        lambda item: math.dist(item.position[:2], ROBOT_BASE[:2]),
+    )
+    kind = get_task(task).things.pointed
+    said = 0
+    for scene in scenes_of(task):
+        things = candidates_in(scene, kind)
+        known = things_at(scene, kind, "robot")
+        own = things_by_phrase(scene, kind)
+        for measure in measures:
+            order = sorted(things, key=measure)
+            ranks = {
+                "closest to you": 0,
+                "all the way in the front": 0,
+                "second closest to you": 1,
+                "all the way in the back": -1,
+            }
+            for words in own.keys() & ranks.keys():
+                assert known[words] is order[ranks[words]], words
+                said += 1
+    assert said
+
+
+@pytest.mark.parametrize(
+    ("other", "words"),
+    [
+        ((0.02, 0.02), {"nearest to the back left corner"}),  # in the same quarter
+        ((-0.02, 0.15), set()),  # hardly outside of it, and about as near to the corner
+        ((-0.2, -0.2), {"at the back left", "in the back left corner"}),
+    ],
+)
+def test_nothing_is_in_a_corner_if_another_thing_is_near_that_corner(other, words):
+    scene = table([(0.1, 0.1), other, (-0.3, 0.0), (0.2, -0.2)])
+    corner = {"nearest to the back left corner", "at the back left", "in the back left corner"}
+    assert usual(scene, "container_0") & corner == words
+    assert not corner.intersection(usual(scene, "container_1"))
 
 
 def gap(thing, fixture):
@@ -165,7 +218,7 @@ def is_there(spot, thing, scene, middle):
 
 @pytest.mark.parametrize("task", SPATIAL)
 def test_a_spot_is_true_of_its_thing_and_of_no_other_one(task):
-    kind = get_task(task).commands.pointed
+    kind = get_task(task).things.pointed
     for scene in scenes_of(task):
         things = candidates_in(scene, kind)
         depths = [thing.position.x for thing in things]
@@ -183,24 +236,35 @@ def test_a_spot_is_true_of_its_thing_and_of_no_other_one(task):
 
 
 @pytest.mark.parametrize("task", SPATIAL)
-def test_nine_of_ten_published_scenes_have_a_spot_and_all_have_usual_words(task):
-    kind = get_task(task).commands.pointed
+def test_two_of_three_published_scenes_have_a_spot_and_nearly_all_have_usual_words(task):
+    kind = get_task(task).things.pointed
     with_spot, total, unusual = 0, 0, 0
     for episode in split_episodes(task):
         if find_refusal(episode, InstructionOptions("spatial")):
             continue
-        request = request_of(episode, InstructionOptions("spatial", language=4))
+        request = request_of(episode, InstructionOptions("spatial"))
         meant = [request.objects_to_point_at(color) for color in request.color_values]
+        things = list(itertools.chain(*meant))
         places = [
-            place
-            for place in spoken_places(episode.scene, kind, "robot")
-            if place.thing in itertools.chain(*meant)
+            place for place in spoken_places(episode.scene, kind, "robot") if place.thing in things
         ]
+        assert places
         total += 1
         with_spot += any(place.spot for place in places)
-        unusual += all(place.kind > USUAL for place in places)
-    assert with_spot >= 0.9 * total
-    assert unusual <= 0.03 * total
+        unusual += all(place.kind == PlaceClass.UNUSUAL for place in places)
+    assert with_spot >= 0.66 * total
+    assert unusual <= 0.04 * total
+
+
+@pytest.mark.parametrize(
+    ("task", "index"), [("VideoUnmask", 10), ("BinFill", 34)], ids=["neighbor", "unusual"]
+)
+def test_a_thing_that_only_a_neighbor_would_name_is_not_grounded(task, index):
+    """*Nearest to the one closest to you* is said by no one."""
+    episode = get_episode(task, "test", index)
+    assert find_refusal(episode, InstructionOptions("grounded")) == UNSEEN
+    spatial = instruct(episode, "spatial")
+    assert spatial.metadata["landmark_classes"] == [PlaceClass.UNUSUAL]
 
 
 ROW = [(0.0, y) for y in (-0.16, -0.08, 0.0, 0.08, 0.16)]
@@ -250,10 +314,10 @@ def test_places_do_not_depend_on_cubes_that_arrive_later():
 
 @pytest.mark.parametrize("task", SPATIAL)
 def test_a_clue_leads_to_one_thing(task):
-    kind = get_task(task).commands.pointed
+    kind = get_task(task).things.pointed
     for scene in scenes_of(task):
         found = {}
-        for thing, clue in spoken_clues(scene, get_task(task)):
+        for thing, clue in thing_clues(scene, get_task(task)):
             assert found.setdefault(clue.words, thing.name) == thing.name
             assert thing.name not in {
                 things_at(scene, kind, "robot")[aside].name for aside in clue.aside
@@ -262,7 +326,7 @@ def test_a_clue_leads_to_one_thing(task):
 
 def test_a_scenario_with_a_spot_fits_only_what_has_one():
     (scenario,) = read_task_scenarios(WOBBLY, "mine.toml")["PickXtimes"].scenarios
-    options = InstructionOptions("spatial", language=4, wordings="train")
+    options = InstructionOptions("spatial", wordings="train")
     fitting = 0
     for index in range(40):
         request = request_of(get_episode("PickXtimes", "train", index), options)
@@ -284,7 +348,7 @@ def test_any_place_is_a_spot_where_there_is_one_and_fits_all_others_too():
     (scenario,) = read_task_scenarios(WOBBLY, "mine.toml")["PickXtimes"].scenarios
     text = WOBBLY.replace("The table wobbles {place:spot}", "Sand the cube {place:any}")
     (any_place,) = read_task_scenarios(text, "mine.toml")["PickXtimes"].scenarios
-    options = InstructionOptions("spatial", language=4, wordings="train")
+    options = InstructionOptions("spatial", wordings="train")
     forms = set()
     for index in range(40):
         request = request_of(get_episode("PickXtimes", "train", index), options)
@@ -302,9 +366,9 @@ def test_only_what_has_moved_since_is_said_to_have_started_there(task):
     for scene in scenes_of(task):
         places = {
             f"the {noun} {started}{place.attributive}": place.thing
-            for place in spoken_places(scene, get_task(task).commands.pointed, "robot")
+            for place in spoken_places(scene, get_task(task).things.pointed, "robot")
         }
-        for thing, clue in spoken_clues(scene, get_task(task)):
+        for thing, clue in thing_clues(scene, get_task(task)):
             assert clue.kind == "sets" or places[clue.words] is thing
 
 
@@ -325,7 +389,7 @@ def test_the_phrases_of_places_by_class(snapshot):
     """The table of all places, by class: a change of words is read in the diff."""
     found = defaultdict(set)
     for task in all_tasks():
-        kind = get_task(task).commands.pointed
+        kind = get_task(task).things.pointed
         some = itertools.islice(split_episodes(task), 0, None, 5)
         for episode, frame in itertools.product(some, FRAMES):
             for place in spoken_places(episode.scene, kind, frame):

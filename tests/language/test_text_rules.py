@@ -4,6 +4,7 @@ import re
 
 import pytest
 from test_scenarios import DIRECT, read
+from wording_stand_ins import WOBBLY
 
 from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, scenes_of
 from roboirg.apps.language_lab.scenarios.text_rules import GRAMMAR
@@ -13,36 +14,12 @@ from roboirg.language.scenarios.scenario_file import general, pointer_table
 MORE = "{he} keeps talking about <it color: it>."
 TURNS = "turns {repeats} today"
 LIKES = "wants to see the {color} cube"
-CUBE = """
-tasks = ["PickXtimes"]
-[commands.all]
-train = ["Pick up {color} {repeats}."]
-test = ["Lift {color} {repeats}."]
-[stated.all]
-color = "the {color} cube"
-repeats = "{repeats:times}"
-[[scenario]]
-frame = "wobbly"
-pool = "train"
-setting = "spatial"
-introduction = "The table wobbles {place:spot}."
-say.color = ["the cube <there place: there>"]
-"""
-CONTAINER = """
-tasks = ["VideoUnmaskSwap"]
-[commands.all]
-train = ["Lift {colors.0}."]
-test = ["Raise {colors.0}."]
-[stated.all]
-"colors.0" = "the container over the {colors.0} cube"
-[[scenario]]
-frame = "wobbly"
-pool = "train"
-setting = "spatial"
-needs.colors = [1]
-introduction = "The table wobbles {place:spot}."
-say.colors.0 = ["the container <there place: there>"]
-"""
+PUT = '[commands]\nall = ["Put {color} {repeats}."]\n'
+CONTAINER = (
+    WOBBLY.replace("PickXtimes", "VideoUnmaskSwap")
+    .replace("introduction", "needs.colors = [1]\nintroduction")
+    .replace('say.color = ["the cube', 'say.colors.0 = ["the container')
+)
 
 
 LISTED = DIRECT.replace("{color} cube", "{list} cubes").replace(
@@ -93,6 +70,13 @@ def test_wrong_grammar_is_named_with_its_words(before, after, rule):
     assert any(rule in one for one in found), found
 
 
+def test_a_side_may_follow_a_target():
+    reason = "what points back must not follow 'on the target'"
+    (pattern,) = (pattern for pattern, found in GRAMMAR.items() if found == reason)
+    assert re.search(pattern, "Stop it on the target on the next one.")
+    assert not re.search(pattern, "Put it on the target on the left.")
+
+
 def test_a_sentence_that_begins_in_lower_case_is_found():
     reason = "a sentence begins with a capital letter"
     (pattern,) = (pattern for pattern, found in GRAMMAR.items() if found == reason)
@@ -125,10 +109,10 @@ def test_words_that_are_false_or_depend_on_the_delivery_are_named(words, reason)
 @pytest.mark.parametrize(
     ("text", "before", "after", "rule"),
     [
-        (CUBE, "Pick up {color}", "Put {color}", "the verb is 'pick up' or 'move'"),
-        (CUBE, "cube <there", "one <there", "name the thing, 'the cube there'"),
-        (CUBE, "wobbles {place:spot}", "wobbles at the cap {place}", "follows 'cube' or 'one'"),
-        (CUBE, "<there place: there>", "over <there place: there>", "people say 'there' alone"),
+        (WOBBLY, "[[scenario]]", PUT + "[[scenario]]", "the verb is 'pick up' or 'move'"),
+        (WOBBLY, "cube <there", "one <there", "name the thing, 'the cube there'"),
+        (WOBBLY, "wobbles {place:spot}", "wobbles at the cap {place}", "follows 'cube' or 'one'"),
+        (WOBBLY, "<there place: there>", "over <there place: there>", "people say 'there' alone"),
         (CONTAINER, "table", "table", "things change places; say when they are there"),
         (CONTAINER, "The table", "Watch the {colors.0} cube. It", "is under a container"),
         (LISTED, "needs.list = [2, 3]", "needs.list = [1]", "the list has one value"),
@@ -143,7 +127,7 @@ def test_places_and_lists_that_are_not_there_are_named(text, before, after, rule
 
 
 def test_what_is_right_about_places_breaks_no_rule():
-    assert not broken(CUBE)
+    assert not broken(WOBBLY)
     begun = CONTAINER.replace("The table wobbles", "At the start, a fly sat")
     assert not [one for one in broken(begun, "VideoUnmaskSwap", 3) if "says" in one]
 
@@ -169,10 +153,12 @@ def test_remarks_about_anything_keep_the_rules_of_distractors(pool):
 
 
 def test_no_pointer_says_several_times_of_one():
-    """Sums and doubles are never one; of two that are listed, singular would choose."""
+    """Sums and doubles are never one; of two numbers, listed or possible, singular would choose."""
     several = [row for row in pointer_table() if re.search(r"\b(?:many|often|each)\b", row.words)]
     may_be_one = [row for row in several if row.operation in ("same", "minus", "half")]
     assert len(may_be_one) > 4
-    listed = [row for row in may_be_one if row.words == "once for each *"]
-    assert len(listed) == 1
-    assert all(row.words.startswith("[repeats: ") for row in may_be_one if row not in listed)
+    of_two = {"once for each *", "that many times", "as many times as {he} * for"}
+    of_two |= {f"as many times as {who} *" for who in ("{he}", "it", "they")}
+    assert of_two <= {row.words for row in may_be_one}
+    agreeing = [row for row in may_be_one if row.words not in of_two]
+    assert all(row.words.startswith("[repeats: ") for row in agreeing)

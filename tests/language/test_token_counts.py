@@ -17,8 +17,6 @@ from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import SPLITS, get_episode, split_episodes
 
 FIXED = tuple(split for split in SPLITS if split != "random")
-LONG = {("BinFill/train/27", "resolved"), ("BinFill/train/79", "resolved")}
-"""In two crowded scenes the resolved command repeats long places; the command is not cut."""
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +60,7 @@ def test_default_instructions_are_counted_right_and_heard_by_a_policy_that_reads
     texts = list(dict.fromkeys(one.text for one in said))
     counts = [len(pieces) + ADDED_TOKENS for pieces in tokenizer.encode(texts)]
     assert [count_tokens(text) for text in texts] == counts
-    assert {(one.episode, one.form) for one in said if count_tokens(one.text) > USUAL_LIMIT} == LONG
+    assert max(counts) <= USUAL_LIMIT
 
 
 @pytest.mark.parametrize("setting", ["explicit", "direct", "reasoning"])

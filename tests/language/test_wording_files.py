@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
-from wording_stand_ins import train_episodes
+from wording_stand_ins import take_words, train_episodes
 
 from roboirg import main as cli
 from roboirg.core.errors import InvalidValueError, RoboIRGError
@@ -19,7 +19,10 @@ from roboirg.core.word_pools import POOLS
 from roboirg.language import FORMS, instruct, instruct_with, open_wordings, token_counts
 from roboirg.language.generator import find_refusal
 from roboirg.language.instruction_row import row
+from roboirg.language.meaning import command_goals
+from roboirg.language.request import values_of_goal
 from roboirg.language.scenarios.identity import words_digest, words_of
+from roboirg.language.scenarios.scenario import REMARKS
 from roboirg.language.scenarios.wording_file import parse_wordings, read_wordings
 from roboirg.language.scenarios.wording_store import find_wordings, register_wordings
 from roboirg.language.settings import settings_of
@@ -71,16 +74,15 @@ def options_of(task, **changes):
             yield InstructionOptions(setting, form, **changes)
 
 
-@pytest.mark.parametrize("language", [3, 4])
-def test_a_whole_sentence_is_explicit_and_all_other_settings_say_ours(language):
+def test_a_whole_sentence_is_explicit_and_all_other_settings_say_ours():
     identity, episode = opened(LITERALS), episode_with("PickXtimes", color="red", repeats=2)
-    for ours in options_of("PickXtimes", language=language):
+    for ours in options_of("PickXtimes"):
         if find_refusal(episode, ours) is not None:
             continue
         said = instruct_with(episode, replace(ours, wordings=identity))
         exported = row(episode, said)
         assert (said.metadata["wordings"], exported["wordings"]) == (identity, identity)
-        assert exported["command_template"] == said.metadata["command"]
+        assert exported["whole_sentence"] == said.metadata["command"]
         if ours.setting == "explicit":
             assert said.text == said.metadata["command"] == SENTENCE.format("red", 2)
             assert said.metadata["hidden_slots"] == 0
@@ -90,36 +92,35 @@ def test_a_whole_sentence_is_explicit_and_all_other_settings_say_ours(language):
             assert said.metadata["command"] == "own"
 
 
-@pytest.mark.parametrize("language", [3, 4])
-def test_a_goal_without_its_sentence_is_refused_in_explicit_only(language):
+def test_a_goal_without_its_sentence_is_refused_in_explicit_only():
     identity, episode = opened(LITERALS), episode_with("PickXtimes", color="green", repeats=2)
     complaint = (
         f"{identity} has no sentence of PickXtimes for the goal: green, twice; leave explicit out"
     )
     with pytest.raises(InvalidValueError, match=complaint):
-        instruct(episode, wordings=identity, language=language)
-    assert instruct(episode, "direct", wordings=identity, language=language).text
+        instruct(episode, wordings=identity)
+    assert instruct(episode, "direct", wordings=identity).text
 
 
-def test_a_task_without_words_of_ours_can_have_sentences_in_language_4():
+def test_a_task_without_words_of_ours_can_have_sentences(monkeypatch):
+    take_words(monkeypatch, "VideoRepick")
     slots = "when = { repeats = 2 }"
     head = 'name = "a"\ntasks = ["VideoRepick"]\n'
     identity = opened(f'{head}[[literal]]\ntask = "VideoRepick"\n{slots}\ntext = "go"')
     goal = next(iter(find_wordings(identity).tasks["VideoRepick"].literals))
     episode = replace(episode_with("VideoRepick"), goal=goal)
-    assert instruct(episode, wordings=identity, language=4).text == "go"
-    with pytest.raises(InvalidValueError, match="language 4 has no scenarios of VideoRepick yet"):
-        instruct(episode, "direct", wordings=identity, language=4)
+    assert instruct(episode, wordings=identity).text == "go"
+    with pytest.raises(InvalidValueError, match="VideoRepick names no file of words"):
+        instruct(episode, "direct", wordings=identity)
 
 
-@pytest.mark.parametrize("language", [3, 4])
-def test_a_sentence_means_each_goal_for_which_the_file_says_it(language):
+def test_a_sentence_means_each_goal_for_which_the_file_says_it():
     several = "do the usual with the {0} cube"
     identity = opened(
         HEAD + literal("red", 1, several) + literal("red", 2, several) + literal("blue", 1)
     )
     episode = episode_with("PickXtimes", color="red", repeats=1)
-    said = instruct(episode, wordings=identity, language=language)
+    said = instruct(episode, wordings=identity)
     wanted = {
         goal for goal in goals_of(episode) if goal["color"] == "red" and goal["repeats"] in (1, 2)
     }
@@ -143,7 +144,7 @@ def test_the_words_of_the_page_are_checked_and_said(tmp_path):
     told = {}
     for episode in train_episodes("PickXtimes", 0, 100):
         for setting, form in itertools.product(("explicit", "direct", "contextual"), FORMS):
-            said = instruct(episode, setting, form, wordings=identity, language=4)
+            said = instruct(episode, setting, form, wordings=identity)
             assert understood_goals(said, episode) == (episode.goal,)
             told[said.text] = said.metadata.get("scenario")
     assert set(told.values()) == {None, "fresh paint", "photos"}
@@ -167,10 +168,13 @@ def test_the_commands_of_the_page_state_every_goal_of_their_tasks(tmp_path):
     assert checked.output.count("explicit (") == len(rows)
 
 
-def test_goals_without_a_sentence_are_one_line_and_not_broken(tmp_path):
+def test_up_to_ten_goals_without_a_sentence_are_named_in_a_line_and_not_broken(tmp_path):
     checked = check(tmp_path / "theirs.toml", WHOLE)
     assert checked.exit_code == 0
-    assert "No sentence of 3 goals, such as on visit 3; episodes with them" in checked.output
+    assert "3 goals, such as: on visit 3; on visit 4; on visit 5. Episodes" in checked.output
+    many = check(tmp_path / "hand.toml", HEAD + literal("red", 2)).output
+    (listed,) = re.findall(r"No sentence of 14 goals, such as: (.*)\. Episodes", many)
+    assert len(set(listed.split("; "))) == 10
     never = WHOLE.replace("visit = 2", "visit = 77")
     assert "BROKEN states no goal" in check(tmp_path / "theirs.toml", never).output
 
@@ -186,7 +190,7 @@ def test_the_length_of_foreign_words_is_the_same_everywhere_and_a_bound_without_
 ):
     file = tmp_path / "mine.toml"
     text = f'{HEAD}[commands]\nall = ["Juggle {{color}} {{repeats}}."]'
-    shown = ["show", "PickXtimes", "3", "--words", "--wordings", str(file), "--language", "4"]
+    shown = ["show", "PickXtimes", "3", "--words", "--wordings", str(file)]
     for has_tokenizer, bound in ((True, ""), (False, "at most ")):
         if not has_tokenizer:
             monkeypatch.setattr(token_counts, "_tokenizer", lambda: None)
@@ -199,17 +203,20 @@ def test_the_length_of_foreign_words_is_the_same_everywhere_and_a_bound_without_
 
 
 def test_the_check_finds_a_setting_without_a_scenario_for_some_scenes(tmp_path):
-    """Such an episode is refused in a run."""
+    """Such an episode is refused in a run; the command that the check prints shows why."""
     file = tmp_path / "mine.toml"
     file.write_text(HEAD + SCENARIO)
     checked = CliRunner().invoke(cli.app, ["language", "check-scenarios", str(file)])
     assert isinstance(checked.exception, RoboIRGError)
-    assert re.search(
+    found = re.search(
         r"BROKEN PickXtimes: spatial has no scenario that fits \d+ scenes, such as "
-        r"PickXtimes/(\w+)/(\d+) \(\w+, .*\); look at it with "
-        r"`roboirg show PickXtimes \2 --split \1`\.\n\n",
+        r"PickXtimes/(\w+)/(\d+) \(\w+, .*\), so a run refuses them; see why with "
+        r"`roboirg (show PickXtimes \2 --split \1 --words --wordings \S+)`, and write one more",
         checked.output,
     )
+    shown = CliRunner().invoke(cli.app, found[3].split()).output
+    why = r"mine.toml has no spatial scenario for it in the pool \w+: nothing has the place or clue"
+    assert re.search(f"spatial cannot express the episode: .*{why}", shown)
 
 
 def test_the_check_finds_a_command_that_lacks_a_field_or_hides_its_value(tmp_path):
@@ -230,7 +237,7 @@ def test_scenarios_of_ones_own_replace_ours_setting_by_setting_and_move_no_draw(
     split = {"train": "train", "test": "test"}[pool]
     for index in range(12):
         episode = get_episode("PickXtimes", split, index)
-        for ours in options_of("PickXtimes", language=4):
+        for ours in options_of("PickXtimes"):
             theirs = replace(ours, wordings=identity)
             if ours.setting == "spatial":
                 if find_refusal(episode, theirs) is None:
@@ -244,7 +251,7 @@ def test_scenarios_of_ones_own_replace_ours_setting_by_setting_and_move_no_draw(
 
 def test_a_scenario_with_a_pool_is_said_in_this_one_only():
     identity = opened(HEAD + SCENARIO.replace("setting", 'pool = "train"\nsetting'))
-    options = InstructionOptions("spatial", wordings=identity, language=4)
+    options = InstructionOptions("spatial", wordings=identity)
     assert "no spatial scenario for it in the pool test" in find_refusal(
         get_episode("PickXtimes", "test", 0), options
     )
@@ -252,9 +259,7 @@ def test_a_scenario_with_a_pool_is_said_in_this_one_only():
 
 def test_stated_values_of_ones_own_leave_the_others_ours():
     identity = opened(HEAD + '[stated.PickXtimes]\ncolor = "our {color} cube"\n')
-    said = instruct(
-        episode_with("PickXtimes", color="red", repeats=3), wordings=identity, language=4
-    ).text
+    said = instruct(episode_with("PickXtimes", color="red", repeats=3), wordings=identity).text
     assert "our red cube" in said
     assert "three times" in said
 
@@ -280,19 +285,16 @@ def test_the_digest_of_words_is_of_what_is_said():
     assert words_digest("PickXtimes", "test", "explicit", opened(other)) == found["dust"]
     assert words_digest("PickXtimes", "test") == ours
     identity = opened(texts["same"])
-    said = instruct(get_episode("PickXtimes", "test", 0), wordings=identity, language=4)
-    assert said.metadata["words"] == words_of("PickXtimes", "test", 4, wordings=identity)
+    said = instruct(get_episode("PickXtimes", "test", 0), wordings=identity)
+    assert said.metadata["words"] == words_of("PickXtimes", "test", wordings=identity)
 
 
 def test_what_a_file_cannot_serve_is_refused_in_a_sentence():
     spoken, episode = opened(HEAD + SCENARIO), episode_with("PickXtimes")
-    with pytest.raises(
-        InvalidValueError, match=r"has commands or scenarios, which need language 4"
-    ):
-        instruct(episode, wordings=spoken)
     stop = episode_with("StopCube")
-    with pytest.raises(InvalidValueError, match=f"^The wording file {spoken} has no words of Stop"):
-        instruct(stop, wordings=spoken, language=4)
+    lacking = f"^The wording file {spoken} has no words of StopCube; name .*: --tasks PickXtimes"
+    with pytest.raises(InvalidValueError, match=lacking):
+        instruct(stop, wordings=spoken)
     with pytest.raises(InvalidValueError, match="are not open"):
         instruct(episode, wordings="gone@00000000")
 
@@ -317,18 +319,45 @@ OLD = '[PickXtimes]\nown = ["direct"]\n[[PickXtimes.commands]]\ntext = "lift {co
         (HEAD, "has no words of PickXtimes, which stands in its tasks"),
         (f"{HEAD}commands = 3", "commands: Expected a table, got a number; it is 3"),
         (f"{HEAD}[commands]\nall = 'a'", "Expected a table or a list, got a text"),
-        (f"{HEAD}[commands]\nStopCube = []", "There is no task of words.toml named 'StopCube'"),
         (f"{HEAD}[commands.all]\ntest = ['Do {{color}}.']",
          "has no commands of PickXtimes in the pool train"),
         (f"{HEAD}commands.all.train = ['{{color}}']\ncommands.all.test = ['{{colour}}']",
-         "commands of PickXtimes has the slot 'colour'"),
+         "commands of PickXtimes has other marks than {color} and {repeats}: '{colour}'."),
         (HEAD + SCENARIO.replace("It's", "It's très"), "'dusty', introduction has the words"),
         (HEAD + SCENARIO.replace('"spatial"', '"spatail"'),
-         "'dusty' has the setting 'spatail'; the settings are direct, direct-rival, "),
+         "'dusty': There is no setting 'spatail'; known: direct, direct-rival, "),
         (HEAD + SCENARIO.replace('"dusty"', '"\\u001b[31m"'), "frame or people has the words"),
-        (HEAD + SCENARIO + SCENARIO, "has the frame 'dusty' twice in the setting spatial"),
+        (HEAD + SCENARIO + SCENARIO, "'dusty' stands twice in the setting spatial, test."),
+        (HEAD + SCENARIO + SCENARIO.replace("setting", 'pool = "test"\nsetting', 1),
+         "'dusty' stands twice in the setting spatial, test."),
+        (f"{HEAD}[commands]\nall = ['Lift <it color: it> {{repeats:lap}}.']",
+         "commands of PickXtimes has other marks than {color} and {repeats}: 'Lift <it color"),
+        (f"{HEAD}[commands]\nall = ['Lift {{color}} {{repeats}}[repeats: |!]']", "has other marks"),
+        (f"{HEAD}[stated.all]\ncolor = 'the {{person}} cube'", "stated color has other marks than"),
+        (f"{HEAD}[stated.all]\nrepeats = 'of {{color}}, {{repeats}}'", "stated repeats has other"),
+        (f"{HEAD}[stated.all]\ncolor = '<it color: it>'", "stated color has other marks"),
+        (f"{HEAD}[stated.all]\ncolour = 'the {{color}} brick'",
+         "stated.all: There is no field 'colour'; known: color, repeats. Did"),
+        (HEAD + SCENARIO + "notes = {}", "'dusty': There is no field 'notes'; known: "),
+        (HEAD + SCENARIO + 'cue.a = "So"', "'dusty': There is no field 'cue.a'; known: "),
+        (HEAD + SCENARIO + 'lead = ["So ", "Now "]', "lead has the words ['So ', 'Now ']; "),
+        (HEAD + SCENARIO.replace('["the cube <there place: there>"]', "[]"), "has no say.color; "),
+        (HEAD + SCENARIO.replace("there>", 'there>", "the {color} cube'),
+         "'dusty' has words in say.color that leave different fields open"),
+        (HEAD + SCENARIO + "people.he = []", "'dusty' has fewer than two people; leave people out"),
+        (HEAD + SCENARIO + 'people.he = ["Leo", "Leo"]', "'dusty' has fewer than two people;"),
+        (HEAD + SCENARIO + 'list = "colors.0"', "list: There is no slot 'colors.0'; known: color"),
+        (HEAD + SCENARIO.replace('"spatial"', '"direct-rival"')
+         + "".join(f'{name} = "No. "\n' for name in REMARKS),
+         "'dusty' has a remark that points at nothing"),
+        (HEAD.replace("PickXtimes", "VideoRepick")
+         + "[[literal]]\ntask = 'VideoRepick'\nwhen.color = 'red'\ntext = 'x'",
+         "literal 1 has when = {'color': 'red'}; it must have a value for repeats."),
+        (HEAD.replace("PickXtimes", "BinFill") + "[[literal]]\ntask = 'BinFill'\ntext = 'x'\n"
+         "when = { colors = ['red'], counts = [1, 2] }", "literal 1 has when = {'colors': ('red',"),
+        (HEAD + SCENARIO.replace("It's", "\u00e9" * 3000), "has words of 3,0"),
         (f"{HEAD}literal = 3", "literal: Expected a list, got a number; it is 3"),
-        (f"{HEAD}[[literal]]\ntask = 'PickXtimes'", "literal 1: Object missing required"),
+        (f"{HEAD}[[literal]]\ntask = 'PickXtimes'\ntext = 'x'", "literal 1 has no when."),
         (HEAD + literal("red", 1).replace("repeats = 1, ", ""),
          "literal 1 has when = {'color': 'red'}; it must have a value for color and repeats"),
         (HEAD + literal("red", "'2'"), "literal 1, when.repeats: Expected a number, got a text"),
@@ -336,7 +365,8 @@ OLD = '[PickXtimes]\nown = ["direct"]\n[[PickXtimes.commands]]\ntext = "lift {co
         (HEAD + literal("red", 1, "lift {{color}}"), "it must be a whole sentence"),
         (HEAD + literal("red", 1, " "), "has the text ' '; it must be a whole sentence"),
         (HEAD + literal("red", 1) * 2, "literal 2 states the goal red, once of PickXtimes again"),
-        (HEAD + literal("red", 1).replace("PickXtimes", "StopCube"), "named 'StopCube'; known"),
+        (HEAD + literal("red", 1).replace("PickXtimes", "StopCube"),
+         "literal 1: There is no task 'StopCube'; known"),
     ],
 )  # fmt: skip
 def test_a_bad_file_is_refused_by_name_field_value_and_what_would_be_right(text, complaint):
@@ -345,6 +375,159 @@ def test_a_bad_file_is_refused_by_name_field_value_and_what_would_be_right(text,
     assert complaint in str(caught.value)
     assert "words.toml" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_an_empty_table_of_commands_is_no_command_of_ours():
+    with pytest.raises(InvalidValueError) as caught:
+        parse_wordings(f"{HEAD}[commands.PickXtimes]\n{SCENARIO}", "words.toml")
+    lines = [f"words.toml has no commands of PickXtimes in the pool {pool}." for pool in POOLS]
+    assert str(caught.value).splitlines() == lines
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        "".join(f"a{number} = 1\n" for number in range(5000)),
+        'introduction = "' + "x" * 500_000 + '"',
+        'needs = { "' + "x" * 500_000 + '" = 1 }',
+        "[[scenario]]\n" * 5000,
+    ],
+)
+def test_complaints_of_a_large_file_stay_short(wrong):
+    text = f'{HEAD}[[scenario]]\nframe = "{"A" * 200_000}"\nsetting = "direct"\n{wrong}'
+    with pytest.raises(InvalidValueError) as caught:
+        parse_wordings(text, "words.toml")
+    assert len(str(caught.value)) < 10_000
+    assert max(map(len, str(caught.value).splitlines())) <= 2_000
+
+
+def test_a_file_with_a_byte_order_mark_is_the_same_wordings(tmp_path):
+    path = tmp_path / "words.toml"
+    path.write_text(LITERALS)
+    usual = open_wordings(path)
+    path.write_text(LITERALS, encoding="utf-8-sig")
+    assert open_wordings(path) == usual
+
+
+def test_a_task_named_twice_has_its_words_once():
+    twice = HEAD.replace('"PickXtimes"', '"PickXtimes", "PickXtimes"')
+    needing = SCENARIO + 'needs.tasks = ["PickXtimes", "PickXtimes"]\n'
+    digests = [
+        words_digest("PickXtimes", "test", "spatial", opened(text))
+        for text in (HEAD + SCENARIO, twice + SCENARIO, twice + needing)
+    ]
+    assert len(set(digests)) == 1
+
+
+BIN = 'name = "bin"\ntasks = ["BinFill"]\n'
+
+
+def bin_literals(goals, step):
+    """Return a sentence for each goal, with its colors from the first to the last or back."""
+    tables = [BIN]
+    for goal in goals:
+        colors, counts = list(goal["colors"])[::step], list(goal["counts"])[::step]
+        when = f"when = {{ colors = {colors}, counts = {counts} }}"
+        tables.append(f'[[literal]]\ntask = "BinFill"\n{when}\ntext = "fill {goal.amounts}"\n')
+    text = "".join(tables)
+    return text.replace("fill (", "fill ").replace("(", "").replace(")", "")
+
+
+@pytest.mark.parametrize("step", [1, -1])
+def test_a_sentence_of_amounts_is_found_in_any_order_of_colors(step):
+    episodes = [get_episode("BinFill", "test", index) for index in range(12)]
+    goals = {goal for episode in episodes for goal in goals_of(episode)}
+    identity = opened(bin_literals(goals, step))
+    assert max(len(episode.goal["colors"]) for episode in episodes) > 1
+    for episode in episodes:
+        said = instruct(episode, wordings=identity)
+        assert understood_goals(said, episode) == (episode.goal,)
+
+
+def test_the_check_names_a_sentence_for_a_goal_that_no_scene_has(tmp_path):
+    file = tmp_path / "theirs.toml"
+    file.write_text(WHOLE.replace("visit = 2", "visit = 99"))
+    checked = CliRunner().invoke(cli.app, ["language", "check-scenarios", str(file)])
+    assert "  No scene has the goal of a sentence: on visit 99\n" in checked.output
+
+
+LED = """
+[[scenario]]
+frame = "paint"
+setting = "direct"
+introduction = "We painted the {color} cube."
+reinforcement = "It is new."
+distractors = ["I still have to wash the brushes."]
+competing = ["The {rival color} one comes next week."]
+cue = "So let's go."
+lead = "So "
+say.color = ["<it color: it>"]
+"""
+
+
+@pytest.mark.parametrize(
+    ("command", "begun"),
+    [
+        ("I'd like {color} there {repeats}.", "So I'd like it"),
+        ("I need {color} there {repeats}.", "So I need it"),
+        ("LEDs on, lift {color} {repeats}.", "So LEDs on, lift it"),
+        ("A lift of {color}, {repeats}.", "So a lift of it"),
+        ("If you can, lift {color} {repeats}.", "So if you can, lift it"),
+    ],
+)
+def test_a_command_after_a_lead_keeps_its_capitals_where_english_does(command, begun):
+    identity = opened(f'{HEAD}[commands]\nall = ["{command}"]\n{LED}')
+    said = instruct(get_episode("PickXtimes", "test", 3), "direct", wordings=identity)
+    assert said.command.startswith(begun)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [('lead = "So "', 'lead = "Take the {color} one: "'), ("it>", "it>, the {color} one,")],
+)
+def test_a_field_whose_value_the_command_names_is_settled_whatever_points_back(before, after):
+    episode = get_episode("PickXtimes", "test", 3)
+    said = [
+        instruct(episode, "direct", wordings=opened(HEAD + text))
+        for text in (LED, LED.replace(before, after))
+    ]
+    assert [len(command_goals(one.meaning, episode)) for one in said] == [3, 1]
+    assert [one.metadata["hidden_slots"] for one in said] == [1, 0]
+
+
+def test_the_terms_of_a_meaning_stand_in_the_order_of_the_goal():
+    for task in ("PickXtimes", "BinFill", "VideoUnmask"):
+        episode = get_episode(task, "test", 3)
+        fields = [value.field for value in values_of_goal(episode.goal)]
+        for setting in ("explicit", "direct"):
+            assert list(instruct(episode, setting).meaning.terms) == fields
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "setting", "lacking"),
+    [
+        ("We painted", "{excluded} went. We painted", "direct", "'excluded'"),
+        ("{rival color} one", "{rival color} one {list}", "contextual", "a competing remark with"),
+        ('["<it color: it>"]', '["{rank}, <it color: it>"]', "direct", "'rank'"),
+    ],
+)
+def test_a_scenario_that_speaks_of_what_is_not_there_is_refused_by_file_and_frame(
+    before, after, setting, lacking
+):
+    identity = opened(HEAD + LED.replace(before, after))
+    episode = get_episode("PickXtimes", "test", 3)
+    sentence = f"words.toml, scenario 'paint', lacks {lacking}"
+    options = {"stages": (1, 2, 3, 5), "distractor": "competing"} if setting == "contextual" else {}
+    with pytest.raises(InvalidValueError, match=f"^{re.escape(sentence)}"):
+        instruct(episode, setting, wordings=identity, **options)
+
+
+def test_a_list_of_a_slot_that_only_another_task_has_fits_no_episode():
+    head = HEAD.replace('"PickXtimes"', '"PickXtimes", "StopCube"')
+    identity = opened(head + LED + 'list = "visit"\n')
+    options = InstructionOptions("direct", wordings=identity)
+    refused = find_refusal(get_episode("PickXtimes", "test", 3), options)
+    assert "has no direct scenario for it in the pool test" in refused
 
 
 PIECES = st.sampled_from(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from roboirg.core.word_pools import POOLS, PoolName
-from roboirg.language import LANGUAGE_VERSIONS, instruct
+from roboirg.language import LANGUAGE_VERSION, instruct
 from roboirg.language.instruction_row import row
 from roboirg.language.scenarios import identity
 from roboirg.language.scenarios.identity import language_label, words_of
@@ -109,24 +109,20 @@ def test_a_word_is_not_taken_for_the_slot_of_its_name(monkeypatch: pytest.Monkey
     assert digest(monkeypatch, word) != digest(monkeypatch, slot)
 
 
-def test_words_have_the_digest_of_their_task_and_pool_and_those_of_language_3_have_none() -> None:
-    assert not words_of("PickXtimes", "test", 3)
-    assert language_label(["PickXtimes"], "test", 3) == LANGUAGE_VERSIONS[3]
+def test_words_have_the_digest_of_their_task_and_pool() -> None:
     tasks = ("PickXtimes", "StopCube", "Gone")
-    found = {words_of(task, pool, 4) for task in tasks for pool in POOLS}
+    found = {words_of(task, pool) for task in tasks for pool in POOLS}
     assert len(found) == len(tasks) * len(POOLS)
-    assert words_of("Gone", "test", 4) == "Gone/test@none"
+    assert words_of("Gone", "test") == "Gone/test@none"
     digest = identity.words_digest("PickXtimes", "train")
-    label = language_label(["PickXtimes", "Gone"], "train", 4)
-    assert label == f"{LANGUAGE_VERSIONS[4]} PickXtimes/train@{digest} Gone/train@none"
+    label = language_label(["PickXtimes", "Gone"], "train")
+    assert label == f"{LANGUAGE_VERSION} PickXtimes/train@{digest} Gone/train@none"
 
 
 @pytest.mark.parametrize("pool", POOLS)
 def test_instructions_and_their_rows_say_which_words_they_have(pool: PoolName) -> None:
     """In the pool that was chosen, if one was."""
     episode = get_episode("PickXtimes", "test", 0)
-    words = words_of("PickXtimes", pool, 4)
-    new, usual = instruct(episode, "direct", language=4, wordings=pool), instruct(episode, "direct")
-    assert (new.metadata["words"], row(episode, new)["words_version"]) == (words, words)
-    assert "words" not in usual.metadata
-    assert row(episode, usual)["words_version"] == "none"
+    words = words_of("PickXtimes", pool)
+    said = instruct(episode, "direct", wordings=pool)
+    assert (said.metadata["words"], row(episode, said)["words_version"]) == (words, words)

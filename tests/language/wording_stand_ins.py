@@ -1,15 +1,35 @@
-"""A clone of RoboMME's repository, as far as an import reads it, with sentences of our own."""
+"""What tests of words share: a scenario, and a clone of RoboMME's repository for the import."""
 
 import shutil
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import robomme_stand_in
 
 from roboirg.apps.language_lab import robomme_import
-from roboirg.core.episode import Episode, Goal
-from roboirg.tasks import get_task
+from roboirg.core.episode import SUITES, Episode, Goal
+from roboirg.language.scenarios import scenario_file
+from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.published_episodes import published_episode
+
+WOBBLY = """
+tasks = ["PickXtimes"]
+[[scenario]]
+frame = "wobbly"
+pool = "train"
+setting = "spatial"
+introduction = "The table wobbles {place:spot}."
+say.color = ["the cube <there place: there>"]
+"""
+"""A scenario of our own, of the spatial setting."""
+
+
+def take_words(monkeypatch, task: str) -> None:
+    """Take our words of a task away, as if none had been written."""
+    monkeypatch.setitem(all_tasks(SUITES), task, replace(get_task(task), words=""))
+    read = scenario_file.task_scenarios.__wrapped__
+    monkeypatch.setattr(scenario_file, "task_scenarios", read)
 
 
 def make_clone(folder: Path) -> Path:

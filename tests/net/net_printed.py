@@ -1,4 +1,4 @@
-"""What commands print of the published packs, of words and of scenes; whether packs hold."""
+"""What commands print of the pack of scripted policies, of words and of scenes; if packs hold."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PACKS = {path.name.partition(".")[0]: path for path in sorted((ROOT / "results").glob("*.zip"))}
-SMALL = ("act-val", "pickxtimes-val")
 SAMPLE = ("--sample", "1%", "--sample-seed", "1")
 
-MAIN, PLANNER, LEARNED = "paper-main-test", "paper-planner-test", "learned-policy-val"
+SCRIPTED = "scripted"
 MARKDOWN, CSV = ("--format", "markdown"), ("--format", "csv")
 COMMANDS: dict[str, tuple[str, ...]] = {
     "tasks": ("tasks",),
@@ -29,24 +28,19 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     ),
     "published": ("tables", "--published", *MARKDOWN),
     "published-latex": ("tables", "--published", "--which", "main", "--format", "latex"),
-    "main-terminal": ("tables", MAIN, "--which", "main", "--published"),
-    "main-latex": ("tables", MAIN, "--which", "main", "--format", "latex"),
-    "main-floors": ("tables", MAIN, "--which", "main", "--floors", "all", *MARKDOWN),
-    "main-forms": ("tables", MAIN, "--which", "forms", *CSV),
-    "main-breakdowns": ("tables", MAIN, "--by", "all", *CSV),
-    "main-compared": ("compare", f"{MAIN}:small-none", f"{MAIN}:small-subgoal", "--by", "all"),
-    "main-compared-close": ("compare", f"{MAIN}:small-ttt", f"{MAIN}:small-framesamp"),
-    "planner-subgoals": ("tables", PLANNER, "--which", "subgoals", *MARKDOWN),
-    "two-runs": ("tables", *SMALL, *MARKDOWN),
-    **{f"{name}-tables": ("tables", name, *CSV) for name in PACKS},
-    **{
-        f"{name}-failures": ("tables", name, "--which", "failures", *CSV)
-        for name in PACKS
-        if name != LEARNED  # a megabyte
-    },
-    **{f"{name}-heard": ("tables", name, "--which", "heard", *MARKDOWN) for name in SMALL},
-    **{f"{name}-arms": ("tables", name, "--which", "arms", *MARKDOWN) for name in SMALL},
-    **{f"{name}-report": ("report", name) for name in SMALL},
+    "main-terminal": ("tables", SCRIPTED, "--which", "main", "--published"),
+    "main-latex": ("tables", SCRIPTED, "--which", "main", "--format", "latex"),
+    "main-floors": ("tables", SCRIPTED, "--which", "main", "--floors", "all", *MARKDOWN),
+    "main-breakdowns": ("tables", SCRIPTED, "--by", "all", *CSV),
+    "main-compared": (
+        *("compare", f"{SCRIPTED}:listener", f"{SCRIPTED}:forgetful", "--by", "all"),
+    ),
+    "planner-subgoals": ("tables", SCRIPTED, "--which", "subgoals", *MARKDOWN),
+    "scripted-tables": ("tables", SCRIPTED, *CSV),
+    "scripted-failures": ("tables", SCRIPTED, "--which", "failures", *MARKDOWN),
+    "scripted-heard": ("tables", SCRIPTED, "--which", "heard", *MARKDOWN),
+    "scripted-arms": ("tables", SCRIPTED, "--which", "arms", *MARKDOWN),
+    "scripted-report": ("report", SCRIPTED),
 }
 FILES: dict[str, tuple[str, ...]] = {
     "episodes.jsonl": ("export", "episodes", "--split", "val", "--out", "episodes.jsonl"),
@@ -59,13 +53,12 @@ FILES: dict[str, tuple[str, ...]] = {
 
 
 def results(folder: Path) -> dict[str, str]:
-    """Return what each command prints, what the pages of small packs say, and hashes of files."""
-    for name, pack in PACKS.items():
-        with zipfile.ZipFile(pack) as archive:
-            archive.extractall(folder / name)
+    """Return what each command prints, what the page of the pack says, and hashes of files."""
+    with zipfile.ZipFile(PACKS[SCRIPTED]) as archive:
+        archive.extractall(folder / SCRIPTED)
     found = {name: printed(folder, *words) for name, words in COMMANDS.items()}
-    for name in SMALL:
-        found[f"{name}-page"] = _page_text((folder / name / "report.html").read_text("utf-8"))
+    page = folder / SCRIPTED / "report.html"
+    found["scripted-page"] = _page_text(page.read_text("utf-8"))
     found["files"] = "".join(sorted(_file_hashes(folder)))
     return found
 

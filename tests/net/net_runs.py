@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 from net_printed import printed
 
-from roboirg.evaluation.records.store import iterate_records
+from roboirg.records.store import iterate_records
 
 PLANS: Mapping[str, dict[str, Any]] = {
     "oracle": {"policies": ["oracle"], "settings": "explicit", "episodes": [0, 1]},

@@ -7,6 +7,7 @@ import hashlib
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import roboirg
 from roboirg.core.arms import ARMS, PARAPHRASE, TOLD
@@ -14,7 +15,7 @@ from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.word_pools import POOLS
 from roboirg.language import instruct_with
-from roboirg.language.arms import say_arm
+from roboirg.language.arms import ArmWords, say_arm
 from roboirg.language.variants import expressible_options
 from roboirg.reader import interpret
 from roboirg.tasks import every_task
@@ -62,12 +63,19 @@ def _arms() -> Iterator[tuple[tuple[str, ...], str]]:
                 continue
             for arm in arms:
                 try:
-                    said = say_arm(episode, options, arm)
+                    said = _in_order(say_arm(episode, options, arm))
                 except InvalidValueError:
                     said = None
-                # Language 3 declares no meaning.
-                words = repr(said).replace(", meaning=None", "")
-                yield (episode.task, options.setting, arm), words
+                yield (episode.task, options.setting, arm), repr(said)
+
+
+def _in_order(said: ArmWords) -> ArmWords:
+    """Return the words of an arm with a tuple for a set, whose order is another in each process."""
+    meaning = said.instruction.meaning
+    if meaning is None:
+        return said
+    ordered: Any = meaning._replace(settled=tuple(sorted(meaning.settled)))
+    return said._replace(instruction=dataclasses.replace(said.instruction, meaning=ordered))
 
 
 def _read() -> Iterator[tuple[tuple[str, ...], str]]:

@@ -126,10 +126,8 @@ def openai_reply(text):
     message = {"role": "assistant", "content": text}
     return {
         "id": "1",
-        "object": "chat.completion",
-        "created": 0,
-        "model": "fake",
-        "choices": [{"index": 0, "message": message, "finish_reason": "stop"}],
+        "model": "gpt-4o",
+        "choices": [{"message": message, "finish_reason": "stop"}],
         "usage": {
             "prompt_tokens": TOKENS[0],
             "completion_tokens": TOKENS[1],

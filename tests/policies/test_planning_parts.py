@@ -31,22 +31,26 @@ from roboirg.policies.vlm.prompt_files import load_prompts
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import contact_sheets, sample_evenly
-from roboirg.util.reply_reading import UnparsableReplyError, json_object, text_of
+from roboirg.util.reply_reading import UnparsableReplyError, text_of
 
 thousandths = st.integers(0, 1000)
 PROMPTS = ("listener", "qwen", "gemini", "memer", "subgoals")
 
 
+@pytest.mark.parametrize(
+    ("point", "reply"),
+    [
+        ("at <{}, {}>", "Go {}"),
+        ("at <|box_start|>({},{})<|box_end|>", "Go {}<|im_end|>"),
+        ("at ({}, {})", '"Go\n{}."'),
+    ],
+)
 @given(st.lists(st.tuples(thousandths, thousandths), max_size=5))
-def test_points_are_scaled_row_first_all_at_once(points):
+def test_points_are_scaled_row_first_all_at_once(point, reply, points):
     """One pass: what is a pixel already is not taken for a thousandth again."""
+    said = " and ".join(point.format(y, x) for y, x in points)
     expected = " and ".join(f"at <{to_pixel(y)}, {to_pixel(x)}>" for y, x in points)
-    texts = " and ".join(f"at <{y}, {x}>" for y, x in points)
-    boxes = " and ".join(f"at <|box_start|>({y},{x})<|box_end|>" for y, x in points)
-    bare = " and ".join(f"at ({y}, {x})" for y, x in points)
-    assert parse_points(f"Go {texts}") == f"go {expected}".strip()
-    assert parse_points(f"Go {boxes}<|im_end|>") == f"go {expected}".strip()
-    assert parse_points(f'"Go\n{bare}."') == f"go {expected}".strip()
+    assert parse_points(reply.format(said)) == f"go {expected}".strip()
 
 
 @given(thousandths)
@@ -111,13 +115,12 @@ def _pattern(form):
 def test_chosen_frames_are_spread_evenly(length, most):
     frames = np.arange(length, dtype=np.uint8)[:, None, None, None]
     kept = sample_evenly(frames, most).ravel().tolist()
-    assert len(kept) == min(length, most) == len(set(kept))
-    assert kept == sorted(kept)
+    assert len(kept) == min(length, most)
     assert kept[0] == 0
-    if most > 1:
+    if len(kept) > 1:
         assert kept[-1] == length - 1
         gaps = np.diff(kept)
-        assert not len(gaps) or gaps.max() - gaps.min() <= 1
+        assert max(1, gaps.max() - 1) <= gaps.min()
     clip = summary_clip(frames, most, length)
     assert len(kept) / clip.rate == Fraction(length, 30)
 
@@ -133,12 +136,6 @@ def test_a_sheet_shows_frames_in_reading_order_each_with_its_label():
     ]
     found = [(int(tile[-1, -1, 0]), bool(np.ptp(tile))) for tile in tiles]
     assert found == [(shade, shade == 50) for shade in (*shades, 0, 0)]
-
-
-@pytest.mark.parametrize("text", ["", "none", "[1]", "{]}"])
-def test_no_object_is_unparsable(text):
-    with pytest.raises(UnparsableReplyError, match="no JSON object"):
-        json_object(text)
 
 
 @pytest.mark.parametrize("value", [None, 3, "", " ", ["x"]])
@@ -158,13 +155,9 @@ def test_prompts_are_versioned_and_can_be_replaced(tmp_path):
         mine.fill("goal", instruction="x")
     with pytest.raises(InvalidValueError, match=r"'system' .*missing.*\$why"):
         mine.fill("system", why="so")
-    file.write_text('again = "never"')
-    assert load_prompts("qwen", str(file)).fingerprint != mine.fingerprint
     file.write_text("= 3")
     with pytest.raises(InvalidValueError, match="not TOML"):
         load_prompts("qwen", str(file))
-    with pytest.raises(InvalidValueError, match="cannot be read"):
-        load_prompts("qwen", str(tmp_path / "none.toml"))
 
 
 wishes = st.sampled_from(["all", "none"]) | st.integers(1, 12)
@@ -175,17 +168,17 @@ def test_each_sees_the_pictures_of_the_video_that_it_asked_for(
     one: DemonstrationFrames, other: DemonstrationFrames, steps
 ):
     drawn = merge_demonstration_frames(one, other)
+    assert drawn == merge_demonstration_frames(other, one)
     every = {"all": 1}.get(drawn, drawn)
     shown = {"joint_positions": np.arange(steps)}
     if drawn != "none":
         shown["front_rgb"] = np.arange(steps)[::every]
-    for wish in (one, other):
-        excerpt = DemonstrationSubset(shown, drawn, wish)
-        assert dict(excerpt).keys() == shown.keys()
-        assert len(excerpt["joint_positions"]) == steps
-        if wish != "none":
-            stride = {"all": 1}.get(wish, wish)
-            assert excerpt["front_rgb"].tolist() == list(range(0, steps, stride))
+    excerpt = DemonstrationSubset(shown, drawn, one)
+    assert dict(excerpt).keys() == shown.keys()
+    assert len(excerpt["joint_positions"]) == steps
+    if one != "none":
+        stride = {"all": 1}.get(one, one)
+        assert excerpt["front_rgb"].tolist() == list(range(0, steps, stride))
 
 
 @given(
@@ -195,20 +188,18 @@ def test_each_sees_the_pictures_of_the_video_that_it_asked_for(
 )
 def test_each_sees_the_moments_that_it_asked_for(one, other, chunks):
     every = merge_observe_every(one, other)
+    assert every == merge_observe_every(other, one)
     step = looked = 0
-    seen = {True: [], False: []}
+    seen = []
     for chunk in chunks:
-        looks = () if every is None else tuple(
-            at for at in range(step + 1, step + chunk + 1) if at % every == 0
-        )  # fmt: skip
+        observation = {"now": step + chunk}
+        if every is not None:
+            looks = range(step + 1, step + chunk + 1)
+            observation["history"] = tuple(at for at in looks if at % every == 0)
         step += chunk
-        observation = {"now": step} if every is None else {"now": step, "history": looks}
-        for wish, who in ((one, True), (other, False)):
-            cut = select_history(observation, looked, every, wish)
-            assert cut["now"] == step
-            assert ("history" in cut) == (wish is not None)
-            seen[who] += cut.get("history", ())
-        looked += len(looks)
-    for wish, who in ((one, True), (other, False)):
-        expected = [] if wish is None else list(range(wish, step + 1, wish))
-        assert seen[who] == expected
+        cut = select_history(observation, looked, every, one)
+        assert cut["now"] == step
+        assert ("history" in cut) == (one is not None)
+        seen += cut.get("history", ())
+        looked += len(observation.get("history", ()))
+    assert seen == ([] if one is None else list(range(one, step + 1, one)))

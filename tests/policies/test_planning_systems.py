@@ -93,17 +93,11 @@ def test_what_a_policy_needs_is_known_from_its_name(spec):
             "'1e10'; it must be at most 2147483",
         ),
         (
-            "mme-vla://localhost:1?timeout=1e30",
-            InvalidValueError,
-            "'1e30'; it must be at most 2147483",
-        ),
-        (
             "vlm-listener:openai?model=x&patience_s=1e30",
             InvalidValueError,
             "1e30.; it must be at most 2147483",
         ),
         ("system:MemER?kind=x", UnknownNameError, "planner 'x'; known: oracle"),
-        ("system:MemER?vidio=x", UnknownNameError, "Did you mean 'video'"),
         ("system:MemER?policy.exekute=3", UnknownNameError, "Did you mean 'execute'"),
         ("system:MemER?server", InvalidValueError, r"\?name=value"),
         ("system:MemER?vlm=a&vlm=b", InvalidValueError, "'vlm' twice"),
@@ -113,15 +107,12 @@ def test_what_a_policy_needs_is_known_from_its_name(spec):
             "provider is 'opnai'; it must be 'openai' or",
         ),
         ("vlm-listener:openai", InvalidValueError, "option model is missing"),
-        ("vlm-listener:openai?model.model=x", UnknownNameError, "Did you mean 'model'"),
         (
             "vlm-listener:openai?model=x&frame=3",
             UnknownNameError,
             "option of policy vlm-listener:openai named 'frame'.*mean 'frames'",
         ),
-        ("vlm-listener:openai?model=x&frames=no", InvalidValueError, "frames is 'no'"),
         ("vlm-listener:openai?model=x&prompts=none.toml", InvalidValueError, "cannot be read"),
-        ("vlm-listener:openai?model=x&base_url=http://me:pw@h/v1", InvalidValueError, "//…@h/v1"),
         (
             "vlm-listener:openai?model=x&base_url=http://h/%3Fkey=1",
             InvalidValueError,
@@ -129,7 +120,6 @@ def test_what_a_policy_needs_is_known_from_its_name(spec):
         ),
         ("vlm-listener:openai?model=x&base_url=localhost:80", InvalidValueError, "http://"),
         ("sistem", UnknownNameError, "system:NAME"),
-        ("planner:stateless", InvalidValueError, "option model is missing"),
         (
             "planner:stateless?model=x&recent=3",
             InvalidValueError,
@@ -141,8 +131,6 @@ def test_what_a_policy_needs_is_known_from_its_name(spec):
             InvalidValueError,
             "does not report",
         ),
-        ("planner:orakel", InvalidValueError, "no planner 'orakel'"),
-        ("system:pi0.5?hands=scripted", InvalidValueError, "has no planner"),
     ],
 )
 def test_wrong_specs_are_explained(spec, error, words):
@@ -159,9 +147,6 @@ def test_own_systems_are_files(tmp_path):
         load_system(str(file), {"server": "x:1"})
     file.write_text('name = "mine"\npolicy = "random"\n')
     assert load_system(str(file), seed=4).seed == 4
-    file.write_text('name = "mine"\n')
-    with pytest.raises(InvalidValueError, match="option policy is missing"):
-        load_system(str(file))
     file.write_text("name = ")
     with pytest.raises(InvalidValueError, match="cannot be read as TOML"):
         load_system(str(file))
@@ -205,39 +190,41 @@ class NoMemory(MmeVlaServer):
 
 
 @pytest.mark.sim
-@pytest.mark.parametrize("name", ["TTT-Expert", "GroundSG-Gemini", "GroundSG-oracle", "MemER"])
-def test_every_system_plays_a_whole_episode(name):
+@pytest.mark.parametrize(
+    ("name", "answer", "calls", "subgoal"),
+    [
+        ("TTT-Expert", "", 0, "None"),
+        (
+            "GroundSG-Gemini",
+            '{"description": "x", "subgoal_sequence": [], "subgoal": "put it down"}',
+            1,
+            "put it down",
+        ),
+        ("GroundSG-oracle", "", 0, r"pick up the \w+ cube at <\d+, \d+> .*"),
+        (
+            "MemER",
+            '{"current_subtask": "put it down", "keyframe_positions": [1]}',
+            3,
+            "put it down",
+        ),
+    ],
+)
+def test_every_system_plays_a_whole_episode(name, answer, calls, subgoal):
     """Against a policy server and a model's server on real sockets, each by its own protocol."""
-    vlm_answers = {
-        "GroundSG-Gemini": '{"description": "x", "subgoal_sequence": [], "subgoal": "put it down"}',
-        "MemER": '{"current_subtask": "put it down", "keyframe_positions": [1]}',
-    }
     remembers = name == "TTT-Expert"
     server = MmeVlaServer() if remembers else NoMemory()
-    with server, fake_vlm([vlm_answers.get(name, "")]) as vlm:
+    with server, fake_vlm([answer]) as vlm:
         overrides = {"server": server.place, "policy.timeout": "300"}
-        if name in vlm_answers:
+        if answer:
             overrides["vlm"] = vlm.url
         policy = load_system(name, overrides)
-        env = roboirg.make(
-            "PickXtimes",
-            setting="direct",
-            **PolicyNeeds.of(policy).env_options,
-            max_steps=40,
-        )
-        try:
-            info = play(env, policy)
-        finally:
-            policy.close()
-        messages = [unpack(data) for data in server.messages]
-    assert info["status"] == "timeout"
-    asked = [message for message in messages if "prompt" in message]
-    assert len(asked) == 3
-    subgoals = [message.get("grounded_subgoal") for message in asked]
-    if name == "GroundSG-oracle":
-        assert all(re.fullmatch(r"pick up the \w+ cube at <\d+, \d+> .*", one) for one in subgoals)
-    else:
-        assert subgoals == ["put it down" if name in vlm_answers else None] * 3
+        needs = PolicyNeeds.of(policy).env_options
+        env = roboirg.make("PickXtimes", setting="direct", max_steps=40, **needs)
+        assert play(env, policy)["status"] == "timeout"
+        policy.close()
+    messages = [unpack(data) for data in server.messages]
+    followed = [str(one.get("grounded_subgoal")) for one in messages if "prompt" in one]
+    assert len(followed) == 3
+    assert all(re.fullmatch(subgoal, one) for one in followed)
     assert any("add_buffer" in message for message in messages) == remembers
-    calls = {"GroundSG-Gemini": 1, "MemER": 3}
-    assert len(vlm.requests) == calls.get(name, 0)
+    assert len(vlm.requests) == calls

@@ -11,14 +11,12 @@ import roboirg
 from roboirg.core.actions import JOINT_ANGLE, check_chunk
 from roboirg.core.episode import Primitive
 from roboirg.core.errors import InvalidValueError, UnknownNameError
-from roboirg.language.settings import plain_settings
 from roboirg.policies import Policy, PrivilegedPolicy, find_policy, make_policy
 from roboirg.policies.builtin import BUILTIN, scripted
 from roboirg.policies.builtin.listeners import ForgetfulPolicy, ListenerPolicy
 from roboirg.policies.builtin.oracle_policy import PreviousGoalPolicy
 from roboirg.policies.contract.policy_calls import policy_usage
 from roboirg.policies.planners.hierarchical_policy import PlannerParts
-from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 
 
@@ -123,15 +121,12 @@ class Numb(Silent):
             InvalidValueError,
             r"OldReset\.reset\(self\) must take instruction and demonstration",
         ),
-        ("roboirg.policies.builtin.random_policy:Missing", InvalidValueError, "no class 'Missing'"),
         (f"{__name__}:Deaf", InvalidValueError, r"no method act\(\)"),
-        ("roboirg.policies.builtin.random_policy:", InvalidValueError, "no class ''"),
         (
             "json:loads",
             InvalidValueError,
             "module json has no class 'loads'; it has JSONDecoder",
         ),
-        (f"{__name__}:pytest", InvalidValueError, "no class 'pytest'"),
         (f"{__name__}:Numb", InvalidValueError, r"class Numb has no method act\(\)"),
     ],
 )
@@ -146,12 +141,9 @@ def test_wrong_specs_are_explained(spec, error, words):
         ("cameras", "front", r"write \('front',\)"),
         ("cameras", ("front", "wirst"), r"Did you mean 'wrist'\?"),
         ("cameras", {"front"}, "of type set; it must be a tuple"),
-        ("cameras", None, "of type NoneType"),
         ("cameras", ("front", "front"), "names 'front' twice"),
         ("actions", "way_point", r"no action space 'way_point'.*Did you mean 'waypoint'\?"),
-        ("actions", 7, "no action space 7"),
         ("demonstration_frames", "some", "demonstration_frames is 'some'; it must be 'all', 'no"),
-        ("demonstration_frames", 0, "demonstration_frames is 0"),
         ("observe_every", -1, "observe_every is -1; it must be a whole number from 1"),
         ("observe_every", True, "observe_every is True"),
         ("depth", 1, "depth is 1; it must be True or False"),
@@ -164,34 +156,16 @@ def test_a_wrong_need_is_told_before_anything_starts(monkeypatch, attribute, wis
         find_policy(f"{__name__}:Silent")
 
 
-def world_of(task, setting, episode):
-    return roboirg.make(task, setting=setting, episode=episode, cameras=())
-
-
-def decided(policy_class, env, seed=0):
-    return policy_class(seed).decide(env, env.instruction.text)
-
-
-@pytest.mark.sim
-@pytest.mark.parametrize("task", every_task())
-def test_the_listener_understands_and_the_forgetful_one_guesses_what_is_not_explicit(task):
-    for setting in plain_settings(every_task()[task]):
-        right = []
-        for episode in range(6):
-            env = world_of(task, setting, episode)
-            assert decided(ListenerPolicy, env) == env.episode.goal
-            guesses = [decided(ForgetfulPolicy, env, seed) for seed in range(5)]
-            right += [guess == env.episode.goal for guess in guesses]
-        if setting == "explicit":
-            assert all(right)
-        else:
-            assert 0.0 < np.mean(right) < 0.9
+def guesses_in(setting, count):
+    env = roboirg.make("VideoUnmask", setting=setting, episode=0, cameras=())
+    assert ListenerPolicy().decide(env, env.instruction.text) == env.episode.goal
+    return [ForgetfulPolicy(seed).decide(env, env.instruction.text) for seed in range(count)]
 
 
 @pytest.mark.sim
 def test_guesses_are_uniform_over_the_goals_that_fit():
-    env = world_of("VideoUnmask", "direct", 0)
-    guesses = [decided(ForgetfulPolicy, env, seed) for seed in range(300)]
+    assert set(guesses_in("explicit", 20)) == {get_episode("VideoUnmask", "test", 0).goal}
+    guesses = guesses_in("direct", 300)
     counts = {guess: guesses.count(guess) for guess in guesses}
     assert len(counts) == 3
     # 100 expected each; five standard deviations of a fair draw are 41.

@@ -86,7 +86,7 @@ def test_a_planner_needs_what_it_declares_and_its_model_is_its_own():
     guide.tokenizer, guide.prompt_tokens, guide.actions = object(), 7, "teleport"
     both = PolicyNeeds.of(Demanding()).merge(PolicyNeeds.of_planner(guide))
     assert both == PolicyNeeds.of(HierarchicalPolicy(guide, Demanding()))
-    assert (both.cameras, both.history_cameras) == (("front", "wrist"), ("front", "wrist"))
+    assert both.cameras == both.history_cameras == ("front", "wrist")
     assert (both.demonstration_frames, both.observe_every, both.depth) == (2, 4, True)
     assert (both.actions, both.prompt_tokens, both.tokenizer) == ("ee_pose", 64, "words.model")
     assert both.trained_tasks == both.merge(PolicyNeeds()).trained_tasks == ("BinFill",)

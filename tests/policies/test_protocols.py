@@ -3,36 +3,21 @@
 import re
 import subprocess
 import sys
-import threading
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 from doc_recipe import install
+from served_here import served
 from wire_episode import INSTRUCTION, moment
 
 from roboirg.apps.policy_check.policy_check import check_policy
-from roboirg.core.errors import UnknownNameError
 from roboirg.policies import make_policy
 from roboirg.policies.by_name.policy_classes import url_classes
-from roboirg.policies.policy_server import open_server
 from roboirg.policies.remote.endpoints import RemoteOptions
 from roboirg.policies.remote.protocols import protocols_by_scheme
 
 PAGE = (Path(__file__).parents[2] / "docs" / "servers.md").read_text()
-
-
-@contextmanager
-def served(spec, protocol):
-    server = open_server(spec, protocol)
-    thread = threading.Thread(target=server.listening.serve_forever)
-    thread.start()
-    try:
-        yield server.url
-    finally:
-        server.listening.shutdown()
-        thread.join()
 
 
 @pytest.fixture
@@ -109,8 +94,3 @@ main()
     assert listed.split() == list(protocols_by_scheme())
     for scheme in protocols_by_scheme():
         assert scheme in help_text
-
-
-def test_an_unknown_scheme_names_the_nearest():
-    with pytest.raises(UnknownNameError, match="Did you mean 'openpi'"):
-        make_policy("openpy://localhost:1", 0)

@@ -2,26 +2,27 @@
 
 import math
 import re
+from pathlib import Path
 
-import planner_faults
 import pytest
-from planning_fakes import fake_vlm, words_of
+from planning_fakes import Late, fake_vlm, words_of
 from selection import slow_but
 
 import roboirg
+from roboirg.analysis.measures.planner_failures import planner_failure
 from roboirg.core.actions import choice_action
 from roboirg.core.errors import InvalidActionError
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.subgoal_words import read_subgoal
-from roboirg.evaluation.analysis.stats.planner_failures import planner_failure
 from roboirg.judging import plain_subgoal
 from roboirg.policies import make_policy, play
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.planners import make_planner, model_planners
-from roboirg.policies.planners.hierarchical_policy import MOST_REFUSALS, HierarchicalPolicy
-from roboirg.policies.planners.oracle_planner import OraclePlanner
-from roboirg.policies.planners.planner import SubgoalOptions
+from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
+from roboirg.records.record import Job
+from roboirg.runs.play.rollout import EpisodeRunner
 from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.choices import choices_of
 from roboirg.tasks.splits.splits import get_episode
@@ -164,58 +165,23 @@ def test_the_listener_plans_what_the_words_mean(task):
 
 
 @pytest.mark.sim
-def test_planners_guess_by_the_seed_of_the_policy():
-    """The command alone fits several goals in this episode."""
-    needs = PolicyNeeds.of(make_policy("planner:forgetful", 0)).env_options
-    env = roboirg.make("VideoUnmask", episode=0, setting="direct", **needs)
-    _, info = env.reset()
-
-    def first(seed):
-        policy = make_policy("planner:forgetful", seed)
-        policy.attach(env)
-        policy.reset(env.instruction.text, info["demonstration"])
-        return policy.planner.plan({}, 0)
-
-    assert first(3) == first(3)
-    assert len({first(seed) for seed in range(8)}) > 1
-    env.close()
-
-
-class Askew(OraclePlanner):
-    """The oracle, 40 pixels off."""
-
-    def plan(self, observation, step):
-        subgoal = super().plan(observation, step)
-        return re.sub(
-            r"<(\d+), (\d+)>", lambda at: f"<{int(at[1])}, {max(int(at[2]) - 40, 0)}>", subgoal
-        )
-
-
-@pytest.mark.sim
-@pytest.mark.parametrize("task", slow_but(["StopCube"], SOME))
-def test_forty_pixels_off_is_another_thing_or_none(task):
-    info, policy = play_with(Askew(SubgoalOptions()), task)
-    assert info["status"] != "success"
-    ends = [one.how for one in policy.endings]
-    if info["status"] == "timeout" and ends[-MOST_REFUSALS:] == ["refused"] * MOST_REFUSALS:
-        assert ends.count("refused") == MOST_REFUSALS  # and it was asked no more
-
-
-@pytest.mark.sim
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("fault", "named"),
+    ("reply", "timeout_s", "named"),
     [
-        ("none", None),
-        *((one, one) for one in ("wrong count", "stopped early", "wrong thing", "refused",
-                                 "unreadable", "went on too long")),
-        ("never", "no answer"),
-        ("late", "no answer"),
+        ("put it into the bin", 60, "refused"),
+        ("la la la", 60, "unreadable"),
+        (Late(10.0), 1, "no answer"),
     ],
-)  # fmt: skip
-def test_the_record_says_how_a_planner_failed(fault, named):
-    records = (planner_faults.record_of(fault, index) for index in range(6))
-    assert planner_failure(next(filter(None, records))) == named
+)
+def test_the_record_says_how_a_planner_failed(reply, timeout_s, named):
+    with fake_vlm([reply]) as server:
+        model = f"base_url={server.url}/v1&model=stub&timeout_s={timeout_s}&retries=0"
+        spec = f"planner:stateless?{model}&observe_every=400"  # few pictures are drawn
+        job = Job(policy=spec, ref=read_policy(spec), task="PickXtimes", split="test", episode=0,
+                  options=InstructionOptions("explicit"))  # fmt: skip
+        record, *_ = EpisodeRunner(Path()).play_once(job)
+    assert planner_failure(record) == named
 
 
 @pytest.mark.parametrize("model", ["", "&model=x"])

@@ -7,16 +7,11 @@ import time
 
 import numpy as np
 import pytest
-from wire_episode import INSTRUCTION, moment, video
+from wire_episode import INSTRUCTION, client_of, moment, video
 from wire_servers import VlaEvalServer
 
 from roboirg.core.errors import InvalidValueError, PolicyReplyError
-from roboirg.policies import make_policy
 from roboirg.policies.contract.policy_calls import server_version
-
-
-def client_of(server, query=""):
-    return make_policy(f"vla-eval://{server.place}{query}", 0)
 
 
 def kinds(server):
@@ -36,10 +31,9 @@ def described(array):
 
 def test_an_episode_is_what_the_harness_would_send(snapshot):
     with VlaEvalServer() as server:
-        client = client_of(server)
-        client.reset(INSTRUCTION, video(3))
-        rows = [client.act(moment(n, history=())) for n in (3, 4)]
-        client.close()
+        with client_of(server, "vla-eval") as client:
+            client.reset(INSTRUCTION, video(3))
+            rows = [client.act(moment(n, history=())) for n in (3, 4)]
         wait_for_messages(server, 5)
     assert client.metadata["model_server"] == "Test"
     assert server_version(client.metadata) == "Test, vla-eval 0.8.0"
@@ -49,15 +43,13 @@ def test_an_episode_is_what_the_harness_would_send(snapshot):
 
 
 def test_a_task_without_a_video_has_no_history_and_subgoals_are_passed_on():
-    with VlaEvalServer() as server:
-        client = client_of(server)
+    with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
         client.follow("pick it up at <1, 2>")
         client.act(moment(0))
         client.act({**moment(1), "instruction": "said later"})
         client.reset(INSTRUCTION, video(0))
         client.act(moment(0))
-        client.close()
     shown = [payload for kind, payload in server.payloads if kind == "observation"]
     assert [one.get("subgoal") for one in shown] == ["pick it up at <1, 2>"] * 2 + [None]
     assert shown[1]["task_description"] == "said later"
@@ -75,7 +67,6 @@ def test_a_task_without_a_video_has_no_history_and_subgoals_are_passed_on():
                 "send_wrist_image": False,
                 "send_state": False,
                 "send_video_history": False,
-                "action_space": "joint_angle",
                 "something": "else",
             },
         ),
@@ -84,28 +75,26 @@ def test_a_task_without_a_video_has_no_history_and_subgoals_are_passed_on():
 def test_what_is_shown_is_what_the_server_or_the_url_wishes(query, wishes):
     with VlaEvalServer() as server:
         server.hello = {**server.hello, "observation_params": wishes}
-        client = client_of(server, query)
-        assert client.cameras == (("front",) if query else ("front", "wrist"))
-        assert client.demonstration_frames == ("none" if query else "all")
-        client.reset(INSTRUCTION, video(2))
-        client.act(moment(0))
-        client.close()
+        with client_of(server, "vla-eval", query) as client:
+            assert client.cameras == (("front",) if query else ("front", "wrist"))
+            assert client.demonstration_frames == ("none" if query else "all")
+            client.reset(INSTRUCTION, video(2))
+            client.act(moment(0))
     ((_, shown),) = [one for one in server.payloads if one[0] == "observation"]
     assert list(shown) == ["images", "task_description"]
     assert list(shown["images"]) == ["agentview"]
 
 
 def test_another_action_space_or_protocol_is_refused():
-    with VlaEvalServer() as server:
+    with VlaEvalServer() as server, client_of(server, "vla-eval") as client:
         server.hello = {**server.hello, "observation_params": {"action_space": "ee_pose"}}
         with pytest.raises(InvalidValueError, match="'ee_pose', but the policy's URL says actions"):
-            client_of(server).reset(INSTRUCTION, video(0))
-        client = client_of(server, "?actions=ee_pose")
-        client.reset(INSTRUCTION, video(0))
-        client.close()
+            client.reset(INSTRUCTION, video(0))
+        with client_of(server, "vla-eval", "?actions=ee_pose") as agreed:
+            agreed.reset(INSTRUCTION, video(0))
         server.hello = {**server.hello, "protocol_version": 2}
         with pytest.raises(PolicyReplyError, match="speaks version 2 of vla-eval's protocol"):
-            client_of(server).reset(INSTRUCTION, video(0))
+            client.reset(INSTRUCTION, video(0))
 
 
 @pytest.mark.parametrize(
@@ -116,8 +105,6 @@ def test_another_action_space_or_protocol_is_refused():
         (b"\xc1", "something other than a message"),
         ("text", "replied with an error: text"),
         ({"actions": np.zeros(7)}, r"got shape \(7,\)"),
-        ({"actions": [float("nan")] * 8}, "finite"),
-        ({"actions": "left"}, "array of 8 real numbers; got str"),
         (
             {"actions": [[1.0], [2.0, 3.0]]},
             "numbers; got rows of different lengths",
@@ -126,24 +113,20 @@ def test_another_action_space_or_protocol_is_refused():
     ],
 )
 def test_a_malformed_reply_ends_the_episode_only(fault, words):
-    with VlaEvalServer(faults=[fault]) as server:
-        client = client_of(server)
+    with VlaEvalServer(faults=[fault]) as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
         with pytest.raises(PolicyReplyError, match=words):
             client.act(moment(0))
         client.reset(INSTRUCTION, video(0))
         assert len(client.act(moment(0))) == 1
-        client.close()
 
 
 @pytest.mark.parametrize("name", ["actions", "action"])
 @pytest.mark.parametrize("action", [[0.5] * 8, np.full((1, 8), 0.5), np.full(8, 0.5, np.float16)])
 def test_an_action_has_either_name_and_any_form(name, action):
-    with VlaEvalServer(faults=[{name: action}]) as server:
-        client = client_of(server)
+    with VlaEvalServer(faults=[{name: action}]) as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
         assert client.act(moment(0)).tolist() == [[0.5] * 8]
-        client.close()
 
 
 def test_errors_of_the_server_are_named_also_when_an_episode_cannot_begin():
@@ -151,15 +134,11 @@ def test_errors_of_the_server_are_named_also_when_an_episode_cannot_begin():
         def answer(self, message):
             raise RuntimeError("observation_failed: the weights melted \x1b[2J")
 
-    with Failing() as server:
-        client = client_of(server)
+    with Failing() as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
         with pytest.raises(PolicyReplyError, match=r"the weights melted \\x1b\[2J\.$"):
             client.act(moment(0))
-        client.close()
-    with VlaEvalServer(faults=["late-error"]) as server:
-        client = client_of(server)
+    with VlaEvalServer(faults=["late-error"]) as server, client_of(server, "vla-eval") as client:
         client.reset(INSTRUCTION, video(0))
         with pytest.raises(PolicyReplyError, match="replied with an error: cannot start"):
             client.act(moment(0))
-        client.close()

@@ -1,6 +1,10 @@
 """A small made-up episode: what a policy is shown, with pictures of 8 x 8."""
 
+from contextlib import contextmanager
+
 import numpy as np
+
+from roboirg.policies import make_policy
 
 INSTRUCTION = "Put the Red cube on the target."
 
@@ -42,3 +46,11 @@ def video(length, size=8, *, sensors=False):
     moments = [moment(number, size, sensors=sensors) for number in range(max(length, 1))]
     fields = [field for field in moments[0] if field != "instruction"]
     return {field: np.stack([m[field] for m in moments])[:length] for field in fields}
+
+
+@contextmanager
+def client_of(server, scheme, options=""):
+    """A policy that asks a server; it is closed after the block."""
+    policy = make_policy(f"{scheme}://{server.place}{options}", 0)
+    yield policy
+    policy.close()

@@ -98,12 +98,15 @@ class WireServer:
         self.connections += 1
         self.open += 1
         try:
-            await websocket.send(pack(self.metadata))
+            await self._begin(websocket)
             await self._converse(websocket)
         except ConnectionClosed:
             pass
         finally:
             self.open -= 1
+
+    async def _begin(self, websocket):
+        await websocket.send(pack(self.metadata))
 
     async def _converse(self, websocket):
         while True:
@@ -223,16 +226,12 @@ class VlaEvalServer(WireServer):
         self.step += 1
         return {"actions": np.full(8, self.step, np.float32)}
 
-    async def _handle(self, websocket):
-        self.connections += 1
-        self.open += 1
-        try:
-            async for data in websocket:
-                await self._respond(websocket, msgpack.unpackb(data, object_hook=decode_texts))
-        except ConnectionClosed:
-            pass
-        finally:
-            self.open -= 1
+    async def _begin(self, websocket):
+        """Say nothing: the client speaks first."""
+
+    async def _converse(self, websocket):
+        async for data in websocket:
+            await self._respond(websocket, msgpack.unpackb(data, object_hook=decode_texts))
 
     async def _respond(self, websocket, message):
         assert set(message) == {"type", "payload", "seq", "timestamp"}

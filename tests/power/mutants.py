@@ -1,14 +1,15 @@
 """What the tests find: stored faults, put into a copy of the code one at a time.
 
-    python tests/power/mutants.py FOLDER [--rooms ROOM ...] [--all] [--workers 2]
+    python tests/power/mutants.py FOLDER [--rooms ROOM ...] [--all]
 
 Cosmic Ray 8.7 made the faults of mutants.csv from the code of November 2026; of each room as many
 places as it has here were drawn with seed 69, and one fault of each place. 47 whose lines were
 rewritten since were drawn again, with seed 72 and outside annotations. A fault is tried with the
 test that found it last, with its file, then with the tests of its room; with --all, those that
-none found are tried, too. FOLDER gets copies of the working tree and results.csv, with which a
+none found are tried, too. FOLDER gets a copy of the working tree and results.csv, with which a
 second call goes on; at the end stands a table, and each fault that is found no longer, or whose
-lines the code no longer has.
+lines the code no longer has. Calls for different rooms may run side by side, each in a folder of
+its own.
 """
 
 from __future__ import annotations
@@ -23,20 +24,18 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from queue import SimpleQueue
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
 STORED = Path(__file__).with_name("mutants.csv")
 TESTS = {
     "judging": ("tests/judging", "tests/tasks"),
-    "tasks": ("tests/tasks", "tests/judging", "tests/language"),
-    "stats": ("tests/analysis", "tests/scripts"),
-    "store": ("tests/evaluation", "tests/apps/leaderboard"),
-    "plan": ("tests/evaluation", "tests/test_wrong_invocations.py"),
+    "tasks": ("tests/tasks", "tests/test_splits.py", "tests/judging", "tests/language"),
+    "stats": ("tests/stats", "tests/analysis", "tests/api", "tests/scripts"),
+    "store": ("tests/records", "tests/runs", "tests/apps/leaderboard"),
+    "plan": ("tests/runs", "tests/test_wrong_invocations.py"),
     "language": ("tests/language", "tests/apps/language_lab"),
     "landmarks": ("tests/language",),
     "reader": ("tests/reader", "tests/language", "tests/policies"),
@@ -184,36 +183,19 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--rooms", nargs="+", choices=TESTS, default=list(TESTS))
     parser.add_argument("--all", action="store_true")
-    parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
     mutants = [Mutant(*row) for row in read(STORED)]
-    trees: SimpleQueue[Path] = SimpleQueue()
-    for number in range(options.workers):
-        trees.put(copy(options.folder.absolute() / f"copy-{number}"))
+    tree = copy(options.folder.absolute() / "copy")
     stored = options.folder / "results.csv"
     if not stored.exists():
         stored.write_text("number,found_by\n", encoding="utf-8")
     results = dict(read(stored))
-
-    def attempt(mutant: Mutant) -> None:
-        tree = trees.get()
-        try:
+    for mutant in mutants:
+        is_tried = mutant.found_by or (options.all and not mutant.equivalent)
+        if mutant.room in options.rooms and mutant.number not in results and is_tried:
             results[mutant.number] = found_by(mutant, tree)
-        finally:  # or the other workers would wait for it
-            trees.put(tree)
-        with stored.open("a", encoding="utf-8", newline="") as file:
-            csv.writer(file).writerow((mutant.number, results[mutant.number]))
-
-    left = [
-        one
-        for one in mutants
-        if one.room in options.rooms
-        and one.number not in results
-        and (one.found_by or (options.all and not one.equivalent))
-    ]
-    with ThreadPoolExecutor(options.workers) as pool:
-        for _ in pool.map(attempt, left):
-            pass
+            with stored.open("a", encoding="utf-8", newline="") as file:
+                csv.writer(file).writerow((mutant.number, results[mutant.number]))
     sys.stdout.write(table(mutants, results) + "\n")
 
 

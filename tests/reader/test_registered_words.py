@@ -5,18 +5,12 @@ from __future__ import annotations
 import pytest
 
 from roboirg.core.errors import InvalidValueError
-from roboirg.reader import interpret, tokens
+from roboirg.reader import interpret
 from roboirg.reader.vocabulary import register_words
 from roboirg.tasks.splits.splits import get_episode
 
 EPISODE = get_episode("PickXtimes", "test", 3)
 TEXT = "Hoist the {} cube and put it on the target twice, then press the button."
-
-
-@pytest.fixture(autouse=True)
-def own_words(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("roboirg.reader.vocabulary.SYNONYMS", copy := dict(tokens.SYNONYMS))
-    monkeypatch.setattr(tokens, "SYNONYMS", copy)
 
 
 def test_a_taught_word_is_read_as_the_known_one() -> None:

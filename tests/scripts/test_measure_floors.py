@@ -3,10 +3,9 @@
 import measure_floors
 import pytest
 
+from roboirg.analysis.measures import measured_floors as stored
+from roboirg.analysis.measures.measured_floors import FloorKey, read_floors
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.analysis.stats import measured_floors as stored
-from roboirg.evaluation.analysis.stats.measured_floors import FloorKey, read_floors
-from roboirg.language.templates import LANGUAGE_VERSION
 from roboirg.shortcuts.shortcut_tables import shortcut_rows
 from roboirg.tasks import all_tasks
 
@@ -29,7 +28,7 @@ def test_the_file_holds_what_is_measured_and_is_read_as_it_was_written():
         assert (one.count, one.excess) == (row.count, pytest.approx(row.excess, abs=1e-4))
         for name in ("chance", "majority", "text-only", "scene-only", "union"):
             assert one.shares[name] == pytest.approx(row.shares[name], abs=1e-4)
-    kept = stored.measured_floors(LANGUAGE_VERSION)
+    kept = stored.measured_floors(measure_floors.LANGUAGE_VERSION)
     assert kept is not None, AGAIN
     own = {key: one for key, one in found.items() if key.task and key.split == stored.TEST}
     assert len(own) == 8
@@ -40,17 +39,6 @@ def test_the_file_holds_what_is_measured_and_is_read_as_it_was_written():
         for name in ("text-only", "scene-only"):
             again = pytest.approx(kept[key].shares[name].slots, abs=0.25)
             assert one.shares[name].slots == again, AGAIN
-
-
-def test_floors_are_those_of_the_words_of_a_language():
-    """Tasks that it does not speak of have no rows, and others not those of the usual one."""
-    pytest.importorskip("sklearn")
-    rows = measure_floors.measure(("VideoRepick", "StopCube"), scenes=1, learning=0, language=4)
-    found = read_floors(measure_floors.file_text(rows))
-    assert {key.task for key in found} == {"", "StopCube"}
-    kept = stored.measured_floors(LANGUAGE_VERSION) or {}
-    key = FloorKey("test", "reasoning", "StopCube")
-    assert found[key].shares["rules"] != kept[key].shares["rules"]
 
 
 def rule_table(by):

@@ -5,13 +5,6 @@ import pytest
 import write_published_figures as figures
 
 
-@pytest.fixture(autouse=True)
-def fewer_episodes(monkeypatch):
-    """What comes up in every other episode of the test split comes up in it."""
-    whole = paper_audit.split_episodes
-    monkeypatch.setattr(paper_audit, "split_episodes", lambda *asked: [*whole(*asked)][::2])
-
-
 @pytest.mark.parametrize("item", paper_audit.ITEMS, ids=lambda item: item.name)
 def test_the_item_holds(item):
     assert item.check()

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from benchmarks.synthetic_run import write_synthetic_run
 
-from roboirg.evaluation.analysis.page.report import write_report
-from roboirg.evaluation.analysis.results.frame import make_frame
-from roboirg.evaluation.analysis.stats.cells import cells_of
-from roboirg.evaluation.plan.sources import Source
-from roboirg.evaluation.plan.stored_plans import read_plan
-from roboirg.evaluation.records.store import read_records, read_results
+from roboirg.analysis.page.report import write_report
+from roboirg.analysis.results.frame import make_frame
+from roboirg.analysis.results.run_cells import cells_of
+from roboirg.analysis.results.sources import Source
+from roboirg.records.store import read_records, read_results
+from roboirg.runs.plan.stored_plans import read_plan
 
 pytest.importorskip("jinja2")
 

@@ -1,5 +1,6 @@
 """Demonstrations: replays are exact, and the cache changes nothing."""
 
+import dataclasses
 import pickle
 import sys
 import tempfile
@@ -9,14 +10,11 @@ from pathlib import Path
 import msgspec
 import numpy as np
 import pytest
+from flat_jobs import job_of
 from selection import slow_but
 
 import roboirg
-from roboirg.core.environment_options import EnvironmentOptions
-from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.play.rollout import EpisodeRunner
-from roboirg.evaluation.records.record import Job
-from roboirg.policies.by_name.finding import read_policy
+from roboirg.runs.play.rollout import EpisodeRunner
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.expert.primitives import MotionPrimitives
@@ -189,14 +187,13 @@ def story(task=SHORT):
     """Everything that an environment and a run return."""
     options = {"cameras": ("front", "wrist"), "demonstration_frames": Viewer.demonstration_frames}
     _, observation, info = reset(task, depth=True, grounded=True, **options)
-    job = Job(
-        policy="mine",
-        ref=read_policy(f"{__name__}:Viewer"),
+    job = job_of(
+        policy=f"{__name__}:Viewer",
         task=task,
         split="test",
         episode=1,
-        options=InstructionOptions("direct"),
-        environment=EnvironmentOptions(max_steps=80),
+        setting="direct",
+        max_steps=80,
     )
     with tempfile.TemporaryDirectory() as folder:
         record = msgspec.structs.asdict(EpisodeRunner(Path(folder))(job))
@@ -256,18 +253,17 @@ def test_a_warm_reset_is_a_cold_one(task, cache, unplanned):
     assert env.session.judge.index == len(env.episode.demonstration)
 
 
-def tampered(recording, **changes):
-    fields = {"actions": recording.actions, "stages": recording.stages, "end": recording.end}
-    return Recording(**{**fields, **changes}).to_bytes()
+def kept_recording(cache):
+    """Return the store, and the name and content of the one recording in it."""
+    (entry,) = cache.glob("actions/*")
+    store = demonstration_cache.open_cache("actions")
+    return store, entry.name, Recording.from_bytes(store.read(entry.name))
 
 
 @pytest.mark.parametrize("fault", ["end", "actions", "stages"])
 def test_a_replay_that_ends_differently_is_replaced_and_told(cache, caplog, fault):
     _, observation, info = reset()
-    (entry,) = cache.glob("actions/*")
-    store = demonstration_cache.open_cache("actions")
-    good = store.read(entry.name)
-    right = Recording.from_bytes(good)
+    store, name, right = kept_recording(cache)
     changes = {
         "end": "0" * 64,
         "actions": right.actions[::-1] + 0.3,
@@ -276,24 +272,22 @@ def test_a_replay_that_ends_differently_is_replaced_and_told(cache, caplog, faul
     wrong = {fault: changes[fault]}
     if fault == "stages":
         wrong["actions"] = right.actions[:0]
-    store.write(entry.name, tampered(right, **wrong))
+    store.write(name, dataclasses.replace(right, **wrong).to_bytes())
     _, after, rebuilt = reset()
     assert [record.levelname for record in caplog.records] == ["WARNING"]
-    assert entry.name in caplog.text
+    assert name in caplog.text
     assert f"{SHORT}/test/1" in caplog.text
     assert np.array_equal(after["end_effector"], observation["end_effector"])
     same(dict(info["demonstration"]), dict(rebuilt["demonstration"]))
-    assert Recording.from_bytes(store.read(entry.name)).end == right.end
+    assert Recording.from_bytes(store.read(name)).end == right.end
     reset()
     assert len(caplog.records) == 1
 
 
 def test_a_frame_hook_sees_the_right_demonstration_once(cache):
     _, _, _ = reset()
-    (entry,) = cache.glob("actions/*")
-    store = demonstration_cache.open_cache("actions")
-    right = Recording.from_bytes(store.read(entry.name))
-    store.write(entry.name, tampered(right, actions=right.actions + 0.2))
+    store, name, right = kept_recording(cache)
+    store.write(name, dataclasses.replace(right, actions=right.actions + 0.2).to_bytes())
     seen = []
     env = roboirg.make(SHORT, episode=1, cameras=())
     env.set_frame_hook(lambda env, shown: seen.append(env.session.world.elapsed))

@@ -5,12 +5,11 @@ from collections import defaultdict
 from statistics import median
 
 import pytest
+from drawn_scenes import drawn_episodes
 from selection import slow_but
 
-from roboirg.core.errors import SceneRejectedError
 from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.expert.primitives import MotionPrimitives
-from roboirg.tasks.splits.splits import make_episode
 
 pytestmark = pytest.mark.sim
 
@@ -42,22 +41,10 @@ PRIMITIVES = {
 """Control steps, shortest and longest known, in the videos of the Reference tasks."""
 
 
-def first_scenes(task, difficulty, count):
-    found = []
-    for seed in itertools.count():
-        try:
-            found.append(make_episode(task, seed, difficulty))
-        except SceneRejectedError:
-            continue
-        if len(found) == count:
-            break
-    return found
-
-
 @pytest.mark.parametrize(("task", "difficulty"), slow_but([("VideoUnmaskSwap", "easy")], VIDEOS))
 def test_videos_are_as_long_as_the_known_ones_within_a_tenth(task, difficulty):
     low, high = VIDEOS[task, difficulty]
-    (episode,) = first_scenes(task, difficulty, 1)
+    episode = next(drawn_episodes(task, difficulty))
     frames = []
     EpisodeSession(episode, visible=False).play_demonstration(frames.append)
     assert 0.9 * low <= len(frames) <= 1.1 * high
@@ -66,7 +53,7 @@ def test_videos_are_as_long_as_the_known_ones_within_a_tenth(task, difficulty):
 def test_primitives_take_as_long_as_the_known_ones_within_fifteen_percent():
     steps = defaultdict(list)
     for task in ("VideoRepick", "VideoPlaceButton"):
-        for episode in first_scenes(task, "medium", 2):
+        for episode in itertools.islice(drawn_episodes(task, "medium"), 2):
             session = EpisodeSession(episode, visible=False)
             expert = MotionPrimitives(session.world)
             for stage in episode.demonstration:

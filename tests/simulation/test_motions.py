@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from moved_worlds import rest
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene, SceneObject
@@ -17,12 +18,6 @@ pytestmark = pytest.mark.sim
 
 def cube(name: str, x: float, y: float, z: float = 0.02, yaw: float = 0.0) -> SceneObject:
     return SceneObject(name, "cube", Point(x, y, z), yaw, "red")
-
-
-def rest(world: World, steps: int) -> World:
-    for _ in range(steps):
-        world.step(physics_settings.HOME_ACTION)
-    return world
 
 
 def plane(world: World, name: str) -> tuple[float, float]:

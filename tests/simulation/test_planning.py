@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from moved_worlds import execute, rest
 from scipy.spatial.transform import Rotation
 
 from roboirg.core.actions import JOINT_HIGH, JOINT_LOW
@@ -14,13 +15,12 @@ from roboirg.core.motions import Point
 from roboirg.core.object_sizes import CUBE_HALF
 from roboirg.simulation.expert import primitives
 from roboirg.simulation.expert.motion_planning import MotionPlanner, ToolPose
-from roboirg.simulation.expert.primitives import MotionPrimitives
 from roboirg.simulation.expert.trajectory_timing import (
     JOINT_ACCELERATION_LIMIT,
     JOINT_SPEED_LIMIT,
     time_parameterize,
 )
-from roboirg.simulation.physics_settings import CONTROL_PERIOD, HOME, HOME_ACTION
+from roboirg.simulation.physics_settings import CONTROL_PERIOD, HOME
 from roboirg.simulation.world import World
 from roboirg.tasks.shared.unmask import APPEAR_STEP
 from roboirg.tasks.splits.splits import get_episode
@@ -162,12 +162,9 @@ def test_first_picks_take_as_long_as_robomme_s(task, primitive, low, high):
         episode = get_episode(task, "test", index)
         world = World(episode.scene, visible=False)
         stage = next(stage for stage in episode.stages if stage.primitive.kind == primitive)
-        while world.elapsed < APPEAR_STEP + 8:  # containers have to be there and at rest
-            world.step(HOME_ACTION)
+        rest(world, APPEAR_STEP + 8)  # containers have to be there and at rest
         begun = world.elapsed
-        for piece in MotionPrimitives(world).execute(stage.primitive):
-            for action in piece:
-                world.step(action)
+        execute(world, stage.primitive)
         assert low <= world.elapsed - begun <= high
         assert stage.expects in world.facts
 
@@ -175,9 +172,7 @@ def test_first_picks_take_as_long_as_robomme_s(task, primitive, low, high):
 def lifted(*objects: SceneObject) -> bool:
     """Whether the expert picks up the first of several objects."""
     world = World(Scene(objects), visible=False)
-    for piece in MotionPrimitives(world).execute(Primitive("pick_cube", objects[0].name)):
-        for action in piece:
-            world.step(action)
+    execute(world, Primitive("pick_cube", objects[0].name))
     return Fact("picked", objects[0].name) in world.facts
 
 

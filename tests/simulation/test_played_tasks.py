@@ -7,17 +7,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from drawn_scenes import drawn_episodes
+from moved_worlds import rest
 
 import roboirg
-from roboirg.core.episode import DIFFICULTIES
-from roboirg.core.errors import SceneRejectedError
 from roboirg.core.motions import Away, Glow, Swap
 from roboirg.core.observations import CAMERAS
 from roboirg.policies import make_policy, play
-from roboirg.simulation import physics_settings
 from roboirg.simulation.world import World
 from roboirg.tasks import every_task
-from roboirg.tasks.splits.splits import make_episode
 
 pytestmark = pytest.mark.sim
 
@@ -53,18 +51,9 @@ HIDDEN_KINDS = {"hidden_cube", "site", "marker"}
 """What the front camera need not see, because a container, nothing or a light shows it."""
 
 
-def scenes(task, count):
-    """Episodes of seeds that no split uses, of all difficulties in turn."""
-    return list(itertools.islice(_valid_scenes(task), count))
-
-
-def _valid_scenes(task):
-    cycle = itertools.cycle(DIFFICULTIES)
-    for seed in itertools.count(31_000_000):
-        try:
-            yield make_episode(task, seed, next(cycle))
-        except SceneRejectedError:
-            continue
+def unused_scene(task, difficulty):
+    """Return an episode of a seed that no split uses."""
+    return next(drawn_episodes(task, difficulty, itertools.count(31_000_000)))
 
 
 def trace(task, index, shoot=None):
@@ -108,14 +97,13 @@ def test_the_oracle_succeeds_and_pictures_look_as_they_did_when_they_were_looked
 
 @pytest.mark.parametrize("task", TASKS)
 def test_nothing_falls_or_drifts_while_the_robot_rests(task):
-    for episode in scenes(task, 2):
-        world = World(episode.scene, visible=False)
+    for difficulty in ("easy", "hard"):
+        episode = unused_scene(task, difficulty)
+        world = rest(World(episode.scene, visible=False), 60)
         moved = set()
         for motion in episode.scene.motions:
             swaps = isinstance(motion, Swap)
             moved |= {motion.first, motion.second, *motion.pinned} if swaps else {motion.subject}
-        for _ in range(60):
-            world.step(physics_settings.HOME_ACTION)
         for name, body in world.bodies.items():
             if name not in moved and body.item.kind != "hidden_cube":
                 assert np.allclose(body.position, body.item.position, atol=2e-3), (episode, name)
@@ -123,15 +111,13 @@ def test_nothing_falls_or_drifts_while_the_robot_rests(task):
 
 @pytest.mark.parametrize("task", TASKS)
 def test_the_front_camera_sees_every_object_that_is_there(task):
-    (episode,) = scenes(task, 1)
-    world = World(episode.scene)
+    episode = unused_scene(task, "easy")
+    world = rest(World(episode.scene), 34)
     late = {
         motion.subject
         for motion in episode.scene.motions
         if isinstance(motion, Glow) or (isinstance(motion, Away) and motion.end > 33)
     }
-    for _ in range(34):
-        world.step(physics_settings.HOME_ACTION)
     seen, counts = np.unique(world.cameras.segmentation("front"), return_counts=True)
     pixels = dict(zip(seen.tolist(), counts.tolist(), strict=True))
     for name, body in world.bodies.items():

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from moved_worlds import execute, rest
 
 import roboirg
 from roboirg.core import object_sizes
@@ -24,13 +25,7 @@ HALF_OPEN = -0.1
 """A gripper action at which each finger is 0.0125 from the middle: one fits into the hole."""
 
 
-def rest(world, steps):
-    for _ in range(steps):
-        world.step(physics_settings.HOME_ACTION)
-    return world
-
-
-def execute(world, pieces, gripper=None):
+def step_through(world, pieces, gripper=None):
     for action in itertools.chain.from_iterable(pieces):
         if gripper is not None:
             action[-1] = gripper
@@ -53,7 +48,7 @@ def test_a_roll_weighs_about_as_much_as_a_cube_and_lies_still():
 
 def test_a_roll_is_picked_from_outside():
     world = World(Scene((TAPE,)), visible=False)
-    execute(world, MotionPrimitives(world).execute(Primitive("pick_cube", "tape")))
+    execute(world, Primitive("pick_cube", "tape"))
     assert Fact("picked", "tape") in world.facts
     assert Fact("held", "tape") in world.facts
 
@@ -65,14 +60,14 @@ def test_a_roll_is_picked_by_its_wall():
     rotation = expert._rotation()  # closes along y
     middle = (object_sizes.TAPE_RADIUS + object_sizes.TAPE_HOLE_RADIUS) / 2
     above, at = (Point(0.0, middle, z) for z in (0.15, object_sizes.TAPE_HALF))
-    execute(world, [expert._move(above, rotation)], HALF_OPEN)
-    execute(world, [expert._grip(physics_settings.OPEN)], HALF_OPEN)
-    execute(world, [expert._move(at, rotation)], HALF_OPEN)
+    step_through(world, [expert._move(above, rotation)], HALF_OPEN)
+    step_through(world, [expert._grip(physics_settings.OPEN)], HALF_OPEN)
+    step_through(world, [expert._move(at, rotation)], HALF_OPEN)
     assert world.bodies["tape"].position == pytest.approx(TAPE.position, abs=2e-3)
-    execute(world, [expert._grip(physics_settings.CLOSED)])
+    step_through(world, [expert._grip(physics_settings.CLOSED)])
     wall = object_sizes.TAPE_RADIUS - object_sizes.TAPE_HOLE_RADIUS
     assert world.robot.finger_positions.sum() == pytest.approx(wall, abs=3e-3)
-    execute(world, [expert._move(above, rotation)])
+    step_through(world, [expert._move(above, rotation)])
     assert Fact("picked", "tape") in world.facts
 
 
@@ -98,12 +93,12 @@ def test_what_is_held_over_a_box_is_not_inside():
     episode = get_episode("PutInBox", "test", 0)
     world = World(episode.scene, visible=False)
     expert, box = MotionPrimitives(world), f"box_{episode.goal.text('color')}"
-    execute(world, expert.execute(Primitive("pick_cube", "tape")))
+    step_through(world, expert.execute(Primitive("pick_cube", "tape")))
     into = expert.execute(Primitive("put_into", "tape", box))
     inside = Fact("binned", "tape", box)
-    execute(world, itertools.islice(into, 2))
+    step_through(world, itertools.islice(into, 2))
     assert inside not in world.facts
-    execute(world, into)
+    step_through(world, into)
     assert inside in world.facts
 
 

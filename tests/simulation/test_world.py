@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from moved_worlds import rest
 
 from roboirg.core import waiting
 from roboirg.core.conditions import Fact
@@ -21,12 +22,6 @@ TASKS = tuple(every_task())
 def world_of(task: str, index: int = 3, *, visible: bool = False) -> World:
     episode = get_episode(task, "test", index)
     return World(episode.scene, visible=visible)
-
-
-def rest(world: World, steps: int) -> World:
-    for _ in range(steps):
-        world.step(physics_settings.HOME_ACTION)
-    return world
 
 
 def test_calls_that_may_hang_are_reported_while_they_run(monkeypatch: pytest.MonkeyPatch) -> None:

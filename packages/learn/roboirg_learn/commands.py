@@ -22,7 +22,9 @@ from roboirg.extension.commands import (
 
 if TYPE_CHECKING:
     from roboirg_learn.listener.listener_training import TrainingPlan
-    from roboirg_learn.policy.policy_plan import PolicyPlan
+    from roboirg_learn.listener.reader_plan import ReaderPlan
+    from roboirg_learn.policy.policy_files import PolicyFiles
+    from roboirg_learn.policy.policy_plan import BodyPlan
     from roboirg_learn.trainer import Progress
 
 # Heavy modules are imported inside the commands, so that --help is fast.
@@ -31,6 +33,27 @@ learn_app = typer.Typer(no_args_is_help=True, help="Train a listener or a policy
 
 TRAINING = "training"
 """Key in a plan of what is rare in a training."""
+
+
+LISTENER_OPTIONS = (
+    "scenes", "goals", "detector_epochs", "reader_epochs", "seed", "seeds", "encoders",
+)  # fmt: skip
+"""What a plan may have under `training` for a listener."""
+POLICY_OPTIONS = (
+    "scenes", "drawn", "goals", "detector_epochs", "body_epochs", "reader_epochs", "seed",
+    "encoders", "memories", "parts", "played",
+)  # fmt: skip
+"""What it may have for a policy."""
+READER_OPTIONS = ("scenes", "goals", "reader_epochs", "seed", "encoders")
+"""What it may have for a reader of words alone."""
+USUAL_MEMORY = "recurrent"
+LISTENER_EPOCHS = 6
+"""Usual passes over all instructions of a listener's reader."""
+
+
+HeardSettings = Annotated[
+    str, typer.Option(help="Settings that it hears, separated by commas, or none.")
+]
 
 
 @learn_app.command("listener")
@@ -57,13 +80,12 @@ def learn_listener(
     detector_epochs, reader_epochs, seed, encoders; for a study also seeds, how many times each
     listener is trained (3).
 
-    Example: roboirg learn listener --out listener.pt
+    Example: roboirg learn listener --out listener.safetensors
     """
     from roboirg_learn.learn_support import check_learn_support
 
     check_learn_support()
-    own = "scenes goals detector_epochs reader_epochs seed seeds encoders"
-    training = _listener_plan(PlanWords(context, plan, TRAINING, own.split()), without)
+    training = _listener_plan(PlanWords(context, plan, TRAINING, LISTENER_OPTIONS), without)
     if study:
         _run_study(training, out, worker_count())
         return
@@ -79,49 +101,44 @@ def learn_listener(
 
 
 def _listener_plan(words: PlanWords, without: str) -> TrainingPlan:
+    """Return how a listener is trained."""
     from roboirg_learn.listener.learned_model import WITHOUTS
     from roboirg_learn.listener.listener_training import TrainingPlan
-    from roboirg_learn.listener.vocabulary import WORD_POOLS
 
     return TrainingPlan(
-        words.tasks(),
-        words.settings(),
-        words.options().language,
-        words=known_name("pool of words", words.fields.get("wordings") or "train", WORD_POOLS),
+        _reader_plan(words, words.tasks(), "all", reader_epochs=LISTENER_EPOCHS),
         without=known_name("variant", without, WITHOUTS),
         **words.choices(TrainingPlan),
     )
 
 
 def _run_study(plan: TrainingPlan, out: Path, workers: int) -> None:
+    """Train and compare several listeners; print the page with their tables."""
     from roboirg_learn.listener.listener_study import run_study
     from roboirg_learn.listener.study_report import write_study
 
     _check_folder(out, "--study needs a folder as --out")
     answers = run_study(plan, out, workers, _print_tenths())
-    about = plan._asdict().items()
-    shown = {name: value for name, value in about if name not in ("tasks", "settings", "without")}
+    shown = {**plan.about, "seeds": plan.seeds}
+    for name in ("tasks", "settings", "without"):
+        del shown[name]
     typer.echo(str(write_study(answers, shown, out)))
 
 
 def _check_folder(out: Path, needed: str) -> None:
+    """Refuse a file where a folder is needed."""
     if out.exists() and not out.is_dir():
         raise InvalidValueError(f"{str(out)!r} is a file; {needed}.")
-
-
-USUAL_MEMORY = "recurrent"
 
 
 @learn_app.command("policy")
 def learn_policy(
     context: typer.Context,
     out: Annotated[
-        Path, typer.Option(help="Folder for the policy and for what it is learned from.")
+        Path, typer.Option(help="Folder for body and reader, and for what they are learned from.")
     ],
     tasks: Tasks = "all",
-    settings: Annotated[
-        str, typer.Option(help="Settings that it hears, separated by commas, or none.")
-    ] = "explicit",
+    settings: HeardSettings = "explicit",
     memory: Annotated[
         str,
         typer.Option(
@@ -141,55 +158,111 @@ def learn_policy(
 ) -> None:
     """Train a policy that acts on pictures and words: records the expert, then learns.
 
-    What is there already is used again. A plan may have, under `training`: scenes, drawn, goals,
-    detector_epochs, body_epochs, reader_epochs, seed, encoders; with --paper also memories, parts
-    (main, resolved, context, planner), played (settings), and at its top episodes and split.
+    It becomes two files: a body, and a reader of words for it. What is there already is used again.
+    A plan may have, under `training`: scenes, drawn, goals, detector_epochs, body_epochs,
+    reader_epochs, seed, encoders; with --paper also memories, parts (main, resolved, context,
+    planner), played (settings), and at its top episodes and split.
 
     Example: roboirg learn policy --tasks PickXtimes --out learned
     """
     from roboirg_learn.learn_support import check_learn_support
+    from roboirg_learn.policy.policy_plan import MEMORY_NAMES, BodyPlan
 
-    own = (
-        "scenes drawn goals detector_epochs body_epochs reader_epochs seed encoders memories parts "
-        "played"
-    )
-    words = PlanWords(context, plan, TRAINING, own.split())
-    training = _policy_plan(words, tasks, settings, memory)
+    words = PlanWords(context, plan, TRAINING, POLICY_OPTIONS)
+    reads = _reader_plan(words, words.tasks(tasks), settings)
+    memory = known_name("memory", memory, MEMORY_NAMES)
+    acts = BodyPlan(reads.tasks, memory, **words.choices(BodyPlan))
     if paper and memory != USUAL_MEMORY:
         raise InvalidValueError("--paper has its memories from the plan: training.memories.")
     _check_folder(out, "--out needs a folder")
     check_learn_support()
     with locked(out / ".lock", f"Another command learns in {str(out)!r}."):
         if paper:
-            _play_paper(training, words, out, worker_count(workers))
+            _play_paper(acts, reads, words, out, worker_count(workers))
             return
-        from roboirg_learn.policy.policy_training import trained_file
+        from roboirg_learn.policy.policy_training import trained_files
 
-        path = trained_file(training, out, worker_count(workers), _print_tenths())
-    typer.echo(f"{path}, {path.stat().st_size / 2**20:.1f} MiB")
-    heard = ",".join(training.settings) or "explicit"
-    options = f"--tasks {quote(','.join(training.tasks))} --split val --settings {quote(heard)}"
-    options += f" --wordings test --out {quote(f'runs/{path.stem}')}"
-    typer.echo(f"Its language is {training.language}; a run in another than 3 needs a plan file.")
-    typer.echo(f"Play it with: roboirg run --policy {quote(f'trained:{path}')} {options}")
+        files = trained_files(acts, reads, out, worker_count(workers), _print_tenths())
+    print_policy(files, reads)
 
 
-def _policy_plan(words: PlanWords, tasks: str, settings: str, memory: str) -> PolicyPlan:
+def _reader_plan(
+    words: PlanWords, tasks: tuple[str, ...], settings: str, **usual: int
+) -> ReaderPlan:
+    """Return how a reader is trained; what a plan does not have is as usual."""
+    from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.listener.vocabulary import WORD_POOLS
-    from roboirg_learn.policy.policy_plan import MEMORY_NAMES, PolicyPlan
 
     hears_none = words.given("settings", settings) in ("none", ["none"])
-    return PolicyPlan(
-        words.tasks(tasks),
-        words.options().language,
-        () if hears_none else words.settings(settings),
-        words=known_name("pool of words", words.fields.get("wordings") or "train", WORD_POOLS),
-        memory=known_name("memory", memory, MEMORY_NAMES),
-        **words.choices(PolicyPlan),
+    heard = () if hears_none else words.settings(settings)
+    pool = words.fields.get("wordings") or "train"
+    return ReaderPlan(
+        tasks,
+        heard,
+        words=known_name("pool of words", pool, WORD_POOLS),
+        **{**usual, **words.choices(ReaderPlan)},
     )
 
 
-def _play_paper(plan: PolicyPlan, words: PlanWords, out: Path, workers: int) -> None:
+@learn_app.command("reader")
+def learn_reader(
+    context: typer.Context,
+    body: Annotated[Path, typer.Option(help="File of the body that it is for.")],
+    out: Annotated[Path, typer.Option(help="File for the reader.")],
+    tasks: Tasks = "all",
+    settings: HeardSettings = "explicit",
+    plan: PlanName = None,
+    workers: Workers = None,
+) -> None:
+    """Train the reader of words for a body that was trained before.
+
+    It sees the train split and random scenes as the body does, and hears what is said in them;
+    no expert plays. All tasks are those of the body. What is unfinished is kept in the folder
+    reader-work next to the result, so that a command that was killed goes on. A plan may have,
+    under `training`: scenes, goals, reader_epochs, seed, encoders.
+
+    Example: roboirg learn reader --body small.body.safetensors --out new.reader.safetensors
+    """
+    from roboirg_learn.learn_support import check_learn_support
+
+    check_learn_support()
+    from roboirg_learn.policy.policy_files import PolicyFiles
+    from roboirg_learn.policy.trained_body import load_body
+    from roboirg_learn.policy.trained_reader import save_reader
+    from roboirg_learn.policy.word_training import check_words, teach_reader
+
+    words = PlanWords(context, plan, TRAINING, READER_OPTIONS)
+    check_output_file(out)
+    acts = load_body(body)
+    if tasks == "all":
+        tasks = ",".join(acts.goals.tasks)
+    reads = _reader_plan(words, words.tasks(tasks), settings)
+    for task in reads.tasks:
+        known_name("task of this body", task, acts.goals.tasks)
+    check_words(reads)
+    work = out.parent / "reader-work"
+    work.mkdir(exist_ok=True)
+    reader = teach_reader(acts, reads, work, out.stem, worker_count(workers), _print_tenths())
+    save_reader(reader, out)
+    print_policy(PolicyFiles(body, out), reads)
+
+
+def print_policy(files: PolicyFiles, plan: ReaderPlan) -> None:
+    """Print how the instructions that a policy has heard are played."""
+    heard = ",".join(plan.settings) or "explicit"
+    if plan.heard == "all":  # tasks without one of the settings are played in the others
+        heard = plan.heard
+    options = (
+        f"--tasks {','.join(plan.tasks)} --split val --settings {heard} "
+        "--wordings test --out runs/learned"
+    )
+    typer.echo(f"Play it with: roboirg run --policy {quote(files.spec)} {options}")
+
+
+def _play_paper(
+    acts: BodyPlan, reads: ReaderPlan, words: PlanWords, out: Path, workers: int
+) -> None:
+    """Train a policy for each mechanism of the paper, play its tables, and print the page."""
     import roboirg
     from roboirg.extension.commands import write_atomically
     from roboirg_learn.policy.paper_experiment import (
@@ -205,19 +278,30 @@ def _play_paper(plan: PolicyPlan, words: PlanWords, out: Path, workers: int) -> 
 
     experiment = ExperimentPlan(**words.choices(ExperimentPlan))
     check_experiment(experiment)
-    files = train_rows(experiment, plan, out, workers, _print_tenths())
-    changes: dict[str, Any] = {"tasks": plan.tasks, "language": plan.language}
-    changes |= {name: words.fields[name] for name in ("episodes", "split") if name in words.fields}
-    played = {}
+    files = train_rows(experiment, acts, reads, out, workers, _print_tenths())
+    changes = _changes(words, reads.tasks)
+    results = {}
     for part in experiment.parts:
         options = part_options(part, experiment, files, changes)
         run = MAIN if part == RESOLVED else part
-        played[run] = roboirg.evaluate(**options, out=out / RUNS / run, workers=workers)
-    texts = [one.table(run, "markdown", published=True) for run, one in played.items()]
-    texts.append(answers_text({run: one.frame for run, one in played.items()}))
+        results[run] = roboirg.evaluate(**options, out=out / RUNS / run, workers=workers)
+
+    texts = [INTRODUCTION]
+    for run, result in results.items():
+        texts.append(result.table(run, "markdown", published=True))
+    texts.append(answers_text({run: result.frame for run, result in results.items()}))
     page = out / "paper.md"
-    write_atomically(page, "\n".join([INTRODUCTION, *texts, ""]))
+    write_atomically(page, "\n".join([*texts, ""]))
     typer.echo(str(page))
+
+
+def _changes(words: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
+    """Return the options that the parts of the paper's experiment take from a plan."""
+    changes: dict[str, Any] = {"tasks": tasks}
+    for name in ("episodes", "split"):
+        if name in words.fields:
+            changes[name] = words.fields[name]
+    return changes
 
 
 def _print_tenths() -> Progress:
@@ -228,6 +312,7 @@ def _print_tenths() -> Progress:
         tenth = 10 * done // total
         if note or shown.get(work) != tenth:
             shown[work] = tenth
-            typer.echo(f"{work}: {done} of {total}{note and f', {note}'}", err=True)
+            ending = f", {note}" if note else ""
+            typer.echo(f"{work}: {done} of {total}{ending}", err=True)
 
     return progress

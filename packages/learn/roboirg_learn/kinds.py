@@ -9,21 +9,28 @@ from typing import TYPE_CHECKING, Any
 
 from roboirg.extension.commands import InvalidValueError, known_name
 from roboirg.extension.policies import PolicyKind, followed
-from roboirg_learn.learn_support import check_learn_support, file_version
+from roboirg_learn.learn_support import check_learn_support
+from roboirg_learn.policy.policy_files import PolicyFiles
 
 if TYPE_CHECKING:
     from roboirg_learn.policy.joint_chunks import JointChunks
     from roboirg_learn.policy.learned_policy import LearnedPolicy
     from roboirg_learn.policy.policy_model import PolicyModel
 
-ACTIONS, HANDS = "actions", "hands"
-"""Options of ``trained:``: the action space, or what follows the subgoals of its planner."""
-SPACES = "waypoint", "joint_angle"
+READER = "reader"
+"""Option of ``trained:``: the file of its reader."""
+ACTIONS = "actions"
+"""Option: the action space."""
+HANDS = "hands"
+"""Option: what follows the subgoals of its planner."""
+SPACES = ("waypoint", "joint_angle")
+"""Action spaces, the usual one first."""
 
 
 def _checked_path(
     spec: str, name: str, options: Mapping[str, str], known: tuple[str, ...] = ()
 ) -> Path:
+    """Return the path that a spec names, if its options are known."""
     for option in options:
         known_name(f"option of {spec.partition(':')[0]}:", option, known)
     if not name:
@@ -40,64 +47,74 @@ def _learned(spec: str, name: str, options: Mapping[str, str]) -> Callable[[int]
 
 def _trained(spec: str, name: str, options: Mapping[str, str]) -> Callable[[int], Any]:
     """Return what makes learned policies; with ``hands=…`` learned planners with those hands."""
-    path, hands = _checked_path(spec, name, options, (ACTIONS, HANDS)), options.get(HANDS)
+    body = _checked_path(spec, name, options, (READER, ACTIONS, HANDS))
+    if not options.get(READER):
+        raise InvalidValueError(
+            f"Policy {spec!r} has a body, but no reader of words; name one with ?reader=FILE. "
+            f"Train one with: roboirg learn reader --body {name} --out FILE."
+        )
+    files = PolicyFiles(body, Path(options[READER]))
     actions = known_name("actions of trained:", options.get(ACTIONS, SPACES[0]), SPACES)
+    hands = options.get(HANDS)
     if hands is None:
-        return lambda seed: make_learned(path, seed, actions)
+        return lambda seed: make_learned(files, seed, actions)
     if ACTIONS in options:
         raise InvalidValueError(f"Policy {spec!r} has other hands, which have their own actions.")
+    return lambda seed: _planner_with(hands, files, seed, spec)
 
-    def make(seed: int) -> object:
-        from roboirg_learn.policy.subgoal_following import LearnedPlanner
 
-        model, version = _load(path)
-        if model.planner is None:
-            raise InvalidValueError(
-                f"Policy {spec!r} has no planner for other hands; learn one with --memory subgoal."
-            )
-        return followed(LearnedPlanner(model, version), hands, seed, spec)
+def _planner_with(hands: str, files: PolicyFiles, seed: int, spec: str) -> object:
+    """Return a learned planner whose subgoals other hands follow."""
+    from roboirg_learn.policy.subgoal_following import LearnedPlanner
 
-    return make
+    model = _load(files)
+    if model.body.planner is None:
+        raise InvalidValueError(
+            f"Policy {spec!r} has no planner for other hands; learn one with --memory subgoal."
+        )
+    return followed(LearnedPlanner(model), hands, seed, spec)
 
 
 def make_learned(
-    path: Path, seed: int = 0, actions: str = SPACES[0]
+    files: PolicyFiles, seed: int = 0, actions: str = SPACES[0]
 ) -> LearnedPolicy | JointChunks:
-    """Return the policy of a file; one with a planner follows the subgoals of others, too.
+    """Return the policy of two files; one with a planner follows the subgoals of others, too.
 
     Args:
-        path: of the file.
+        files: of its body and its reader.
         seed: without effect, as nothing is random.
         actions: name of the action space, waypoint or joint_angle.
 
     Raises:
-        InvalidValueError: the file is none.
+        InvalidValueError: a file is none, or they do not fit.
         MissingDependencyError: there is no PyTorch.
     """
     from roboirg_learn.policy.joint_chunks import JointChunks, JointChunksOfHands
     from roboirg_learn.policy.learned_policy import LearnedPolicy
     from roboirg_learn.policy.subgoal_following import LearnedHands
 
-    model, version = _load(path)
-    made = (LearnedPolicy if model.planner is None else LearnedHands)(model, version, seed)
-    if actions == SPACES[0]:
-        return made
-    return JointChunksOfHands(made) if isinstance(made, LearnedHands) else JointChunks(made)
+    model = _load(files)
+    is_waypoint = actions == SPACES[0]
+    if model.body.planner is None:
+        policy = LearnedPolicy(model, seed)
+        return policy if is_waypoint else JointChunks(policy)
+    hands = LearnedHands(model, seed)
+    return hands if is_waypoint else JointChunksOfHands(hands)
 
 
-def _load(path: Path) -> tuple[PolicyModel, str]:
+def _load(files: PolicyFiles) -> PolicyModel:
+    """Return what files hold now."""
     check_learn_support()
-    version = file_version(path, "policy")
-    return _model(path, version), version
+    return _model(files, files.changed)
 
 
 @functools.lru_cache(maxsize=4)
-def _model(path: Path, version: str) -> PolicyModel:
-    """Return what a file of that version holds; episodes change nothing in it."""
-    del version
+def _model(files: PolicyFiles, changed: tuple[int, ...]) -> PolicyModel:
+    """Return what files that were written then hold; episodes change nothing in it."""
+    del changed
     from roboirg_learn.policy.policy_model import load_policy
 
-    return load_policy(path)
+    return load_policy(files)
 
 
 LEARNED = PolicyKind("learned", _learned)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import msgspec
@@ -23,8 +24,17 @@ from roboirg.extension.sight import (
 LATER_STEP = 40
 """Control step of a second look at scenes with a video: the containers have appeared by then."""
 Pixels = NDArray[np.uint8]
-_StoredViews = list[tuple[bytes, tuple[str, ...], list[list[float]], list[list[float]]]]
-"""Views in a file: fields as in `LabeledView`, the picture as PNG."""
+
+
+class _StoredView(NamedTuple):
+    """A view in a file: fields as in `LabeledView`, the picture as PNG."""
+
+    png: bytes
+    names: tuple[str, ...]
+    centers: list[list[float]]
+    positions: list[list[float]]
+
+
 NO_PICTURE: Pixels = np.zeros((0, 0, 3), np.uint8)
 """Stands for the picture where only labels were asked for."""
 
@@ -46,13 +56,16 @@ def pictures_to_see(first: Pixels, frames: Sequence[Pixels] | Pixels, every: int
     """
     if not len(frames):
         return [first]
-    return [frames[0], frames[min(LATER_STEP // every, len(frames) - 1)]]
+    later = min(LATER_STEP // every, len(frames) - 1)
+    return [frames[0], frames[later]]
 
 
 def look_as_played(episode: Episode) -> tuple[LabeledView, ...]:
     """Return the pictures that a listener looks at when it plays an episode; without labels."""
-    seen = pictures_to_see(*shown_to_policy(episode, LATER_STEP), LATER_STEP)
-    return tuple(LabeledView(one, (), _points_of([]), _points_of([])) for one in seen)
+    first, frames = shown_to_policy(episode, LATER_STEP)
+    pictures = pictures_to_see(first, frames, LATER_STEP)
+    nowhere = _points_of([])
+    return tuple(LabeledView(picture, (), nowhere, nowhere) for picture in pictures)
 
 
 def draw_missing(
@@ -64,38 +77,46 @@ def draw_missing(
 ) -> None:
     """Draw the views of episodes that a folder does not have, by `look` or `look_as_played`."""
     folder.mkdir(parents=True, exist_ok=True)
-    missing = [one for one in episodes if not _path(folder, one).exists()]
-    there = len(episodes) - len(missing)
-    for done, _ in enumerate(parallel_map(partial(_store, folder, draw), missing, workers), 1):
-        show(there + done, len(episodes))
+    missing = [episode for episode in episodes if not _path(folder, episode).exists()]
+    done = len(episodes) - len(missing)
+    for _ in parallel_map(partial(_store, folder, draw), missing, workers):
+        done += 1
+        show(done, len(episodes))
 
 
 def read_views(folder: Path, episode: Episode, *, pictures: bool) -> tuple[LabeledView, ...]:
     """Return the views of an episode from a folder, or only their labels."""
     path = _path(folder, episode)
     try:
-        stored = msgspec.msgpack.decode(path.read_bytes(), type=_StoredViews)
+        stored = msgspec.msgpack.decode(path.read_bytes(), type=list[_StoredView])
     except (OSError, msgspec.DecodeError) as error:
         raise InvalidValueError(f"{str(path)!r} cannot be read ({error}); delete it.") from error
-    return tuple(
-        LabeledView(decode_png(png) if pictures else NO_PICTURE, names, *map(_points_of, points))
-        for png, names, *points in stored
-    )
+    return tuple(_loaded(view, pictures=pictures) for view in stored)
+
+
+def _loaded(view: _StoredView, *, pictures: bool) -> LabeledView:
+    """Return a view of a file, with its picture or without."""
+    picture = decode_png(view.png) if pictures else NO_PICTURE
+    return LabeledView(picture, view.names, _points_of(view.centers), _points_of(view.positions))
 
 
 def _path(folder: Path, episode: Episode) -> Path:
+    """Return the file of an episode's views, whose name has all that they depend on."""
     return folder / f"{episode.key.replace('/', '-')}-{ENVIRONMENT_VERSION}.views"
 
 
 def _store(
     folder: Path, draw: Callable[[Episode], tuple[LabeledView, ...]], episode: Episode
 ) -> None:
+    """Draw the views of an episode and write them; runs in worker processes."""
     stored = []
-    for picture, names, *points in draw(episode):
-        png = cv2.imencode(".png", picture[..., ::-1])[1].tobytes()
-        stored.append((png, names, *(one.tolist() for one in points)))
+    for view in draw(episode):
+        _, png = cv2.imencode(".png", view.picture[..., ::-1])
+        centers = view.centers.tolist()
+        stored.append(_StoredView(png.tobytes(), view.names, centers, view.positions.tolist()))
     write_atomically(_path(folder, episode), msgspec.msgpack.encode(stored))
 
 
 def _points_of(points: Sequence[Sequence[float]]) -> NDArray[np.float32]:
+    """Return points as (n, 2), also without any."""
     return np.array(points, dtype=np.float32).reshape(-1, 2)

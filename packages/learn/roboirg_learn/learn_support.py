@@ -1,41 +1,21 @@
-"""What all that is learned needs: PyTorch, and fingerprints of files."""
+"""What all that is learned needs: PyTorch and safetensors."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from roboirg.extension.commands import InvalidValueError, MissingDependencyError, short_hash
+from roboirg.extension.commands import MissingDependencyError
 
 
 def check_learn_support() -> None:
-    """Check early that PyTorch is there, and let it use one thread.
+    """Check early that PyTorch and safetensors are there, and let PyTorch use one thread.
 
     Networks this small are slower on two as soon as anything else runs.
     """
     try:
+        import safetensors  # noqa: F401 - only whether it is there
         import torch
     except ImportError as error:
         raise MissingDependencyError(
-            f"What is learned needs PyTorch, which cannot be imported ({error}); "
-            "run: pip install torch"
+            f"What is learned needs PyTorch and safetensors, which cannot be imported ({error}); "
+            "run: pip install torch safetensors"
         ) from error
     torch.set_num_threads(1)
-
-
-def file_version(path: Path, kind: str) -> str:
-    """Return a fingerprint of a file that was learned.
-
-    Args:
-        path: the file.
-        kind: what it is: ``listener`` or ``policy``.
-
-    Raises:
-        InvalidValueError: it cannot be read.
-    """
-    try:
-        return short_hash(path.read_bytes())
-    except OSError as error:
-        raise InvalidValueError(
-            f"The trained {kind} {str(path)!r} cannot be read ({error.strerror}); make one with: "
-            f"roboirg learn {kind} --out PATH."
-        ) from error

@@ -1,22 +1,115 @@
-"""Files of what was learned: plain tensors and data, of which nothing is executed."""
+"""Files of what was learned: tensors, and a description as JSON, of which nothing is executed."""
 
 from __future__ import annotations
 
 import io
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import torch
-from torch import nn
+from safetensors import safe_open
+from safetensors.torch import save
+from torch import Tensor, nn
 
-from roboirg.extension.commands import InvalidValueError, write_atomically
+from roboirg.extension.commands import InvalidValueError, short_hash, write_atomically
 
+FORMAT = 1
+"""Version of the layout of the files."""
+DESCRIPTION = "roboirg"
+"""Key of a file's metadata under which its description stands."""
+END = ".safetensors"
+"""Of the names of these files."""
 Trained = TypeVar("Trained")
 
 
-def save_trained(content: Mapping[str, Any], path: Path) -> None:
+class TrainedFile(NamedTuple):
+    """What a file holds.
+
+    Attributes:
+        about: what is needed to make the networks, as plain data; its ``plan`` says how they were
+            trained.
+        tensors: by name; those of a network begin with its name and a dot.
+    """
+
+    about: dict[str, Any]
+    tensors: dict[str, Tensor]
+
+    @property
+    def version(self) -> str:
+        """Fingerprint of plan and tensors; in what layout they are stored is no part."""
+        content = json.dumps(self.about["plan"], sort_keys=True)
+        for name, tensor in sorted(self.tensors.items()):
+            numbers = short_hash(tensor.numpy().tobytes())
+            content += f"\n{name} {tensor.dtype} {list(tensor.shape)} {numbers}"
+        return short_hash(content)
+
+    def load(self, nets: nn.ModuleDict) -> None:
+        """Give networks the weights that the file has under their names, ready to be used."""
+        own = {name: tensor for name, tensor in self.tensors.items() if "." in name}
+        nets.load_state_dict(own)
+        nets.eval()
+
+
+def save_trained(
+    kind: str,
+    about: Mapping[str, Any],
+    nets: nn.ModuleDict,
+    tensors: Mapping[str, Tensor],
+    path: Path,
+) -> None:
     """Write what was learned, whole or not at all.
+
+    Args:
+        kind: what it is: ``listener``, ``body`` or ``reader``.
+        about: as in `TrainedFile`.
+        nets: the networks by their names.
+        tensors: other numbers, by names without dots.
+        path: of the file.
+
+    Raises:
+        InvalidValueError: the file cannot be written.
+    """
+    description = json.dumps({"kind": kind, "format": FORMAT, **about})
+    content = {**tensors, **nets.state_dict()}
+    write_atomically(path, save(content, {DESCRIPTION: description}))
+
+
+def load_trained(path: Path, kind: str, read: Callable[[TrainedFile], Trained]) -> Trained:
+    """Return what was learned.
+
+    Args:
+        path: the file.
+        kind: as in `save_trained`.
+        read: makes the result of the file's content.
+
+    Raises:
+        InvalidValueError: the file is none of that kind.
+    """
+    try:
+        with safe_open(path, framework="pt") as file:
+            about = json.loads(file.metadata()[DESCRIPTION])
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        found = f"{about['kind']} of format {about['format']}"
+        if found != f"{kind} of format {FORMAT}":
+            raise InvalidValueError(f"it is a {found}")
+        return read(TrainedFile(about, tensors))
+    except Exception as error:
+        raise InvalidValueError(
+            f"{str(path)!r} is no trained {kind} ({_reason(error)}); roboirg learn makes one."
+        ) from error
+
+
+def _reason(error: Exception) -> str:
+    """Return in a few words why a file could not be loaded."""
+    if isinstance(error, (OSError, InvalidValueError)):
+        return str(error).removesuffix(".")
+    return "it is damaged, or was not written by this version"
+
+
+def save_unfinished(content: Mapping[str, Any], path: Path) -> None:
+    """Write what was learned on the way, whole or not at all.
 
     Raises:
         InvalidValueError: the file cannot be written.
@@ -37,46 +130,3 @@ def load_unfinished(path: Path, made_of: object) -> dict[str, Any] | None:
             f"{str(path)!r} cannot be read ({type(error).__name__}); delete it to learn it again."
         ) from error
     return content if content.get("made_of") == made_of else None
-
-
-def load_nets(nets: Mapping[str, nn.Module], content: Mapping[str, Any]) -> None:
-    """Give networks the weights that a file has under their names, ready to be used."""
-    for name, net in nets.items():
-        net.load_state_dict(content[name])
-        net.eval()
-
-
-def load_trained(
-    path: Path, kind: str, file_format: str, read: Callable[[Mapping[str, Any]], Trained]
-) -> Trained:
-    """Return what was learned.
-
-    Args:
-        path: the file.
-        kind: what it is: ``listener`` or ``policy``.
-        file_format: that the file must name as its ``format``.
-        read: makes the result of the file's content.
-
-    Raises:
-        InvalidValueError: the file is none of that kind.
-    """
-    try:
-        content = torch.load(path, weights_only=True, map_location="cpu")
-        found = content.get("format") if isinstance(content, dict) else None
-        if found != file_format:
-            raise InvalidValueError(f"its format is not {file_format!r}, but {found!r}")
-        return read(content)
-    except Exception as error:
-        raise InvalidValueError(
-            f"{str(path)!r} is no trained {kind} ({_reason(error)}); "
-            f"make one with: roboirg learn {kind}."
-        ) from error
-
-
-def _reason(error: Exception) -> str:
-    """Return in a few words why a file could not be loaded."""
-    if isinstance(error, OSError):
-        return error.strerror or str(error)
-    if isinstance(error, InvalidValueError):
-        return str(error).splitlines()[0].removesuffix(".")
-    return "it is damaged, or was not written by this version"

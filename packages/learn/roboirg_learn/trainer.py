@@ -1,9 +1,14 @@
-"""Training of small networks: batches, and steps with a falling rate."""
+"""Training of small networks: batches, and steps with a falling rate.
+
+An epoch is a pass over all that is learned from, a batch is what one step learns from. A training
+is kept in a file after each epoch, so that a command that was killed goes on.
+"""
 
 from __future__ import annotations
 
 import math
 import random
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
@@ -11,10 +16,18 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 import torch
 from torch import nn
 
-from roboirg_learn.trained_file import load_unfinished, save_trained
+from roboirg_learn.trained_file import load_unfinished, save_unfinished
 
 BATCH = 32
-One = TypeVar("One")
+RISING_SHARE = 0.1
+"""Of all steps, those in which the rate rises."""
+SPOILED_TOTAL = 10
+"""With so many steps the rising tenth would last no time, by which PyTorch divides."""
+MOST_GRADIENT = 1.0
+"""Norm to which gradients are clipped."""
+Item = TypeVar("Item")
+Curve = list[dict[str, float]]
+"""Of each pass the mean loss, and the score after it."""
 
 
 class Progress(Protocol):
@@ -41,7 +54,7 @@ def batch_count(lessons: Sequence[object]) -> int:
     return math.ceil(len(lessons) / BATCH)
 
 
-def batches(lessons: Sequence[One], rng: random.Random, size: int = BATCH) -> Iterator[list[One]]:
+def batches(lessons: Sequence[Item], rng: random.Random, size: int = BATCH) -> Iterator[list[Item]]:
     """Yield lessons in random order, in batches."""
     mixed = rng.sample(lessons, len(lessons))
     for start in range(0, len(mixed), size):
@@ -49,86 +62,117 @@ def batches(lessons: Sequence[One], rng: random.Random, size: int = BATCH) -> It
 
 
 def even_batches(
-    lessons: Sequence[One], rng: random.Random, length: Callable[[One], int], size: int = BATCH
-) -> Iterator[list[One]]:
+    lessons: Sequence[Item], rng: random.Random, length: Callable[[Item], int], size: int = BATCH
+) -> Iterator[list[Item]]:
     """Yield batches of lessons that are about equally long, which wastes no time on padding."""
     mixed = sorted(rng.sample(lessons, len(lessons)), key=length)
     found = [mixed[start : start + size] for start in range(0, len(mixed), size)]
     yield from rng.sample(found, len(found))
 
 
-class Trainer(Generic[One]):
-    """Trains a network with AdamW; the rate falls to zero along a cosine."""
+class Course(ABC, Generic[Item]):
+    """What a network learns: in which order, for how long, and how wrong it is.
 
-    def __init__(
-        self,
-        net: nn.Module,
-        loss_of: Callable[[Sequence[One]], torch.Tensor],
-        rate: float,
-        steps: int,
-    ) -> None:
-        self._net, self._loss_of = net, loss_of
-        self._optimizer = torch.optim.AdamW(net.parameters(), lr=rate, weight_decay=0.01)
-        # With ten steps the rising tenth would last no time, by which PyTorch divides.
-        total = max(steps, 1) + (steps == 10)  # noqa: PLR2004
-        self._schedule = torch.optim.lr_scheduler.OneCycleLR(
-            self._optimizer, rate, total_steps=total, pct_start=0.1
+    Attributes:
+        net: the network, untrained at first.
+        rate: the greatest learning rate, between a short rise and a long fall.
+        epochs: passes over all that is learned from.
+        steps: batches of a pass.
+    """
+
+    net: nn.Module
+    rate: float
+    epochs: int
+    steps: int
+
+    @abstractmethod
+    def batches(self, epoch: int) -> Iterable[Sequence[Item]]:
+        """Return what is learned from in a pass, numbered from 0."""
+
+    @abstractmethod
+    def loss(self, batch: Sequence[Item]) -> torch.Tensor:
+        """Return how wrong the network is about a batch."""
+
+    def score(self) -> Mapping[str, float]:
+        """Return how good the network is now, by the names of measures."""
+        return {}
+
+
+class Training:
+    """Trains a network with AdamW; the rate falls to zero along a cosine.
+
+    Args:
+        course: what it learns.
+    """
+
+    def __init__(self, course: Course[Any]) -> None:
+        self._course = course
+        self._net = course.net
+        self._optimizer = torch.optim.AdamW(
+            course.net.parameters(), lr=course.rate, weight_decay=0.01
         )
+        total = max(course.epochs * course.steps, 1)
+        if total == SPOILED_TOTAL:
+            total += 1
+        self._schedule = torch.optim.lr_scheduler.OneCycleLR(
+            self._optimizer, course.rate, total_steps=total, pct_start=RISING_SHARE
+        )
+        self._curve: list[dict[str, float]] = []
 
-    def run(self, batches: Iterable[Sequence[One]]) -> float:
+    def run(self, show: Callable[[int, int, str], None], kept: KeptTraining) -> Curve:
+        """Learn in all passes, or go on where a training that was kept ended.
+
+        Args:
+            show: called after each pass with its number from 1, with all, and how well it goes.
+            kept: where the training is kept.
+        """
+        self._restore(kept)
+        epochs = self._course.epochs
+        for epoch in range(len(self._curve), epochs):
+            loss = self._learn_from(self._course.batches(epoch))
+            self._net.eval()
+            with torch.no_grad():
+                measures = {"loss": loss, **self._course.score()}
+            self._curve.append(measures)
+            self._keep(kept)
+            note = ", ".join(f"{name} {value:.3f}" for name, value in measures.items())
+            show(epoch + 1, epochs, note)
+        self._net.eval()
+        return self._curve
+
+    def _learn_from(self, batches: Iterable[Sequence[Any]]) -> float:
         """Take a step for each batch; returns the mean loss."""
         self._net.train()
         losses = []
         for batch in batches:
             self._optimizer.zero_grad()
-            loss: Any = self._loss_of(batch)
+            loss: Any = self._course.loss(batch)
             loss.backward()
             losses.append(float(loss.detach()))
-            nn.utils.clip_grad_norm_(self._net.parameters(), 1.0)
+            nn.utils.clip_grad_norm_(self._net.parameters(), MOST_GRADIENT)
             self._optimizer.step()
             self._schedule.step()
         return sum(losses) / max(1, len(losses))
 
-    def learn(
-        self,
-        passes: int,
-        batches: Callable[[int], Iterable[Sequence[One]]],
-        show: Callable[[int, int, str], None],
-        kept: KeptTraining,
-        score: Callable[[], Mapping[str, float]] = dict,
-    ) -> list[dict[str, float]]:
-        """Learn in several passes, or go on where a training that was kept ended.
+    @property
+    def _parts(self) -> dict[str, Any]:
+        """What changes from step to step, by its name in the file."""
+        return {"net": self._net, "optimizer": self._optimizer, "schedule": self._schedule}
 
-        Returns the mean loss of each pass, with the score after it.
-
-        Args:
-            passes: how many.
-            batches: of a pass, by its number from 0.
-            show: called after each pass with its number from 1, with all, and how well it goes.
-            kept: where the training is kept.
-            score: how good the network is now.
-        """
-        parts: dict[str, Any] = {
-            "net": self._net,
-            "optimizer": self._optimizer,
-            "schedule": self._schedule,
-        }
+    def _restore(self, kept: KeptTraining) -> None:
+        """Take up the training of a file, with PyTorch's random numbers, if it fits."""
         state = load_unfinished(kept.path, kept.made_of)
-        found: list[dict[str, float]] = []
-        if state is not None and "found" in state:
-            for name, part in parts.items():
-                part.load_state_dict(state[name])
-            torch.set_rng_state(state["random"])
-            found = state["found"]
-        for number in range(len(found), passes):
-            loss = self.run(batches(number))
-            self._net.eval()
-            with torch.no_grad():
-                found.append({"loss": loss, **score()})
-            state = {name: part.state_dict() for name, part in parts.items()}
-            state |= {"random": torch.get_rng_state(), "found": found, "made_of": kept.made_of}
-            save_trained(state, kept.path)
-            note = ", ".join(f"{name} {value:.3f}" for name, value in found[-1].items())
-            show(number + 1, passes, note)
-        self._net.eval()
-        return found
+        if state is None or "found" not in state:
+            return
+        for name, part in self._parts.items():
+            part.load_state_dict(state[name])
+        torch.set_rng_state(state["random"])
+        self._curve = state["found"]
+
+    def _keep(self, kept: KeptTraining) -> None:
+        """Write all that is needed to go on after this pass."""
+        state = {name: part.state_dict() for name, part in self._parts.items()}
+        state["random"] = torch.get_rng_state()
+        state["found"] = self._curve
+        state["made_of"] = kept.made_of
+        save_unfinished(state, kept.path)

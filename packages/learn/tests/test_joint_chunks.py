@@ -19,8 +19,8 @@ class Rehearsed(LearnedPolicy):
     """Returns waypoints in order, and keeps what it sees."""
 
     def __init__(self, waypoints):
-        words = SimpleNamespace(tasks=("ButtonUnmask",))
-        super().__init__(SimpleNamespace(vocabulary=words), "rehearsed")
+        reader = SimpleNamespace(plan={"tasks": ["ButtonUnmask"]})
+        super().__init__(SimpleNamespace(reader=reader, version="rehearsed"))
         self.waypoints, self.pictures, self.tools = waypoints, [], []
 
     def reset(self, instruction, demonstration):

@@ -1,6 +1,8 @@
 """The policy that learns to act: what it is recorded from, its file, its command, and its play."""
 
 import json
+import shlex
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,29 +13,46 @@ from typer.testing import CliRunner
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.envs.factory import make
-from roboirg.evaluation.records.store import read_records
 from roboirg.extension.sight import ExpertRecording, record_expert
+from roboirg.language.settings import plain_settings
 from roboirg.main import app
 from roboirg.policies import play
 from roboirg.policies.builtin.waypoint_expert import WaypointExpert
 from roboirg.policies.by_name.finding import make_policy, read_policy
+from roboirg.records.store import read_records
+from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import locked
+from roboirg_learn.commands import print_policy
+from roboirg_learn.listener.reader_plan import ReaderPlan
 from roboirg_learn.policy.moves import common_moves, decisions_of
-from roboirg_learn.policy.policy_plan import PolicyPlan, Recorded
+from roboirg_learn.policy.policy_files import PolicyFiles
+from roboirg_learn.policy.policy_plan import BodyPlan, Recorded
 from roboirg_learn.policy.recording_files import load_recording, save_recording
 from roboirg_learn.policy.sight import sight_of, turns_of
 
-
-@pytest.mark.parametrize("kind", ["trained", "learned"])
-@pytest.mark.parametrize(
-    ("named", "words"),
-    [("", "names no file"), ("a.pt?speed=2", "no option of"), ("none.pt", "No such file")],
+RESULTS = Path(__file__).parents[3] / "results"
+SHIPPED = PolicyFiles(
+    RESULTS / "recurrent.body.safetensors", RESULTS / "recurrent.reader.safetensors"
 )
-def test_wrong_names_are_one_sentence(kind, named, words):
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        ("learned:", "names no file"),
+        ("learned:a?speed=2", "no option of"),
+        ("learned:none", "No such file"),
+        ("trained:", "names no file"),
+        ("trained:a?reader=b&speed=2", "no option of"),
+        ("trained:none?reader=b", "'none' is no trained body .No such file"),
+        ("trained:a", r"no reader of words; name one with \?reader=FILE. Train .* --body a --out"),
+    ],
+)
+def test_wrong_names_are_one_sentence(spec, words):
     pytest.importorskip("torch")
     with pytest.raises(InvalidValueError, match=words):
-        make_policy(f"{kind}:{named}", 0)
+        make_policy(spec, 0)
 
 
 @pytest.mark.sim
@@ -98,13 +117,14 @@ def test_a_move_that_was_not_made_has_the_label_of_the_one_that_was():
 @pytest.mark.sim
 def test_an_interrupted_training_goes_on_where_it_was(recorded, tmp_path):
     torch = pytest.importorskip("torch")
-    from roboirg_learn.listener.vocabulary import make_vocabulary
-    from roboirg_learn.policy.body_training import train_body
+    from roboirg_learn.listener.vocabulary import parts_of_tasks
+    from roboirg_learn.policy.body_training import BodyLayout, BodyLesson, train_body
+    from roboirg_learn.policy.trained_body import GoalLayout
 
-    plan = PolicyPlan(("ButtonUnmask",), 3, body_epochs=4)
+    plan = BodyPlan(("ButtonUnmask",), body_epochs=4)
     episode = get_episode("ButtonUnmask", "random", 0)
     sight, decisions = sight_of([recorded]), decisions_of(recorded)
-    vocabulary = make_vocabulary([""], sight.classes, plan.tasks)
+    goals = GoalLayout(plan.tasks, parts_of_tasks(plan.tasks))
 
     def stop(work, done, total, note):
         if done == 2:
@@ -113,11 +133,9 @@ def test_an_interrupted_training_goes_on_where_it_was(recorded, tmp_path):
     def train(name, progress):
         folder = tmp_path / name
         folder.mkdir(exist_ok=True)
-        learned = [Recorded(episode, recorded)] * 3
-        moves = common_moves([decisions])
-        return train_body(
-            plan, learned, [decisions] * 3, moves, sight, vocabulary, folder, progress
-        )
+        lessons = [BodyLesson(Recorded(episode, recorded), decisions)] * 3
+        layout = BodyLayout(sight, goals, common_moves([decisions]))
+        return train_body(plan, lessons, layout, folder, progress)
 
     whole = train("whole", lambda *_: None)
     with pytest.raises(KeyboardInterrupt):
@@ -175,21 +193,52 @@ def test_a_recording_is_read_as_it_was_written(recorded, tmp_path):
 
 def test_a_file_that_cannot_be_loaded_is_said_with_the_reason(tmp_path):
     torch = pytest.importorskip("torch")
-    from roboirg_learn.trained_file import load_trained
+    from safetensors.torch import save_file
 
-    path = tmp_path / "policy.pt"
+    from roboirg_learn.trained_file import DESCRIPTION, load_trained, save_trained
+
+    path = tmp_path / "a.body"
     path.write_bytes(b"nothing")
-    with pytest.raises(InvalidValueError, match="it is damaged"):
-        load_trained(path, "policy", "this", dict)
-    for content, words in (
-        ([1], "its format is not 'this'"),
-        ({"format": "that"}, "its format is not 'this'"),
-        ({"format": "this"}, "it is damaged"),
+    with pytest.raises(InvalidValueError, match="it is damaged, or was not"):
+        load_trained(path, "body", list)
+    for description, words in (
+        ({}, "it is damaged"),
+        ({"kind": "body", "format": 0}, "it is a body of format 0"),
+        ({"kind": "reader", "format": 1}, "it is a reader of format 1"),
+        ({"kind": "body", "format": 1}, "it is damaged"),
     ):
-        torch.save(content, path)
+        save_file({"a": torch.zeros(1)}, path, {DESCRIPTION: json.dumps(description)})
         with pytest.raises(InvalidValueError, match=words):
-            load_trained(path, "policy", "this", lambda content: content["body"])
-    assert load_trained(path, "policy", "this", dict) == {"format": "this"}
+            load_trained(path, "body", lambda file: file.about["plan"])
+    save_trained("body", {"plan": {}}, torch.nn.ModuleDict(), {"a": torch.zeros(1)}, path)
+    assert load_trained(path, "body", lambda file: file.about["plan"]) == {}
+
+
+def test_a_version_is_of_plan_and_tensors_and_not_of_the_file(tmp_path):
+    """Else a file that is written anew would be another policy, or one trained anew the same."""
+    torch = pytest.importorskip("torch")
+    from roboirg_learn.trained_file import TrainedFile, load_trained, save_trained
+
+    def version(plan, weight, name="heights", **more):
+        path = tmp_path / "a.body"
+        nets = torch.nn.ModuleDict({"net": torch.nn.Linear(1, 1)})
+        torch.nn.init.constant_(nets["net"].weight, weight)
+        torch.nn.init.zeros_(nets["net"].bias)
+        save_trained("body", {"plan": plan, **more}, nets, {name: torch.zeros(2)}, path)
+        return load_trained(path, "body", lambda file: file).version
+
+    first = version({"seed": 0, "tasks": ["BinFill"]}, 1.0)
+    assert version({"tasks": ["BinFill"], "seed": 0}, 1.0, moves=[1]) == first
+    others = [
+        version({"seed": 1, "tasks": ["BinFill"]}, 1.0),
+        version({"seed": 0, "tasks": ["BinFill"]}, 2.0),
+        version({"seed": 0, "tasks": ["BinFill"]}, 1.0, "depths"),
+    ]
+    assert len({first, *others}) == 4
+    row, column = torch.zeros(1, 2), torch.zeros(2, 1)
+    assert TrainedFile({"plan": {}}, {"a": row}).version != (
+        TrainedFile({"plan": {}}, {"a": column}).version
+    )
 
 
 @settings(max_examples=25)
@@ -205,10 +254,10 @@ def test_each_task_is_learned_and_shows_how_training_goes(tasks):
         assert sum(own) == (len(own) + HELD_BACK - 2) // HELD_BACK
 
 
-def learn(*options):
+def learn(*options, what="policy"):
     """Return the error of the command with wrong options."""
     pytest.importorskip("torch")
-    done = CliRunner().invoke(app, ["learn", "policy", *map(str, options)])
+    done = CliRunner().invoke(app, ["learn", what, *map(str, options)])
     assert isinstance(done.exception, InvalidValueError), done.output
     return str(done.exception)
 
@@ -240,6 +289,7 @@ def test_what_cannot_be_learned_is_said_before_anything_is_recorded(tmp_path, mo
     assert not (out / "recordings").exists()
 
 
+BODY, READER = "recurrent-0.body.safetensors", "explicit-0.reader.safetensors"
 FEW = {"scenes": 3, "drawn": 2, "detector_epochs": 1, "body_epochs": 2, "reader_epochs": 1}
 
 
@@ -252,15 +302,14 @@ def folder(tmp_path_factory):
     call = ["learn", "policy", "--tasks", "ButtonUnmask", "--out", str(folder), "--plan", plan]
     done = CliRunner().invoke(app, [*call, "--workers", "0"])
     assert done.exit_code == 0, done.output
-    assert done.output.endswith(" --wordings test --out runs/recurrent-explicit-0\n")
+    assert PolicyFiles(folder / BODY, folder / READER).spec in done.output
     return folder, call
 
 
 @pytest.mark.sim
 @pytest.mark.slow
 def test_the_command_makes_a_policy_that_plays_by_pictures_alone(folder, tmp_path):
-    path = folder[0] / "recurrent-explicit-0.pt"
-    spec = f"trained:{path}"
+    spec = PolicyFiles(folder[0] / BODY, folder[0] / READER).spec
     assert (read_policy(spec).is_privileged, read_policy(spec).is_hosted) == (False, True)
     assert read_policy(spec).needs.trained_tasks == ("ButtonUnmask",)
     assert not hasattr(make_policy(spec, 0), "attach")
@@ -269,7 +318,7 @@ def test_the_command_makes_a_policy_that_plays_by_pictures_alone(folder, tmp_pat
     done = CliRunner().invoke(app, [*call, "--episodes", "1", "--out", str(out)])
     assert done.exit_code == 0, done.output
     played = read_records(next(out.rglob("records.jsonl")).parent)
-    memories = [(one.error, one.policy_metadata["trained"]["memory"]) for one in played]
+    memories = [(one.error, one.policy_metadata["trained"]["body"]["memory"]) for one in played]
     assert memories == [(None, "recurrent")] * 2
     curve = json.loads((folder[0] / "body-recurrent-0.json").read_text())
     assert [one["epoch"] for one in curve] == [1, 2]
@@ -286,7 +335,83 @@ def test_what_is_there_is_used_again_and_another_plan_loses_nothing(folder):
         ([*call[2:], plan_file(training=FEW | {"body_epochs": 3})], "was trained by another plan"),
     ):
         assert words in learn(*options)
+    other = ["--body", place / BODY, "--out", place / "new", "--tasks", "BinFill"]
+    assert "no task of this body 'BinFill'" in learn(*other, what="reader")
     done = CliRunner().invoke(app, [*call, plan, "--memory", "none", "--settings", "none"])
     assert done.exit_code == 0, done.output
-    assert (place / "none-none-0.pt").exists()
+    assert (place / "none-0.body.safetensors").exists()
+    assert (place / "none-0.reader.safetensors").exists()
     assert {path: path.stat().st_mtime_ns for path in before} == before
+
+
+@pytest.mark.sim
+def test_a_reader_is_trained_for_a_body_that_is_there_and_goes_on_where_it_was(tmp_path):
+    """No expert plays, and a command that was killed trains the passes that are left."""
+    pytest.importorskip("torch")
+    from roboirg_learn.policy.trained_body import load_body
+    from roboirg_learn.policy.trained_reader import load_reader
+
+    out = tmp_path / "new.reader"
+    few = plan_file(training={"scenes": 2, "reader_epochs": 2})
+    call = ["learn", "reader", "--body", str(SHIPPED.body), "--out", str(out), "--plan", few]
+    call += ["--tasks", "StopCube", "--settings", "explicit,direct", "--workers", "0"]
+    whole = CliRunner().invoke(app, call)
+    assert whole.exit_code == 0, whole.output
+    assert PolicyFiles(SHIPPED.body, out).spec in whole.output
+    reader, body = load_reader(out), load_body(SHIPPED.body)
+    assert (reader.plan["tasks"], reader.plan["body"]) == (["StopCube"], body.version)
+    assert reader.vocabulary[1:] == (body.sight.classes, *body.goals)
+    assert not list(tmp_path.rglob("recordings"))
+    out.unlink()
+    again = CliRunner().invoke(app, call)
+    assert again.exit_code == 0, again.output
+    assert "reader: 1 of 2" not in again.output
+    assert load_reader(out).version == reader.version
+
+
+def test_what_is_printed_to_be_played_can_be_played(capsys):
+    """Names of all settings are refused where a task lacks one of them."""
+    plan = ReaderPlan(("StopCube", "BinFill"), tuple(plain_settings()))
+    print_policy(PolicyFiles(Path("a"), Path("my b")), plan)
+    words = shlex.split(capsys.readouterr().out.partition("roboirg run ")[2])
+    options = dict(zip(words[::2], words[1::2], strict=True))
+    assert options["--policy"] == "trained:a?reader=my%20b"
+    make_plan(policies=["oracle"], tasks=plan.tasks, settings=options["--settings"], split="val")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (("--body", "none"), "'none' is no trained body"),
+        (("--tasks", "PickUp"), "no task 'PickUp'"),
+        (("--settings", "never"), "no setting 'never'"),
+    ],
+)
+def test_a_reader_that_cannot_be_trained_is_said_first(options, words, tmp_path):
+    given = ["--body", SHIPPED.body, "--out", tmp_path / "a", *options]
+    assert words in learn(*given, what="reader")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_reader_of_other_things_or_goals_does_not_fit(tmp_path):
+    """Else it would name numbers that mean something else to the body."""
+    pytest.importorskip("torch")
+    from untrained import reader_for
+
+    from roboirg_learn.policy.policy_model import load_policy
+    from roboirg_learn.policy.trained_body import GoalLayout, load_body
+    from roboirg_learn.policy.trained_reader import save_reader
+
+    body = load_body(SHIPPED.body)
+    files = PolicyFiles(SHIPPED.body, tmp_path / "a.reader")
+    parts = body.goals.parts
+    for classes, goals in (
+        (body.sight.classes[1:], body.goals),
+        (body.sight.classes, GoalLayout(body.goals.tasks[::-1], parts)),
+        (body.sight.classes, GoalLayout(body.goals.tasks, ("color=pink", *parts))),
+    ):
+        save_reader(reader_for(classes, goals), files.reader)
+        with pytest.raises(InvalidValueError, match="does not fit the body"):
+            load_policy(files)
+    save_reader(reader_for(body.sight.classes, body.goals), files.reader)
+    assert load_policy(files).reader.vocabulary.tasks == body.goals.tasks

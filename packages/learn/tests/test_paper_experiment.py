@@ -8,9 +8,10 @@ import pandas as pd
 import pytest
 from published_results import like_published
 
+from roboirg.analysis.results.frame import make_frame
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.analysis.results.frame import make_frame
-from roboirg.evaluation.plan.plan_maker import make_plan
+from roboirg.policies.by_name.policy_kinds import split_spec
+from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 from roboirg_learn.policy.paper_experiment import (
@@ -22,8 +23,12 @@ from roboirg_learn.policy.paper_experiment import (
     row_name,
 )
 from roboirg_learn.policy.paper_page import answers_text
+from roboirg_learn.policy.policy_files import PolicyFiles
 
-FILES = {row_name(memory): Path(f"{memory}-explicit-0.pt") for memory in SYSTEMS}
+FILES = {
+    row_name(memory): PolicyFiles(Path(f"{memory}.body"), Path("my words.reader"))
+    for memory in SYSTEMS
+}
 ROW_OF = {system: row_name(memory) for memory, system in SYSTEMS.items()}
 
 
@@ -41,6 +46,15 @@ def test_each_part_plays_the_cells_of_the_paper(part, cells, policies):
     options = part_options(part, ExperimentPlan(), FILES, {"episodes": "2"})
     assert len(options["policy"]) == policies
     assert len(played(options)) == cells * 2
+
+
+def test_rows_and_the_hands_of_others_name_body_and_reader():
+    policies = part_options("planner", ExperimentPlan(), FILES, {})["policy"]
+    hands = [dict(split_spec(name, spec).options) for name, spec in policies.items()]
+    own = "trained:subgoal.body?reader=my%20words.reader"
+    assert policies["small-subgoal"] == own
+    assert {"hands": own} in hands
+    assert {"reader": "my words.reader", "hands": "scripted"} in hands
 
 
 def test_held_out_words_are_spoken_in_every_split():

@@ -141,39 +141,33 @@ def test_what_is_replayed_is_what_a_planner_that_is_right_would_be_given():
     assert [recent_looks(9)[place] for place in np.flatnonzero(planned.keys[3] == 1)] == [6]
 
 
-def policy_of(memory):
-    """Return a policy that has learned nothing."""
-    torch = pytest.importorskip("torch")
-    from roboirg_learn.listener.listener_net import ListenerNet
-    from roboirg_learn.listener.vocabulary import make_vocabulary
-    from roboirg_learn.policy.moves import Move
-    from roboirg_learn.policy.policy_model import PolicyModel, make_body
-    from roboirg_learn.policy.policy_plan import HANDS
-    from roboirg_learn.policy.task_net import TaskNet
-    from roboirg_learn.policy.thing_detector import ThingDetector
-
-    torch.manual_seed(0)
-    vocabulary = make_vocabulary(["pick the cube"], SIGHT.classes, ["PickXtimes"])
-    moves = Move(True, 0.0, 0.0, 0.15, "align", 0.0), Move(False, 0.0, 0.0, 0.1, "keep", 0.0)
-    forms = forms_of([get_episode("PickXtimes", "train", 0)])
-    nets = [make_body(SIGHT, vocabulary, moves, HANDS), make_body(SIGHT, vocabulary, forms, memory)]
-    every = [ThingDetector(len(SIGHT.classes)), TaskNet(vocabulary), ListenerNet(vocabulary), *nets]
-    for net in every:
-        net.eval()
-    about = {"words": "train"}
-    return PolicyModel(
-        SIGHT, every[0], vocabulary, every[1], every[2], np.zeros((4, 2)), moves, memory, nets[0],
-        about, forms, nets[1],
-    )  # fmt: skip
-
-
 @pytest.fixture(params=["subgoal", "keyframes"])
 def saved(request, tmp_path):
-    policy, path = policy_of(request.param), tmp_path / "policy.pt"
-    from roboirg_learn.policy.policy_model import save_policy
+    """Return the files of a policy with a planner that has learned nothing."""
+    torch = pytest.importorskip("torch")
+    from untrained import reader_for
 
-    save_policy(policy, path)
-    return path
+    from roboirg_learn.listener.vocabulary import parts_of_tasks
+    from roboirg_learn.policy.moves import Move
+    from roboirg_learn.policy.policy_files import PolicyFiles
+    from roboirg_learn.policy.policy_plan import HANDS, BodyPlan
+    from roboirg_learn.policy.thing_detector import ThingDetector
+    from roboirg_learn.policy.trained_body import GoalLayout, TrainedBody, make_body, save_body
+    from roboirg_learn.policy.trained_reader import save_reader
+
+    torch.manual_seed(0)
+    goals = GoalLayout(("PickXtimes",), parts_of_tasks(["PickXtimes"]))
+    moves = Move(True, 0.0, 0.0, 0.15, "align", 0.0), Move(False, 0.0, 0.0, 0.1, "keep", 0.0)
+    forms = forms_of([get_episode("PickXtimes", "train", 0)])
+    acts = make_body(SIGHT, goals, moves, HANDS)
+    plans = make_body(SIGHT, goals, forms, request.param)
+    plan = BodyPlan(goals.tasks, request.param).about
+    detector = ThingDetector(len(SIGHT.classes))
+    body = TrainedBody(SIGHT, detector, goals, moves, acts, plan, forms, plans)
+    files = PolicyFiles(tmp_path / "a.body", tmp_path / "a.reader")
+    save_body(body, files.body)
+    save_reader(reader_for(SIGHT.classes, goals), files.reader)
+    return files
 
 
 def observation_of(seed=0):
@@ -198,7 +192,7 @@ def test_hands_follow_any_planner_and_name_their_own_subgoals_without_one(saved)
     hands.reset("pick the cube", NO_VIDEO)
     assert hands.act(observation_of()).shape == (1, 7)
     words = split_point(hands.subgoal)[0]
-    assert words in {SubgoalForm(form.words).at(None) for form in hands.model.forms}
+    assert words in {SubgoalForm(form.words).at(None) for form in hands.model.body.forms}
     hands.follow("press the button at <100, 90>")
     hands.act(observation_of())
     assert hands.subgoal == "press the button at <100, 90>"
@@ -217,7 +211,7 @@ def test_a_learned_planner_leads_the_scripted_hands_and_others_lead_learned_ones
     from roboirg.policies.by_name.finding import make_policy, read_policy
     from roboirg_learn.policy.subgoal_following import LearnedHands, LearnedPlanner
 
-    own, scripted = f"trained:{saved}", f"trained:{saved}?hands=scripted"
+    own, scripted = saved.spec, f"{saved.spec}&hands=scripted"
     assert read_policy(own).is_hosted
     assert not read_policy(own).is_privileged
     assert read_policy(scripted).is_privileged
@@ -228,9 +222,8 @@ def test_a_learned_planner_leads_the_scripted_hands_and_others_lead_learned_ones
     policy = make_policy(f"planner:oracle?hands={own}", 0)
     assert isinstance(policy.policy, LearnedHands)
     assert policy.actions == "waypoint"
-    assert (
-        make_policy(f"planner:oracle?hands={own}?actions=joint_angle", 0).actions == "joint_angle"
-    )
+    joints = f"planner:oracle?hands={own}%26actions=joint_angle"
+    assert make_policy(joints, 0).actions == "joint_angle"
     with pytest.raises(InvalidValueError, match="other hands"):
         make_policy(f"{scripted}&actions=joint_angle", 0)
     with pytest.raises(InvalidValueError, match="when-done"):
@@ -242,9 +235,9 @@ def test_hands_know_no_goal_and_planners_point_at_what_is_out_of_sight(saved):
     torch = pytest.importorskip("torch")
     from roboirg_learn.policy.body_net import TOOL_NUMBERS
     from roboirg_learn.policy.policy_data import EpisodeNumbers, LookNumbers, to_batch
-    from roboirg_learn.policy.policy_model import load_policy
+    from roboirg_learn.policy.trained_body import load_body
 
-    model = load_policy(saved)
+    model = load_body(saved.body)
     size = len(model.forms)
     looks, things, rng = 6, 3, np.random.default_rng(0)
     seen = np.ones((looks, things), bool)
@@ -255,11 +248,11 @@ def test_hands_know_no_goal_and_planners_point_at_what_is_out_of_sight(saved):
         seen, np.ones_like(seen), rng.normal(0, 1, (looks, TOOL_NUMBERS)).astype(np.float32),
     )  # fmt: skip
     planned = replayed(np.array([0, 1]), np.array([2, 5]), 0, size, chooses=True)
-    goal, nothing = np.zeros(model.vocabulary.goal_size, np.float32), np.array([-1, -1])
+    goal, nothing = np.zeros(model.goals.size, np.float32), np.array([-1, -1])
     numbers = EpisodeNumbers(shown, goal, np.array([2, 5]), *[nothing] * 3, planned)
     answer = model.planner(to_batch([numbers]))
     assert (answer.things[0, 1, :, 1] > -1e3).all()
-    assert (answer.keys is None) == (model.memory == "subgoal")
+    assert (answer.keys is None) == (model.plan["memory"] == "subgoal")
     context = planned._replace(context=planned.context + 1)
     other = model.planner(to_batch([numbers._replace(planned=context)]))
     assert not torch.equal(answer.moves, other.moves)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterable, Iterator
 from dataclasses import fields
-from functools import partial
 from typing import Annotated, Any
 
 import typer
@@ -14,13 +13,15 @@ from typer.core import TyperCommand
 
 from roboirg.core.instruction_options import InstructionOptions
 
-EPISODES, WORDS, PLAY = "Which episodes", "Which words", "How they are played"
+EPISODES = "Which episodes"
+WORDS = "Which words"
+PLAY = "How they are played"
 """Panels of the help; narrow terminals have room for every name in them."""
 _PANELS = {
     EPISODES: (
         "policies", "tasks", "settings", "forms", "split", "episodes", "policy_seeds", "arms",
     ),
-    WORDS: ("stages", "wordings", "language"),
+    WORDS: ("stages", "wordings"),
     PLAY: ("max_steps", "max_cost", "video"),
 }  # fmt: skip
 """The fields of a plan that are used daily; a plan file has all."""
@@ -54,25 +55,39 @@ class DeclaredCommand(TyperCommand):
         self._made = []
 
     def invoke(self, ctx: Any) -> Any:  # noqa: ANN401 - typer does not export its base class
-        """Call the function."""
-        given = {one.name: ctx.params.pop(one.name) for one in self._made}
-        ctx.obj = {name: value for name, value in given.items() if value not in (None, [], ())}
+        """Call the function of the command with the declared options that were typed.
+
+        They are no arguments of the function, so they are moved from the context's ``params`` to
+        its ``obj``; ``--tasks all`` becomes ``{"tasks": "all"}``.
+        """
+        ctx.obj = {}
+        for parameter in self._made:
+            value = ctx.params.pop(parameter.name)
+            is_typed = value not in (None, [], ())
+            if is_typed:
+                ctx.obj[parameter.name] = value
         return super().invoke(ctx)
 
 
 def _params_of(declared: Iterable[tuple[str, Any, Any]]) -> list[Any]:
-    """Return typer's parameters of a command."""
+    """Return typer's parameters for some options, each given by name, type and ``typer.Option``.
+
+    Typer makes parameters only of the signature of a function. So an empty function gets a
+    signature with these options, becomes a command, and the parameters of that are returned.
+    """
 
     def command() -> None: ...
 
     keyword = inspect.Parameter.KEYWORD_ONLY
-    parameters = [
-        inspect.Parameter(name, keyword, default=None, annotation=Annotated[kind | None, option])
-        for name, kind, option in declared
-    ]
-    # Typer reads both.
+    parameters: list[inspect.Parameter] = []
+    for name, kind, option in declared:
+        parameters.append(
+            inspect.Parameter(
+                name, keyword, default=None, annotation=Annotated[kind | None, option]
+            )
+        )
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    command.__annotations__ = {one.name: one.annotation for one in parameters}
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     holder = typer.Typer(add_completion=False)
     holder.command()(command)
     return typer.main.get_command(holder).params
@@ -82,18 +97,23 @@ class RunCommand(DeclaredCommand):
     """The command that plays a plan; plans are imported for its own help only."""
 
     def declared(self) -> Iterator[tuple[str, Any, Any]]:
-        """Yield the daily options of a plan; their texts end with the defaults."""
-        from roboirg.evaluation.plan.plan import plan_options
+        """Yield name, type and option of the plan's options that ``roboirg run`` has, by panel.
 
-        options = {one.name: one for one in plan_options()}
+        The help of each ends with its default.
+        """
+        from roboirg.runs.plan.plan import plan_options
+
+        options = {option.name: option for option in plan_options()}
         for panel, names in _PANELS.items():
-            for one in map(options.__getitem__, names):
-                text = one.help if one.default is None else f"{one.help}  ({one.default})"
-                option = partial(typer.Option, help=text, rich_help_panel=panel)
-                if one.name == "policies":
-                    yield one.name, list[str], option("--policy")
-                    continue
-                yield one.name, str, option()
+            for name in names:
+                text = options[name].help
+                if options[name].default is not None:
+                    text += f"  ({options[name].default})"
+                if name == "policies":  # typed once for each policy
+                    flag = typer.Option("--policy", help=text, rich_help_panel=panel)
+                    yield name, list[str], flag
+                else:
+                    yield name, str, typer.Option(help=text, rich_help_panel=panel)
 
 
 class WordsCommand(DeclaredCommand):
@@ -101,6 +121,6 @@ class WordsCommand(DeclaredCommand):
 
     def declared(self) -> Iterator[tuple[str, Any, Any]]:
         """Yield the options of an instruction."""
-        for one in fields(InstructionOptions):
-            if one.name not in ("setting", "form", "delivery"):
-                yield one.name, str, typer.Option(help=one.metadata["help"])
+        for option in fields(InstructionOptions):
+            if option.name not in ("setting", "form", "delivery"):
+                yield option.name, str, typer.Option(help=option.metadata["help"])

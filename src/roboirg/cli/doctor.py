@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 from packaging.requirements import Requirement
@@ -36,6 +37,9 @@ from roboirg.util.cache import cache_folder
 from roboirg.util.processor import core_count, worker_advice
 from roboirg.util.proxies import proxy_of
 
+if TYPE_CHECKING:
+    from roboirg.simulation.world import World
+
 FRAME_TIMEOUT = 120
 """Time limit for the test frame, and then for each picture, s."""
 
@@ -51,6 +55,24 @@ _RENDER_REMEDY = (
 )
 _FEWEST_COLORS = 100
 """In a picture of a scene, which has thousands."""
+
+
+_MOVE_EVERY = 4
+"""Pictures after which the robot is set elsewhere for a step: it must move, or nothing is drawn."""
+
+
+class _Child(NamedTuple):
+    """What came of a child process.
+
+    Attributes:
+        is_ok: whether it succeeded.
+        output: what it wrote.
+        fault: what is wrong if it failed.
+    """
+
+    is_ok: bool
+    output: str
+    fault: str
 
 
 @dataclass(frozen=True)
@@ -91,14 +113,17 @@ def report(checks: Sequence[Check]) -> str:
     """Return a line for each check, with a remedy below every failure."""
     width = max((len(check.name) for check in checks), default=0)
     lines: list[str] = []
+    failures = 0
     for check in checks:
-        lines.append(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:<{width}}  {check.found}")
+        verdict = "ok  " if check.ok else "FAIL"
+        lines.append(f"{verdict}  {check.name:<{width}}  {check.found}")
         if not check.ok:
+            failures += 1
             lines.append(f"      {'':<{width}}  -> {check.remedy}")
-    failures = sum(not check.ok for check in checks)
-    lines.append(
-        f"{failures} of {len(checks)} checks failed." if failures else "All checks passed."
-    )
+    if failures:
+        lines.append(f"{failures} of {len(checks)} checks failed.")
+    else:
+        lines.append("All checks passed.")
     return "\n".join(lines)
 
 
@@ -120,6 +145,7 @@ def _check_python() -> Check:
 
 
 def _check_packages() -> Iterator[Check]:
+    """Check this package, and each package that it, or one of its extras, needs."""
     try:
         requirements = metadata.requires(DISTRIBUTION) or []
     except metadata.PackageNotFoundError:
@@ -127,18 +153,27 @@ def _check_packages() -> Iterator[Check]:
         yield Check(DISTRIBUTION, False, "not installed", remedy)
         return
     yield Check(DISTRIBUTION, True, metadata.version(DISTRIBUTION))
-    wanted = {}  # several extras may list the same package
-    for one in map(Requirement, requirements):
-        needed = one.marker is None or any(one.marker.evaluate({"extra": it}) for it in _EXTRAS)
-        if needed and one.name != DISTRIBUTION:
-            wanted[one.name] = one.specifier
-    brings = metadata.packages_distributions()
-    for name, specifier in wanted.items():
-        brought = brings.get(_MODULES.get(name, ""), [name])
-        yield _check_package(name if name in brought else brought[0], specifier)
+
+    needed: dict[str, SpecifierSet] = {}  # several extras may list the same package
+    for text in requirements:
+        requirement = Requirement(text)
+        if requirement.name != DISTRIBUTION and _is_needed(requirement):
+            needed[requirement.name] = requirement.specifier
+    packages_by_module = metadata.packages_distributions()
+    for name, specifier in needed.items():
+        # A module may come from another package than the required one, such as a headless build.
+        packages = packages_by_module.get(_MODULES.get(name, ""), [name])
+        yield _check_package(name if name in packages else packages[0], specifier)
+
+
+def _is_needed(requirement: Requirement) -> bool:
+    """Return whether a requirement is one of all installations, or of the extras for playing."""
+    marker = requirement.marker
+    return marker is None or any(marker.evaluate({"extra": extra}) for extra in _EXTRAS)
 
 
 def _check_package(name: str, specifier: SpecifierSet) -> Check:
+    """Check that a package is installed in a version that will do."""
     remedy = f"pip install '{name}{specifier}'"
     try:
         version = metadata.version(name)
@@ -161,46 +196,70 @@ def _check_files() -> tuple[Check, ...]:
 
 
 def _try(name: str, find: Callable[[], str], without: str = "") -> Check:
-    """Check that something can be found; `without`: what happens otherwise, if that is no fault."""
+    """Return the check of something by looking for it, such as the cache's folder.
+
+    Args:
+        name: of the check.
+        find: returns what was found, empty if it is switched off; raises if it is missing or set to
+            a wrong value.
+        without: what happens without it, such as that runs are slower; empty if all runs need it.
+    """
+    can_do_without = bool(without)
     try:
         return Check(name, True, find() or "off")
     except OSError as error:
-        found = f"{error.strerror or error}{without and f': {without}'}"
-        return Check(name, bool(without), found, "let TMPDIR name a folder to write to")
+        found = error.strerror or str(error)
+        if can_do_without:
+            found += f": {without}"
+        return Check(name, can_do_without, found, "let TMPDIR name a folder to write to")
     except RoboIRGError as error:
+        # Such errors read "what is wrong; what to do".
         problem, _, remedy = str(error).partition("; ")
         # Only what is missing can be done without; a wrong value stops runs.
-        return Check(
-            name, bool(without) and isinstance(error, MissingDependencyError), problem, remedy
-        )
+        is_missing = isinstance(error, MissingDependencyError)
+        return Check(name, can_do_without and is_missing, problem, remedy)
 
 
 def _check_opencv() -> Check:
     """Load OpenCV in a child process; its wheel needs two system libraries."""
-    loads, _, fault = _run_python("-c", "import cv2")
+    child = _run_python("-c", "import cv2")
     remedy = "run `make setup`, or: apt-get install libgl1 libglib2.0-0"
-    return Check("OpenCV libraries", loads, "loaded" if loads else fault, remedy)
+    return Check("OpenCV libraries", child.is_ok, "loaded" if child.is_ok else child.fault, remedy)
 
 
 def _check_rendering(render_s: int = 0) -> tuple[Check, Check]:
-    """Try the renderer in a child process, whose lines are the device and then what it drew."""
-    is_drawn, output, fault = _run_python(
-        # Without a buffer, because a line may be the last one before a crash.
-        *("-u", "-m", "roboirg.cli.doctor", "--frame", str(render_s)),
-        limit_s=2 * (FRAME_TIMEOUT + render_s),
-    )
-    device, *frames = output.splitlines() or [""]
+    """Return two checks of the renderer: that there is a device, and that it draws.
+
+    A child process draws, as a driver may crash or hang. It prints the device in its first line,
+    and in the next ones what it drew.
+
+    Args:
+        render_s: seconds for which to go on drawing.
+    """
+    # "-u" for no buffer, because a line may be the last one before a crash.
+    draw = ("-u", "-m", "roboirg.cli.doctor", "--frame", str(render_s))
+    child = _run_python(*draw, limit_s=2 * (FRAME_TIMEOUT + render_s))
+    device, *drawn = child.output.splitlines() or [""]
     remedy = f"{to_unset(DEVICE_VARIABLE, *DRIVER_VARIABLES)}{_RENDER_REMEDY}"
-    tried = frames[-1:] if is_drawn else [*frames[-1:], fault]
-    found = ", then ".join(tried) if device else "not tried: no device"
+
+    found = "not tried: no device"
+    if device:
+        steps = drawn[-1:]
+        if not child.is_ok:
+            steps.append(child.fault)
+        found = ", then ".join(steps)
+    name = f"{render_s} s of pictures" if render_s else "test frame"
     return (
-        Check("render device", bool(device), device or fault, remedy),
-        Check(f"{render_s} s of pictures" if render_s else "test frame", is_drawn, found, remedy),
+        Check("render device", bool(device), device or child.fault, remedy),
+        Check(name, child.is_ok, found, remedy),
     )
 
 
-def _run_python(*arguments: str, limit_s: int = FRAME_TIMEOUT) -> tuple[bool, str, str]:
-    """Run Python in a child process; return whether it succeeds, its output, and what is wrong."""
+def _run_python(*arguments: str, limit_s: int = FRAME_TIMEOUT) -> _Child:
+    """Run Python with some arguments in a child process; return its output and its fault.
+
+    The fault says in words why it did not end well: too slow, a signal, or its last line of stderr.
+    """
     try:
         child = subprocess.run(  # noqa: S603 - constant words in our own interpreter
             [sys.executable, *arguments],
@@ -211,34 +270,32 @@ def _run_python(*arguments: str, limit_s: int = FRAME_TIMEOUT) -> tuple[bool, st
             timeout=limit_s,
         )
     except subprocess.TimeoutExpired as error:
-        output = (
-            error.stdout.decode(errors="replace")
-            if isinstance(error.stdout, bytes)
-            else error.stdout or ""
-        )
-        return False, output, f"no end within {limit_s} s"
+        output = error.stdout or ""
+        if isinstance(output, bytes):
+            output = output.decode(errors="replace")
+        return _Child(False, output, f"no end within {limit_s} s")
     code = child.returncode
+    if code == -signal.SIGALRM:  # the alarm of `_draw_test_frame`
+        return _Child(False, child.stdout, f"no picture within {FRAME_TIMEOUT} s")
     if code < 0:
-        return (
-            False,
-            child.stdout,
-            f"no picture within {FRAME_TIMEOUT} s"
-            if code == -signal.SIGALRM
-            else f"the process crashed ({signal.strsignal(-code)})",
-        )
+        fault = f"the process crashed ({signal.strsignal(-code)})"
+        return _Child(False, child.stdout, fault)
     errors = child.stderr.strip().splitlines() or [f"exit code {code}"]
-    return code == 0, child.stdout, errors[-1]
+    return _Child(code == 0, child.stdout, errors[-1])
 
 
 def _check_memory() -> Check:
-    total = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    limit = Path("/sys/fs/cgroup/memory.max")  # a container's own limit
-    if limit.is_file() and (text := limit.read_text().strip()).isdigit():
-        total = min(total, int(text))
+    """Check the memory of this machine, or what a container may use of it."""
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    limit_file = Path("/sys/fs/cgroup/memory.max")  # a container's own limit
+    if limit_file.is_file():
+        limit = limit_file.read_text().strip()
+        if limit.isdigit():
+            memory = min(memory, int(limit))
     return Check(
         "memory",
-        total >= _MIN_MEMORY,
-        f"{total / _GIB:.1f} GiB",
+        memory >= _MIN_MEMORY,
+        f"{memory / _GIB:.1f} GiB",
         f"provide at least {_MIN_MEMORY // _GIB} GiB; each worker process takes about 0.5 GiB",
     )
 
@@ -266,8 +323,6 @@ def _draw_test_frame(render_s: int) -> None:
         RoboIRGError: no device can render, or there is no picture.
     """
     # Imported here because only the child process may load them.
-    from roboirg.core.observations import CAMERAS
-    from roboirg.simulation.physics_settings import HOME_ACTION
     from roboirg.simulation.rendering.render_device import describe_device, find_render_device
     from roboirg.simulation.world import World
     from roboirg.tasks.splits import get_episode
@@ -279,25 +334,39 @@ def _draw_test_frame(render_s: int) -> None:
     sys.stdout.write(f"{device.name} at {device.alias} ({kind})\n")
     start = time.perf_counter()
     world = World(get_episode("PickXtimes", "test", 0).scene)
-    picture = world.picture("front")
-    colors = len({*map(bytes, picture.reshape(-1, 3))})
+    pixels = world.picture("front").reshape(-1, 3)
+    colors = len(set(map(bytes, pixels)))
     if colors < _FEWEST_COLORS:
         raise RenderDeviceError(f"the picture of a scene has only {colors} colors.")
     sys.stdout.write(f"256 x 256 pixels in {time.perf_counter() - start:.1f} s\n")
-    start, drawn = time.perf_counter(), 0
-    for second in range(1, render_s + 1):
+    _go_on_drawing(world, render_s)
+
+
+def _go_on_drawing(world: World, seconds: int) -> None:
+    """Draw a world that moves for some seconds; print after each how many pictures were drawn."""
+    from roboirg.core.observations import CAMERAS
+    from roboirg.simulation.physics_settings import HOME_ACTION
+
+    start = time.perf_counter()
+    drawn = 0
+    for second in range(1, seconds + 1):
         while time.perf_counter() < start + second:
-            signal.alarm(FRAME_TIMEOUT)
-            world.step(HOME_ACTION * (1.0 if drawn % 4 else 0.9))  # it moves, or nothing is drawn
+            signal.alarm(FRAME_TIMEOUT)  # begins anew with every picture
+            action = HOME_ACTION
+            if drawn % _MOVE_EVERY == 0:
+                action = HOME_ACTION * 0.9
+            world.step(action)
             drawn += len(world.cameras.pictures(CAMERAS))
         sys.stdout.write(f"{drawn} pictures in {second} s\n")
 
 
 def _main() -> int:
+    """Run the doctor, or with ``--frame SECONDS`` its child that draws; return the exit code."""
     if "--frame" not in sys.argv[1:]:
         return run_doctor()
+    seconds = sys.argv[2:] or ["0"]
     try:
-        _draw_test_frame(int(sys.argv[2]) if sys.argv[2:] else 0)
+        _draw_test_frame(int(seconds[0]))
     except RoboIRGError as error:
         sys.stderr.write(f"{error}\n")
         return 1

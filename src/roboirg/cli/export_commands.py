@@ -23,7 +23,7 @@ def export_episodes(
 
     Example: roboirg export episodes --split val --out episodes.jsonl
     """
-    from roboirg.evaluation.plan.option_parsing import parse_names, parse_splits
+    from roboirg.runs.plan.option_parsing import parse_names, parse_splits
     from roboirg.tasks import find_tasks
     from roboirg.tasks.splits.episode_export import write_episodes
     from roboirg.tasks.splits.splits import split_episodes

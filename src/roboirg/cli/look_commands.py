@@ -41,7 +41,10 @@ def fetch_models(
     """
     from roboirg.simulation.model_fetch import fetch_model_files
 
-    typer.echo(fetch_model_files(Path(wheel) if wheel else None, partial(typer.echo, err=True)))
+    file = None
+    if wheel:
+        file = Path(wheel)
+    typer.echo(fetch_model_files(file, partial(typer.echo, err=True)))
 
 
 def list_tasks() -> None:

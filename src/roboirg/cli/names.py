@@ -8,30 +8,37 @@ from roboirg.core.errors import Name, known_name
 
 
 def known_tasks(given: object, wordings: str | None = None) -> tuple[str, ...]:
-    """Return tasks as typed or in a plan; of all, those that open wordings have words of."""
+    """Return the names of the tasks that were typed or that a plan names, such as ``all``.
+
+    Args:
+        given: names or groups of tasks.
+        wordings: identity of a wording file, which has sentences that others wrote. If it is given,
+            ``all`` means only the tasks for which it has sentences.
+    """
     from roboirg.core.word_pools import outside_words
-    from roboirg.evaluation.plan.option_parsing import means_all, parse_names
     from roboirg.language.scenarios.wording_store import find_wordings
+    from roboirg.runs.plan.option_parsing import means_all, parse_names
     from roboirg.tasks import find_tasks
 
     names = find_tasks(parse_names("task", given))
     identity = outside_words(wordings)
     if identity is None or not means_all(given):
         return names
-    return tuple(name for name in names if name in find_wordings(identity).tasks)
+    tasks = find_wordings(identity).tasks
+    return tuple(name for name in names if name in tasks)
 
 
 def known_settings(given: object) -> tuple[str, ...]:
     """Return settings as typed or in a plan."""
-    from roboirg.evaluation.plan.option_parsing import parse_names
     from roboirg.language.settings import find_settings
+    from roboirg.runs.plan.option_parsing import parse_names
 
     return find_settings(parse_names("setting", given))
 
 
 def known_names(kind: str, given: object, known: Sequence[Name]) -> tuple[Name, ...]:
-    """Return the names that were typed, separated by commas; all are all that are known."""
-    from roboirg.evaluation.plan.option_parsing import means_all, parse_names
+    """Return the names that were typed, separated by commas; ``all`` means all that are known."""
+    from roboirg.runs.plan.option_parsing import means_all, parse_names
 
     if means_all(given):
         return tuple(known)

@@ -61,9 +61,11 @@ class PlanWords:
         section: str = "",
         own: Sequence[str] = (),
     ) -> None:
-        from roboirg.evaluation.plan.plan_file import read_plan_file
+        from roboirg.runs.plan.plan_file import read_plan_file
 
-        self._context, self._section, self._own = context, section, own
+        self._context = context
+        self._section = section
+        self._own = own
         self.fields = {} if plan is None else read_plan_file(plan, section)
 
     def given(self, name: str, value: str) -> Any:  # noqa: ANN401 - as in the file
@@ -75,7 +77,8 @@ class PlanWords:
     def tasks(self, typed: str = "all", wordings: str | None = None) -> tuple[str, ...]:
         """Return the names of tasks that were typed, or else those of the plan.
 
-        Of all, those that open wordings have words of.
+        With open wordings (words that others wrote), ``all`` means the tasks that they have words
+        of.
         """
         return known_tasks(self.given("tasks", typed), wordings)
 
@@ -84,13 +87,16 @@ class PlanWords:
         return known_settings(self.given("settings", typed))
 
     def choices(self, kind: type) -> dict[str, Any]:
-        """Return what the plan's section gives of the fields of this class.
+        """Return the values in this command's section of the plan that are fields of a class.
+
+        Of a section ``{"size": "8", "name": "a"}``, a class with the field ``size: int`` gets
+        ``{"size": 8}``.
 
         Raises:
             UnknownNameError: a key is none of its own.
             InvalidValueError: a value is not of the field's type.
         """
-        from roboirg.evaluation.plan.plan_maker import as_typed_field
+        from roboirg.runs.plan.plan_maker import as_typed_field
 
         given = self.fields.get(self._section, {})
         if not isinstance(given, Mapping):
@@ -100,23 +106,27 @@ class PlanWords:
             )
         check_names(f"key of {self._section} in the plan", given, self._own)
         types = get_type_hints(kind, include_extras=True)
-        return {
-            name: as_typed_field(f"{self._section}.{name}", types[name], value)
-            for name, value in given.items()
-            if name in types
-        }
+        choices: dict[str, Any] = {}
+        for name, value in given.items():
+            if name in types:
+                choices[name] = as_typed_field(f"{self._section}.{name}", types[name], value)
+        return choices
 
     def options(self) -> InstructionOptions:
-        """Return the options of instructions without setting and form, each checked by itself.
+        """Return the options of instructions that the plan gives, other than setting and form.
 
-        `check_options` checks whether they go together.
+        ``{"tasks": "all", "stages": "1,5"}`` gives options with these stages; tasks are no option
+        of instructions. Options may stand alone in the plan, or in its section ``instruction``.
+        Each is checked by itself; `check_options` checks whether they go together.
         """
-        from roboirg.evaluation.plan.plan import FLAT
-        from roboirg.evaluation.plan.plan_maker import word_options
+        from roboirg.runs.plan.plan import FLAT
+        from roboirg.runs.plan.plan_maker import word_options
 
-        flat = (one for one, section in FLAT.items() if section == "instruction")
-        names = {"stages", "wordings", "instruction", *flat}
-        return word_options(**{one: self.fields[one] for one in self.fields if one in names})
+        names = {"stages", "wordings", "instruction"}
+        # `FLAT` has the section of each option that may also stand outside of it.
+        names.update(name for name, section in FLAT.items() if section == "instruction")
+        chosen = {name: value for name, value in self.fields.items() if name in names}
+        return word_options(**chosen)
 
     def forms(self, usual: Sequence[str] = ("implicit",)) -> tuple[str, ...]:
         """Return the plan's forms, or the usual ones if it has none."""
@@ -151,4 +161,5 @@ def add_working_directory(*, last: bool = False) -> None:
         last: whether it comes last, so that a file there replaces no installed module; for
             commands whose processes hold worlds.
     """
-    sys.path.insert(len(sys.path) if last else 0, str(Path.cwd()))
+    place = len(sys.path) if last else 0
+    sys.path.insert(place, str(Path.cwd()))

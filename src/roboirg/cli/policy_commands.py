@@ -18,8 +18,10 @@ from roboirg.util.web.listening import TIMEOUT_S
 from roboirg.util.web.request_origin import LOOPBACK, LOOPBACK_NAMES
 
 _STOPPED = {signal.SIGINT: 130, signal.SIGTERM: 143}
+"""Exit codes by the signal that ends a server."""
 
-_PROTOCOLS, _URL_SCHEMES = "PROTOCOLS", "SCHEMES"
+_PROTOCOLS = "PROTOCOLS"
+_URL_SCHEMES = "SCHEMES"
 """Stand for the protocols, and for the schemes of all policy URLs, in help texts."""
 
 PolicySpec = Annotated[
@@ -32,16 +34,22 @@ class ProtocolHelpCommand(TyperCommand):
     """A command whose help lists the protocols; they are imported only for that."""
 
     def get_help(self, ctx: Any) -> str:  # noqa: ANN401 - typer does not export its base class
+        """Return the help, in which the installed protocols and schemes of URLs are listed.
+
+        The texts of the options have a placeholder for each, as the list is slow to make.
+        """
         from roboirg.policies.by_name.policy_classes import url_classes
         from roboirg.policies.remote.protocols import protocols_by_scheme
 
-        urls = ", ".join(f"{scheme}://…" for scheme in url_classes())
-        schemes = protocols_by_scheme().items()
-        served_schemes = [scheme for scheme, protocol in schemes if protocol.service is not None]
+        served: list[str] = []
+        for scheme, protocol in protocols_by_scheme().items():
+            if protocol.service is not None:
+                served.append(scheme)
+        urls = [f"{scheme}://…" for scheme in url_classes()]
         for parameter in self.params:
             words = getattr(parameter, "help", None) or ""
-            words = words.replace(_PROTOCOLS, ", ".join(served_schemes))
-            vars(parameter)["help"] = words.replace(_URL_SCHEMES, urls)
+            words = words.replace(_PROTOCOLS, ", ".join(served))
+            vars(parameter)["help"] = words.replace(_URL_SCHEMES, ", ".join(urls))
         return super().get_help(ctx)
 
 
@@ -76,9 +84,11 @@ def serve(
 
     keep_freed_memory()
     add_working_directory()
-    key = None if api_key_env is None else os.environ.get(api_key_env)
-    if api_key_env is not None and not key:
-        raise InvalidValueError(f"The environment variable {api_key_env} holds no key.")
+    key = None
+    if api_key_env is not None:
+        key = os.environ.get(api_key_env)
+        if not key:
+            raise InvalidValueError(f"The environment variable {api_key_env} holds no key.")
     options = ServerOptions(host, port, key, timeout_s)
     server = open_server(policy, protocol, options, seed=seed)
     for number in _STOPPED:
@@ -94,6 +104,7 @@ def serve(
 
 
 def _stop(number: int, frame: FrameType | None) -> None:
+    """End this process at a signal."""
     del frame
     # A connection may be in the middle of a long call; there is nothing to save.
     sys.stdout.flush()

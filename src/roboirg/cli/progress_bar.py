@@ -5,11 +5,30 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
 
 # Rich is imported where it is used, so that --help is fast.
 
 LINE_EVERY_S = 10.0
 """Seconds between two lines of progress where stderr is no terminal."""
+_MINUTE_S = 60.0
+
+
+class _Work(NamedTuple):
+    """A kind of work under way.
+
+    Attributes:
+        bar: its bar.
+        start: time of its first report, s.
+        first: how much was done then.
+    """
+
+    bar: TaskID
+    start: float
+    first: int
 
 
 @contextmanager
@@ -45,40 +64,65 @@ def progress_bars(*, has_lines: bool = True) -> Iterator[Callable[[str, int, int
     from roboirg.util.console_width import progress_console
 
     console = progress_console(stderr=True)
-    columns = (
+    bars = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
         TextColumn("{task.fields[remark]}"),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
     )
-    started: dict[str, tuple[float, int]] = {}
-    last_line = 0.0
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
-        bars = {}
-
-        def report(work: str, done: int, total: int, remark: str) -> None:
-            nonlocal last_line
-            if work not in bars:
-                bars[work] = bar.add_task(work, total=total, remark="")
-                started[work] = time.monotonic(), done
-            bar.update(bars[work], completed=done, total=total, remark=remark)
-            now = time.monotonic()
-            if console.is_terminal or not has_lines:
-                return
-            if now - last_line > LINE_EVERY_S or done == total:
-                last_line = now
-                left = _time_left(now, *started[work], done, total)
-                console.print(f"{work} {done}/{total} {left} {remark}".rstrip(), highlight=False)
-
-        yield report
+    with bars:
+        yield _Reporter(bars, has_lines=has_lines and not console.is_terminal).report
 
 
-def _time_left(now: float, start: float, first: int, done: int, total: int) -> str:
-    """Return the time left at the rate so far, in words."""
-    if done in (total, first):
+class _Reporter:
+    """Shows the progress of several kinds of work.
+
+    Args:
+        bars: for each a bar.
+        has_lines: whether to print lines, too.
+    """
+
+    def __init__(self, bars: Progress, *, has_lines: bool) -> None:
+        self._bars = bars
+        self._has_lines = has_lines
+        self._works: dict[str, _Work] = {}
+        self._last_line = 0.0
+
+    def report(self, name: str, done: int, total: int, remark: str) -> None:
+        """Show how much of a kind of work is done: on the bar, or at times in a printed line.
+
+        Args:
+            name: of the kind of work; a new name gets a new bar.
+            done: how much is done.
+            total: how much there is.
+            remark: stands at the end.
+        """
+        if name not in self._works:
+            bar = self._bars.add_task(name, total=total, remark="")
+            self._works[name] = _Work(bar, time.monotonic(), done)
+        work = self._works[name]
+        self._bars.update(work.bar, completed=done, total=total, remark=remark)
+        now = time.monotonic()
+        is_line_due = now - self._last_line > LINE_EVERY_S or done == total
+        if self._has_lines and is_line_due:
+            self._last_line = now
+            line = f"{name} {done}/{total} {_time_left(work, now, done, total)} {remark}"
+            self._bars.console.print(line.rstrip(), highlight=False)
+
+
+def _time_left(work: _Work, now: float, done: int, total: int) -> str:
+    """Return the time left at the rate so far, such as ``5 min left``; empty if it is not known.
+
+    What was done before the first report, `work.first`, does not count.
+    """
+    if done in (total, work.first):
         return ""
-    seconds = (now - start) / (done - first) * (total - done)
-    return f"{seconds / 60:.0f} min left" if seconds >= 60 else f"{seconds:.0f} s left"  # noqa: PLR2004
+    seconds_each = (now - work.start) / (done - work.first)
+    seconds = seconds_each * (total - done)
+    if seconds >= _MINUTE_S:
+        return f"{seconds / _MINUTE_S:.0f} min left"
+    return f"{seconds:.0f} s left"

@@ -20,8 +20,8 @@ def merge(
 
     Example: roboirg records merge runs/first runs/second --out runs/all
     """
-    from roboirg.evaluation.records.merging import merge_runs
-    from roboirg.evaluation.records.run_files import run_folder
+    from roboirg.records.merging import merge_runs
+    from roboirg.records.run_files import run_folder
 
     merged = merge_runs([run_folder(run) for run in runs], run_folder(out))
     typer.echo(

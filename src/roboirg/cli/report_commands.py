@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,14 +14,17 @@ from roboirg.cli.names import known_names
 from roboirg.core.errors import InvalidValueError, known_name
 
 if TYPE_CHECKING:
-    from roboirg.evaluation.analysis.stats.breakdowns import Breakdown
-    from roboirg.evaluation.analysis.stats.run_data import RunData
-    from roboirg.evaluation.analysis.tables.table import Table
-    from roboirg.evaluation.plan.sources import Source
+    from roboirg.analysis.measures.breakdowns import Breakdown
+    from roboirg.analysis.measures.run_data import RunData
+    from roboirg.analysis.results.sources import Source
+    from roboirg.analysis.tables.table import Table
 
 # Heavy modules are imported inside the commands, so that --help answers at once.
 
 _ALL = "all"
+"""Stands for every name."""
+_COVERAGE = "coverage"
+"""The table that needs no run."""
 
 Runs = Annotated[
     list[str] | None,
@@ -67,11 +72,11 @@ def report(
 
     Example: roboirg report runs/first
     """
+    from roboirg.analysis.page.report import write_report
+    from roboirg.analysis.results.sources import opened_sources
     from roboirg.cli.progress_bar import progress_bar
     from roboirg.cli.run_commands import print_tables_of
-    from roboirg.evaluation.analysis.page.report import write_report
-    from roboirg.evaluation.plan.sources import opened_sources
-    from roboirg.evaluation.records.packs import MEDIA_FOLDERS
+    from roboirg.records.packs import MEDIA_FOLDERS
 
     if serve and (against or out):
         raise InvalidValueError(
@@ -80,9 +85,9 @@ def report(
     others = [] if against is None else [against]
     with (
         opened_sources([run], MEDIA_FOLDERS) as (source,),
-        opened_sources(others, MEDIA_FOLDERS) as found,
+        opened_sources(others, MEDIA_FOLDERS) as other_sources,
     ):
-        other = found[0] if found else None
+        other = other_sources[0] if other_sources else None
         with progress_bar("episodes of the page") as progress:
             page = write_report(
                 source, against=other, out=out, videos=videos, served=serve, progress=progress
@@ -96,7 +101,7 @@ def report(
 
 def _serve(page: Path, port: int) -> None:
     """Serve the page of a run with its videos on this machine."""
-    from roboirg.evaluation.analysis.page.page_server import run_server
+    from roboirg.analysis.page.page_server import run_server
     from roboirg.util.web.request_origin import LOOPBACK
 
     with run_server(page.parent, port) as server:
@@ -122,11 +127,11 @@ def figures(
 
     Example: roboirg figures runs/first --out figures
     """
-    from roboirg.evaluation.analysis.figures import FIGURES, write_figures
-    from roboirg.evaluation.analysis.figures.figure_style import check_figure_support
-    from roboirg.evaluation.analysis.results.reading import read_frame
-    from roboirg.evaluation.analysis.stats.run_data import RunData
-    from roboirg.evaluation.plan.sources import opened_sources
+    from roboirg.analysis.figures import FIGURES, write_figures
+    from roboirg.analysis.figures.figure_style import check_figure_support
+    from roboirg.analysis.measures.run_data import RunData
+    from roboirg.analysis.results.reading import read_frame
+    from roboirg.analysis.results.sources import opened_sources
 
     check_figure_support()
     if not runs and not published:
@@ -173,32 +178,34 @@ def tables(
     """
     from rich.console import Console
 
+    from roboirg.analysis.measures.run_data import RunData
+    from roboirg.analysis.results.reading import read_frame
+    from roboirg.analysis.results.sources import opened_sources
+    from roboirg.analysis.tables.rendering import get_format
+    from roboirg.analysis.tables.rendering.terminal import print_tables
     from roboirg.cli.run_commands import warn_of_mixtures
-    from roboirg.evaluation.analysis.results.reading import read_frame
-    from roboirg.evaluation.analysis.stats.run_data import RunData
-    from roboirg.evaluation.analysis.tables.rendering import get_format
-    from roboirg.evaluation.analysis.tables.rendering.terminal import print_tables
-    from roboirg.evaluation.plan.sources import opened_sources
     from roboirg.util.atomic_write import write_atomically
     from roboirg.util.freed_memory import paused_collection
 
+    # The options are checked first, as reading takes long.
     output = get_format(format)
     _check_choice(which, by, runs or [], published=published, floors=floors)
     with paused_collection(), opened_sources(runs or []) as sources:
         data = RunData(read_frame(sources, words=by is not None))
-        found = _tables(which, by, sources, data, published=published, floors=floors)
+        made = _tables(which, by, sources, data, published=published, floors=floors)
     if output.is_for_programs:
         warn_of_mixtures(data.frame)
     if out is not None:
-        for table in found:
+        for table in made:
             path = out / f"{table.key}{output.suffix}"
             write_atomically(path, output.draw(table))
             typer.echo(path)
     elif format == "terminal":
-        print_tables(found, Console())
+        print_tables(made, Console())
+    elif output.is_for_programs:
+        typer.echo(output.draw(*made), nl=False)  # one text with all tables
     else:
-        texts = [output.draw(*found)] if output.is_for_programs else map(output.draw, found)
-        typer.echo("\n".join(texts), nl=False)
+        typer.echo("\n".join(map(output.draw, made)), nl=False)
 
 
 def compare(
@@ -217,51 +224,63 @@ def compare(
     from rich.console import Console
     from rich.text import Text
 
+    from roboirg.analysis.measures.comparison import compare as compare_frames
+    from roboirg.analysis.measures.comparison_text import sentences
+    from roboirg.analysis.measures.headline import headline_notes
+    from roboirg.analysis.results.reading import read_frame
+    from roboirg.analysis.results.run_cells import cells_of
+    from roboirg.analysis.results.sources import opened_sources
+    from roboirg.analysis.tables.arm_table import language_use_sentences
     from roboirg.cli.run_commands import warn_of_mixtures
-    from roboirg.evaluation.analysis.results.reading import read_frame
-    from roboirg.evaluation.analysis.stats.cells import cells_of
-    from roboirg.evaluation.analysis.stats.comparison import compare as compare_frames
-    from roboirg.evaluation.analysis.stats.comparison_text import sentences
-    from roboirg.evaluation.analysis.stats.headline import headline_notes
-    from roboirg.evaluation.analysis.tables.arm_table import language_use_sentences
-    from roboirg.evaluation.plan.sources import opened_sources
     from roboirg.util.console_width import widen
 
-    wanted = _breakdowns(by)
-    with opened_sources([first]) as ours, opened_sources([second]) as theirs:
-        frame, other = (read_frame(one, words=bool(wanted)) for one in (ours, theirs))
-    found = compare_frames(frame, other, wanted)
-    warn_of_mixtures(frame, other)
-    names = (found.first.marked_policy, found.second.marked_policy)
-    if names[0] == names[1]:
-        names = (f"{names[0]} ({first})", f"{names[1]} ({second})")
+    breakdowns = _breakdowns(by)
+    needs_words = bool(breakdowns)
+    with opened_sources([first]) as sources, opened_sources([second]) as other_sources:
+        frame = read_frame(sources, words=needs_words)
+        other_frame = read_frame(other_sources, words=needs_words)
+    comparison = compare_frames(frame, other_frame, breakdowns)
+    warn_of_mixtures(frame, other_frame)
+
+    name = comparison.first.marked_policy
+    other_name = comparison.second.marked_policy
+    if name == other_name:  # the same policy in two runs
+        name = f"{name} ({first})"
+        other_name = f"{other_name} ({second})"
+    lines = [
+        *sentences(comparison, name, other_name),
+        *headline_notes(cells_of(frame), {comparison.first: name}),
+        *headline_notes(cells_of(other_frame), {comparison.second: other_name}),
+        *language_use_sentences(frame, other_frame, (name, other_name)),
+    ]
     console = Console()
     widen(console)
-    for sentence in (
-        *sentences(found, *names),
-        *headline_notes(cells_of(frame), {found.first: names[0]}),
-        *headline_notes(cells_of(other), {found.second: names[1]}),
-        *language_use_sentences(frame, other, names),
-    ):
-        console.print(Text(sentence), highlight=False)
+    for line in lines:
+        console.print(Text(line), highlight=False)
 
 
 def _check_choice(
     which: str, by: str | None, runs: Sequence[str], *, published: bool, floors: str | None
 ) -> None:
-    """Refuse tables that do not exist or that have no such rows, before anything is read."""
-    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
-    from roboirg.evaluation.analysis.tables.paper_tables import WHICH
+    """Raise if the options of `tables` exclude each other, before any record is read.
 
-    alone = tuple(DIAGNOSTIC_TABLES)
-    known_name("table", which, (*WHICH, *alone, _ALL))
-    asked = [which] * (which != _ALL) + ["--by"] * (by is not None)
-    if {*alone, "--by"} & {*asked} and (published or floors or len(asked) > 1):
-        raise InvalidValueError(
-            f"--by, and --which {', '.join(alone)}, show runs alone; each excludes the other, "
-            "--published and --floors."
-        )
-    if not runs and not published and which != "coverage":
+    Diagnostic tables (such as ``failures``) and those by kind of words (``--by``) show runs alone,
+    so they take neither published values nor floors.
+    """
+    from roboirg.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
+    from roboirg.analysis.tables.paper_tables import WHICH
+
+    known_name("table", which, (*WHICH, *DIAGNOSTIC_TABLES, _ALL))
+    is_diagnostic = which in DIAGNOSTIC_TABLES
+    is_broken_down = by is not None
+    if is_diagnostic or is_broken_down:
+        names_both = is_broken_down and which != _ALL  # --by and a table
+        if names_both or published or floors:
+            raise InvalidValueError(
+                f"--by, and --which {', '.join(DIAGNOSTIC_TABLES)}, show runs alone; each excludes "
+                "the other, --published and --floors."
+            )
+    if not runs and not published and which != _COVERAGE:
         raise InvalidValueError("Tables need a run; give its folder, a pack, or --published.")
 
 
@@ -274,52 +293,72 @@ def _tables(
     published: bool,
     floors: str | None,
 ) -> list[Table]:
-    from roboirg.evaluation.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
-    from roboirg.evaluation.analysis.tables.table_notes import with_mixtures
+    """Return the tables that were chosen, with notes about what differs between the results.
+
+    ``--by`` chooses tables by kind of words, a diagnostic name one table, all else the paper's.
+    """
+    from roboirg.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
+    from roboirg.analysis.tables.table_notes import with_mixtures
 
     if by is not None:
-        found = _breakdown_tables(data, by)
+        made = _breakdown_tables(data, by)
     elif which in DIAGNOSTIC_TABLES:
-        records = (one for source in sources for one in source.records())
-        found = [DIAGNOSTIC_TABLES[which](data, records)]
+        records = itertools.chain.from_iterable(source.records() for source in sources)
+        made = [DIAGNOSTIC_TABLES[which](data, records)]
     else:
-        found = _paper_tables(which, data, published=published, floors=floors)
-    return with_mixtures(found, data.frame)
+        made = _paper_tables(which, data, published=published, floors=floors)
+    return with_mixtures(made, data.frame)
 
 
 def _paper_tables(which: str, data: RunData, *, published: bool, floors: str | None) -> list[Table]:
-    from roboirg.evaluation.analysis.published import RATE_TABLES
-    from roboirg.evaluation.analysis.stats.chance import FLOORS
-    from roboirg.evaluation.analysis.tables.paper_tables import WHICH, is_informative, make_table
+    """Return one table of the paper, or with ``all`` each for which there are results.
 
-    shown = (*RATE_TABLES, "coverage") if published else ()
-    asked = (
-        [one for one in WHICH if one in shown or is_informative(one, data)]
-        if which == _ALL
-        else [which]
-    )
+    With the published values, the tables that have some are always among them.
+    """
+    from roboirg.analysis.measures.chance import FLOORS
+    from roboirg.analysis.published import RATE_TABLES
+    from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
+
     added = () if floors is None else known_names("floor", floors, FLOORS)
-    found = [make_table(one, data, published=published, floors=added) for one in asked]
-    if which not in (_ALL, "coverage") and not found[0].rows:
-        raise InvalidValueError(
-            f"The runs have no results for the table {which!r}; --which all shows what they have."
-        )
-    return found
+    make = functools.partial(make_table, data=data, published=published, floors=added)
+    if which != _ALL:
+        table = make(which)
+        if which != _COVERAGE and not table.rows:
+            raise InvalidValueError(
+                f"The runs have no results for the table {which!r}; --which all shows what they "
+                "have."
+            )
+        return [table]
+
+    made: list[Table] = []
+    for name in WHICH:
+        is_of_paper = name in RATE_TABLES or name == _COVERAGE
+        if (published and is_of_paper) or is_informative(name, data):
+            made.append(make(name))
+    return made
 
 
 def _breakdown_tables(data: RunData, by: str) -> list[Table]:
-    from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
+    """Make the tables of gaps by kind of words that the runs have results for."""
+    from roboirg.analysis.tables.diagnostic_tables import make_breakdown_table
 
-    tables = (make_breakdown_table(one, data.frame) for one in _breakdowns(by))
-    if not (found := [table for table in tables if table.rows]):
+    made: list[Table] = []
+    for breakdown in _breakdowns(by):
+        table = make_breakdown_table(breakdown, data.frame)
+        if table.rows:
+            made.append(table)
+    if not made:
         raise InvalidValueError(
             f"The runs have no instruction to break down by {by}; they need an implicit setting."
         )
-    return found
+    return made
 
 
 def _breakdowns(by: str | None) -> tuple[Breakdown, ...]:
-    from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS
+    """Return the breakdowns with the names in a text such as ``pattern,stage``; none without it."""
+    from roboirg.analysis.measures.breakdowns import BREAKDOWNS
 
-    names = () if by is None else known_names("breakdown", by, tuple(BREAKDOWNS))
+    if by is None:
+        return ()
+    names = known_names("breakdown", by, tuple(BREAKDOWNS))
     return tuple(BREAKDOWNS[name] for name in names)

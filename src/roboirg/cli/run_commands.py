@@ -20,16 +20,19 @@ from roboirg.util.processor import worker_advice
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from roboirg.evaluation.analysis.results.frame import Frame
-    from roboirg.evaluation.plan.plan import Plan
-    from roboirg.evaluation.plan.sources import Source
-    from roboirg.evaluation.records.record import Job
-    from roboirg.evaluation.run.executor import Executor
-    from roboirg.evaluation.run.runner import RunSummary
+    from roboirg.analysis.results.frame import Frame
+    from roboirg.analysis.results.sources import Source
+    from roboirg.records.record import Job, Summary
+    from roboirg.runs.plan.plan import Plan
+    from roboirg.runs.run.executor import Executor
+    from roboirg.runs.run.runner import RunSummary
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
-USAGE_ERROR, INTERRUPTED, TERMINATED = 2, 130, 143
+USAGE_ERROR = 2
+INTERRUPTED = 130
+TERMINATED = 143
+"""Exit codes."""
 EXECUTORS = ("local", "ray")
 
 PlanName = Annotated[
@@ -79,14 +82,15 @@ def run(
 
     Example: roboirg run --policy oracle --tasks PickXtimes --out runs/first
     """
-    from roboirg.evaluation.plan.plan_file import plan_text
-    from roboirg.evaluation.plan.sources import Source
-    from roboirg.evaluation.play.prompt_shares import prompt_shares, warning_lines
-    from roboirg.evaluation.play.video_writer import check_video_support
-    from roboirg.evaluation.records.run_files import run_folder
-    from roboirg.evaluation.run.runner import check_run
+    from roboirg.analysis.results.sources import Source
+    from roboirg.records.run_files import run_folder
+    from roboirg.runs.plan.plan_file import plan_text
+    from roboirg.runs.play.prompt_shares import prompt_shares, warning_lines
+    from roboirg.runs.play.video_writer import check_video_support
+    from roboirg.runs.run.runner import check_run
 
     add_working_directory(last=True)
+    # The plan that is shown needs no policy, so it gets one as an example.
     made = _plan(plan, context.obj, usual=("oracle",) if show_plan else ())
     if show_plan:
         typer.echo(plan_text(made), nl=False)
@@ -111,9 +115,9 @@ def run(
 
 def play(plan: Plan, out: Path, executor: Executor, *, retry: bool) -> RunSummary:
     """Play a plan with a progress bar; exits the process when it is interrupted."""
-    from roboirg.evaluation.episode_errors import Terminated
-    from roboirg.evaluation.run.progress import ConsoleReporter
-    from roboirg.evaluation.run.runner import episode_runner, run_plan
+    from roboirg.runs.episode_errors import Terminated
+    from roboirg.runs.run.progress import ConsoleReporter
+    from roboirg.runs.run.runner import episode_runner, run_plan
     from roboirg.util.console_width import progress_console
     from roboirg.util.freed_memory import keep_freed_memory
 
@@ -134,21 +138,28 @@ def print_tables_of(source: Source) -> None:
     """Print the tables of a run, what is mixed in it, and its unsuccessful episodes."""
     from rich.console import Console
 
-    from roboirg.evaluation.analysis.results.reading import read_frame
-    from roboirg.evaluation.analysis.tables.rendering.terminal import print_tables
-    from roboirg.evaluation.analysis.tables.run_tables import make_run_tables, print_failures
+    from roboirg.analysis.results.reading import read_frame
+    from roboirg.analysis.tables.rendering.terminal import print_tables
+    from roboirg.analysis.tables.run_tables import make_run_tables, print_failures
 
-    frame, console = read_frame([source]), Console()
+    frame = read_frame([source])
+    console = Console()
     print_tables(make_run_tables(frame), console)
     warn_of_mixtures(frame)
     print_failures(frame, console)
 
 
 def warn_of_mixtures(*frames: Frame) -> None:
-    """Print on stderr what the results do not have in common; control arms are left out."""
-    from roboirg.evaluation.records.mixing import mixtures
+    """Print on stderr what differs between the results, such as versions of the environment.
 
-    for sentence in mixtures([one for frame in frames for one in frame.told().played]):
+    Episodes of control arms differ on purpose, so they are left out.
+    """
+    from roboirg.records.mixing import mixtures
+
+    played: list[Summary] = []
+    for frame in frames:
+        played += frame.told().played
+    for sentence in mixtures(played):
         typer.echo(sentence, err=True)
 
 
@@ -183,59 +194,61 @@ def report_problems(summary: RunSummary, folder: Path) -> None:
 def _plan(name: str | None, typed: dict[str, Any], usual: Sequence[str]) -> Plan:
     """Return the plan of a file, overridden by the options that were typed.
 
-    `usual` are its policies if it has none.
+    Args:
+        name: of the plan or its file; None for a plan of typed options alone.
+        typed: options by name.
+        usual: the policies of a plan that names none; empty to refuse such a plan.
     """
-    from roboirg.evaluation.plan.plan import FLAT
-    from roboirg.evaluation.plan.plan_file import read_plan_file
-    from roboirg.evaluation.plan.plan_maker import make_plan
+    from roboirg.runs.plan.plan import FLAT
+    from roboirg.runs.plan.plan_file import read_plan_file
+    from roboirg.runs.plan.plan_maker import make_plan
     from roboirg.tasks.splits.private_splits import drawn_split
 
-    chosen = {} if name is None else read_plan_file(name)
+    fields = {} if name is None else read_plan_file(name)
+    # A plan refuses an option that stands both inside and outside of its section. A typed one
+    # stands outside, so it is removed from the section that the file may have.
     for option in FLAT.keys() & typed.keys():
-        section = chosen.get(FLAT[option])
+        section = fields.get(FLAT[option])
         if isinstance(section, dict):
             section.pop(option, None)
-    chosen |= typed
-    policies = chosen.pop("policies", None) or usual
+    fields |= typed
+    policies = fields.pop("policies", None) or usual
     if not policies:
         raise InvalidValueError("No policy given; name one with --policy, such as oracle.")
-    chosen["split"] = drawn_split(str(chosen.get("split", "test")))
-    return make_plan(policies, **chosen)
+    fields["split"] = drawn_split(str(fields.get("split", "test")))
+    return make_plan(policies, **fields)
 
 
 def _executor(plan: Plan, name: str, workers: int | None) -> Executor:
+    """Return what plays the episodes of a plan: processes of this machine, or a Ray cluster."""
     check_names("executor", [name], EXECUTORS)
     if name == "ray":
-        from roboirg.evaluation.run.ray_cluster import RayCluster
+        from roboirg.runs.run.ray_cluster import RayCluster
 
         address = os.environ.get("RAY_ADDRESS")
         variables = plan.cluster.variables + plan.hosting.policy_env
         needs = replace(plan.cluster, variables=variables)
         return RayCluster(workers, address, plan.attempts.episode_timeout_s, needs)
-    from roboirg.evaluation.run.executor import choose_executor
+    from roboirg.runs.run.executor import choose_executor
 
     return choose_executor(workers, plan.attempts.episode_timeout_s)
 
 
 def _print_counts(plan: Plan, folder: Path) -> None:
+    """Print what ``--dry-run`` shows: how many episodes there are and are stored, and calls.
+
+    Args:
+        plan: what would be played.
+        folder: of the run, which may not exist yet.
+    """
     from rich.console import Console
 
-    from roboirg.evaluation.records.record_codec import identity_key
-    from roboirg.evaluation.records.store import read_index
-    from roboirg.evaluation.run.plan_counts import cell_sizes
-    from roboirg.language.settings import EXPLICIT
+    from roboirg.records.record_codec import identity_key
+    from roboirg.records.store import read_index
 
-    jobs, console = plan.jobs(), Console()
-    sizes = cell_sizes(jobs)
-    settings = tuple(dict.fromkeys(setting for cells in sizes.values() for setting in cells))
-    rows = [
-        (*names, *(" + ".join(map(str, cells.get(one, {}).values())) or "–" for one in settings))
-        for names, cells in sizes.items()
-    ]
-    forms = dict.fromkeys(job.form for job in jobs if job.setting != EXPLICIT)  # it has one form
-    caption = f"episodes: {' + '.join(forms)}" if forms else "episodes"
-    heads = ("policy", "task", *settings)
-    _print_table(console, f"plan {plan.fingerprint}", heads, rows, caption)
+    console = Console()
+    jobs = plan.jobs()
+    settings = _print_sizes(plan, jobs, console)
     for arm, count in plan.left_out(jobs).items():
         console.print(f"{arm}: {counted(count, 'episode')} left out.", highlight=False)
     _print_prompt_shares(plan, jobs, settings, console)
@@ -247,6 +260,39 @@ def _print_counts(plan: Plan, folder: Path) -> None:
     _print_model_calls(todo, console)
 
 
+def _print_sizes(plan: Plan, jobs: tuple[Job, ...], console: Console) -> tuple[str, ...]:
+    """Print a table with the number of episodes by policy and task (rows) and setting (columns).
+
+    If instructions have several forms, a cell has a number for each: ``50 + 50``.
+
+    Returns:
+        The settings, in the order of the columns.
+    """
+    from roboirg.language.settings import EXPLICIT
+    from roboirg.runs.run.plan_counts import cell_sizes
+
+    sizes = cell_sizes(jobs)
+    settings: dict[str, None] = {}  # a set that keeps its order
+    for counts_by_setting in sizes.values():
+        settings.update(dict.fromkeys(counts_by_setting))
+    rows: list[tuple[str, ...]] = []
+    for (policy, task), counts_by_setting in sizes.items():
+        cells: list[str] = []
+        for setting in settings:
+            counts = counts_by_setting.get(setting, {}).values()  # by form
+            cells.append(" + ".join(map(str, counts)) or "–")
+        rows.append((policy, task, *cells))
+
+    caption = "episodes"
+    # The explicit setting always has the same one form, so it is not listed.
+    forms = dict.fromkeys(job.form for job in jobs if job.setting != EXPLICIT)
+    if forms:
+        caption = f"episodes: {' + '.join(forms)}"
+    heads = ("policy", "task", *settings)
+    _print_table(console, f"plan {plan.fingerprint}", heads, rows, caption)
+    return tuple(settings)
+
+
 def _print_table(
     console: Console,
     title: str,
@@ -254,7 +300,15 @@ def _print_table(
     rows: Sequence[Sequence[str]],
     caption: str | None = None,
 ) -> None:
-    """Print a table, if it has rows; all columns but those of names are numbers."""
+    """Print a table, if it has rows; columns of numbers stand to the right.
+
+    Args:
+        console: where to print.
+        title: above the table.
+        heads: of the columns; only those of policy, task and setting are no numbers.
+        rows: of the table, with a text for each column.
+        caption: below the table; None for none.
+    """
     from rich.table import Table
 
     from roboirg.util.console_width import widen
@@ -271,10 +325,17 @@ def _print_table(
 
 
 def _print_model_calls(todo: Sequence[Job], console: Console) -> None:
-    """Print how often models will be asked at least, if policies ask any."""
-    from roboirg.evaluation.run.plan_counts import least_calls
+    """Print how often the policies will ask a model at least; nothing if none asks one.
 
-    rows = [(*names, f"{calls:,}") for names, calls in least_calls(todo).items()]
+    Args:
+        todo: the jobs that are not stored yet.
+        console: where to print.
+    """
+    from roboirg.runs.run.plan_counts import least_calls
+
+    rows: list[tuple[str, ...]] = []
+    for (policy, setting), calls in least_calls(todo).items():
+        rows.append((policy, setting, f"{calls:,}"))
     _print_table(console, "least calls of models", ("policy", "setting", "calls"), rows)
     if rows:
         console.print(
@@ -286,21 +347,28 @@ def _print_model_calls(todo: Sequence[Job], console: Console) -> None:
 def _print_prompt_shares(
     plan: Plan, jobs: tuple[Job, ...], settings: tuple[str, ...], console: Console
 ) -> None:
-    """Print how many instructions the policies that declare a limit do not read whole."""
-    from roboirg.core.policy_ref import BUILT_IN
-    from roboirg.evaluation.play.prompt_shares import prompt_shares, share_text
+    """Print how many instructions are too long for the policies that declare a limit of tokens.
 
-    shares = prompt_shares(jobs)
-    rows = []
-    for one in shares:
-        if one.limit is not None:
-            counts = (one.settings.get(setting) for setting in settings)
-            row = ("–" if count is None else share_text(count) for count in counts)
-            rows.append((one.policy, f"{one.limit.tokens} tokens", *row))
+    Policies that declare no limit are named below the table, but for the built-in ones, which
+    read every instruction.
+    """
+    from roboirg.core.policy_ref import BUILT_IN
+    from roboirg.runs.play.prompt_shares import prompt_shares, share_text
+
+    built_in = {policy.name for policy in plan.policies if policy.kind == BUILT_IN}
+    rows: list[tuple[str, ...]] = []
+    undeclared: list[str] = []
+    for shares in prompt_shares(jobs):
+        if shares.limit is not None:
+            cells: list[str] = []
+            for setting in settings:
+                verdicts = shares.settings.get(setting)
+                cells.append("–" if verdicts is None else share_text(verdicts))
+            rows.append((shares.policy, f"{shares.limit.tokens} tokens", *cells))
+        elif shares.policy not in built_in:
+            undeclared.append(shares.policy)
     title = "instructions cut off at a policy's limit"
     _print_table(console, title, ("policy", "reads", *settings), rows)
-    ours = {one.name for one in plan.policies if one.kind == BUILT_IN}
-    undeclared = [one.policy for one in shares if one.limit is None and one.policy not in ours]
     if undeclared:
         console.print(
             f"No limit declared (prompt_tokens=N), so cuts are unknown: {', '.join(undeclared)}.",

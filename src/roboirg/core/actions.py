@@ -79,6 +79,8 @@ WAYPOINT = ActionSpace(
 
 _NO_NUMBERS = bool, np.bool_, NoneType, Decimal, np.ma.core.MaskedConstant
 """What stands in lists of others for a number, and is none."""
+_REAL_KINDS = "iuf"
+"""NumPy's letters for whole numbers with and without a sign, and for floating-point numbers."""
 NO_POINT = -1.0
 CHOICE = ActionSpace(
     "choice",
@@ -95,10 +97,16 @@ ACTION_SPACES: Mapping[str, ActionSpace] = {
 
 
 def choice_action(label: str, point: tuple[float, float] | None = None) -> CheckedActions:
-    """Return the action of a choice: its letter, and row and column of the point if it has one."""
+    """Return the action of a choice: its letter, and row and column of the point if it has one.
+
+    ``"b", (120, 80)`` -> 1, 120, 80; ``"b"`` -> 1, -1, -1.
+    """
     if len(label) != 1 or not label.isascii() or not label.isalpha():
         raise InvalidActionError(f"Choice {label!r} is not a letter.")
-    return np.array([ord(label.lower()) - ord("a"), *(point or (NO_POINT, NO_POINT))])
+    number = ord(label.lower()) - ord("a")
+    if point is None:
+        point = (NO_POINT, NO_POINT)
+    return np.array([number, *point])
 
 
 def find_action_space(name: object) -> ActionSpace:
@@ -121,7 +129,7 @@ def check_action(action: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> Checked
 def check_chunk(actions: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> CheckedActions:
     """Return a policy's answer as a chunk (n, size), n >= 1; one action is a chunk of one."""
     numbers = _numbers(actions, space)
-    chunk = numbers[None] if numbers.ndim == 1 else numbers
+    chunk = numbers[None] if numbers.ndim == 1 else numbers  # one action becomes one row
     if chunk.ndim != 2 or chunk.shape[1] != space.size or len(chunk) == 0:  # noqa: PLR2004
         raise InvalidActionError(
             f"A chunk of actions ({space.name}) has shape (n, {space.size}), n >= 1; an action has "
@@ -131,21 +139,34 @@ def check_chunk(actions: ArrayLike, space: ActionSpace = JOINT_ANGLE) -> Checked
 
 
 def _numbers(action: ArrayLike, space: ActionSpace) -> CheckedActions:
+    """Return what a policy gave as an array of float64, of any shape.
+
+    Takes lists, and arrays of NumPy, PyTorch and JAX.
+
+    Raises:
+        InvalidActionError: it is no array of real numbers.
+    """
     got = type(action).__name__
     if hasattr(action, "detach"):
-        # NumPy takes no tensor of PyTorch in bfloat16, with a gradient, or on a GPU.
+        # A tensor of PyTorch; NumPy takes none in bfloat16, with a gradient, or on a GPU.
         tensor = action.detach().cpu()
-        action = tensor.double().numpy() if tensor.is_floating_point() else tensor.numpy()
+        if tensor.is_floating_point():
+            tensor = tensor.double()
+        action = tensor.numpy()
     try:
         numbers = np.asarray(action)
     except ValueError:
-        numbers, got = np.asarray(None), "rows of different lengths"
+        numbers = np.asarray(None)  # no number either, so it is refused below
+        got = "rows of different lengths"
+    # NumPy turns the flags in a list into numbers; an array, which it returns as it is, has a type.
     if numbers.ndim and numbers is not action:
         _check_values(np.ma.asarray(action, dtype=object))  # type: ignore[no-untyped-call]
-    if numbers.dtype.kind not in "iuf" and numbers.dtype.name != "bfloat16":  # JAX's
-        dtype = f" of dtype {numbers.dtype}" if numbers.ndim else ""
+    is_real = numbers.dtype.kind in _REAL_KINDS or numbers.dtype.name == "bfloat16"  # JAX's
+    if not is_real:
+        if numbers.ndim:
+            got += f" of dtype {numbers.dtype}"
         raise InvalidActionError(
-            f"An action ({space.name}) is an array of {space.size} real numbers; got {got}{dtype}."
+            f"An action ({space.name}) is an array of {space.size} real numbers; got {got}."
         )
     return numbers.astype(np.float64)
 
@@ -158,9 +179,11 @@ def _check_values(values: NDArray[np.object_]) -> None:
 
 
 def _finite(numbers: CheckedActions) -> CheckedActions:
+    """Return the numbers if all of them are finite; raises `InvalidActionError` otherwise."""
     bad = np.argwhere(~np.isfinite(numbers))
     if len(bad):
-        raise _bad_value(bad[0], str(numbers[tuple(bad[0])]))
+        place = bad[0]
+        raise _bad_value(place, str(numbers[tuple(place)]))
     return numbers
 
 

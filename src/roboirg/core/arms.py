@@ -30,6 +30,8 @@ ARMS: Mapping[str, str] = {
 PARAPHRASES = 2
 """How many of them ``paraphrase`` alone stands for."""
 MOST_PARAPHRASES = 20
+_MOST_DIGITS = 3
+"""Of a number of paraphrases that is read at all."""
 
 _NUMBERED = re.compile(rf"{PARAPHRASE}-([1-9]\d?)")
 
@@ -46,27 +48,36 @@ def check_arm(arm: str) -> None:
     Raises:
         UnknownNameError: there is none.
     """
+    is_known = arm in ARMS and arm != PARAPHRASE
     number = paraphrase_number(arm)
-    if arm == PARAPHRASE or (arm not in ARMS and not 1 <= (number or 0) <= MOST_PARAPHRASES):
-        known = [name if name != PARAPHRASE else f"{name}-1" for name in ARMS]
+    if number is not None:
+        is_known = number <= MOST_PARAPHRASES
+    if not is_known:
+        known = [f"{name}-1" if name == PARAPHRASE else name for name in ARMS]
         raise UnknownNameError("arm", arm, known)
 
 
 def parse_arm(text: str) -> tuple[str, ...]:
-    """Return the arms of a name as typed: ``paraphrase:2`` is the first two paraphrases.
+    """Return the arms of a name as typed.
+
+    ``silent`` -> itself; ``paraphrase:2`` -> ``paraphrase-1`` and ``paraphrase-2``; without a
+    number, `PARAPHRASES` of them.
 
     Raises:
         UnknownNameError: there is no such arm.
         InvalidValueError: the number of paraphrases is out of range.
     """
-    name, colon, count = text.partition(":")
+    name, colon, typed_count = text.partition(":")
     if name != PARAPHRASE:
         check_arm(text)
         return (text,)
-    number = int(count) if count.isdecimal() and len(count) < 4 else 0  # noqa: PLR2004
-    if colon and not 1 <= number <= MOST_PARAPHRASES:
+    count = PARAPHRASES
+    if colon:
+        is_number = typed_count.isdecimal() and len(typed_count) <= _MOST_DIGITS
+        count = int(typed_count) if is_number else 0  # 0 is refused, too
+    if not 1 <= count <= MOST_PARAPHRASES:
         raise InvalidValueError(
             f"The arm {text!r} must have a number of paraphrases from 1 to {MOST_PARAPHRASES}, "
             f"such as {PARAPHRASE}:{PARAPHRASES}."
         )
-    return tuple(f"{PARAPHRASE}-{one + 1}" for one in range(number or PARAPHRASES))
+    return tuple(f"{PARAPHRASE}-{number}" for number in range(1, count + 1))

@@ -38,19 +38,29 @@ class Choice(NamedTuple):
 def check_choices(actions: CheckedActions, choices: Sequence[Choice]) -> None:
     """Check that actions (n, 3) choose one of a task's choices, with a point where it needs one.
 
+    An action is the number of a choice, then row and column of the point; see
+    `roboirg.core.actions.CHOICE`.
+
     Raises:
         InvalidActionError: one does not; the message names the choices.
     """
-    low, high = CHOICE.low[1:], CHOICE.high[1:]
-    for number, *point in actions:
+    lowest = CHOICE.low[1:]
+    highest = CHOICE.high[1:]
+    for action in actions:
+        number = action[0]
         if number not in range(len(choices)):
-            listed = ", ".join(f"{one.label} ({one.action})" for one in choices)
+            listed = ", ".join(f"{choice.label} ({choice.action})" for choice in choices)
             raise InvalidActionError(
                 f"Choice number {number:g} is not one of 0 to {len(choices) - 1}: {listed}."
             )
         chosen = choices[int(number)]
-        if chosen.kind is not None and not ((point > low) & (point <= high)).all():
+        if chosen.kind is None:
+            continue
+        point = action[1:]
+        # Above -1, which stands for no point, so that 0 is the first row and column.
+        is_inside = bool(((point > lowest) & (point <= highest)).all())
+        if not is_inside:
             raise InvalidActionError(
                 f"Choice {chosen.label} ({chosen.action}) needs the row and column of a point, "
-                f"0 to {high[0]:g}; got {point[0]:g}, {point[1]:g}."
+                f"0 to {highest[0]:g}; got {point[0]:g}, {point[1]:g}."
             )

@@ -108,6 +108,9 @@ def facts_of(condition: Condition | Rule) -> tuple[Fact, ...]:
         case FactCount() | OccurrenceCount():
             return condition.facts
         case All():
-            return tuple(fact for part in condition.of for fact in facts_of(part))
+            facts: list[Fact] = []
+            for part in condition.of:
+                facts += facts_of(part)
+            return tuple(facts)
         case Elapsed():
             return ()

@@ -36,10 +36,18 @@ class HeardUtterance(NamedTuple):
 
 
 def utterance_steps(count: int, delivery: str) -> tuple[int, ...]:
-    """Return the control step of the policy's turn at which each of `count` utterances is said."""
+    """Return the control step of the policy's turn at which each of `count` utterances is said.
+
+    In turns, three are said at 0, 20 and 40, and five at 0, 10, 20, 30 and 40.
+    """
     if delivery != TURNS or count < 2:  # noqa: PLR2004 - one utterance has no other to wait for
         return (0,) * count
-    return tuple(min(turn * SPACING, turn * LATEST // (count - 1)) for turn in range(count))
+    steps = []
+    for turn in range(count):
+        # The first at 0, the last, which is the command, at `LATEST`.
+        evenly_spread = turn * LATEST // (count - 1)
+        steps.append(min(turn * SPACING, evenly_spread))
+    return tuple(steps)
 
 
 class SpokenInstruction:
@@ -52,7 +60,8 @@ class SpokenInstruction:
     """
 
     def __init__(self, turns: Sequence[str], delivery: str) -> None:
-        self._schedule = tuple(zip(utterance_steps(len(turns), delivery), turns, strict=True))
+        steps = utterance_steps(len(turns), delivery)
+        self._schedule = tuple(zip(steps, turns, strict=True))
         self.heard: list[HeardUtterance] = []
         self.prompt = ""
         self.hear(0)
@@ -63,13 +72,17 @@ class SpokenInstruction:
         return len(self._schedule) - len(self.heard)
 
     def hear(self, step: int) -> None:
-        """Hear what has been said up to a control step; call at every observation."""
-        new = [text for said, text in self._schedule[len(self.heard) :] if said <= step]
-        if new:
-            self.heard += [HeardUtterance(text, step) for text in new]
-            self.prompt = " ".join(new)
+        """Hear what has been said up to a control step; call at every observation.
+
+        `prompt` becomes what is new; it stays if nothing is.
+        """
+        unheard = self._schedule[len(self.heard) :]
+        new_texts = [text for said_at, text in unheard if said_at <= step]
+        if new_texts:
+            self.heard += [HeardUtterance(text, step) for text in new_texts]
+            self.prompt = " ".join(new_texts)
 
     def said_at(self, step: int) -> str:
         """Return the words said last at a control step, whether the policy observed it or not."""
-        last = max(said for said, _ in self._schedule if said <= step)
-        return " ".join(text for said, text in self._schedule if said == last)
+        last = max(said_at for said_at, _ in self._schedule if said_at <= step)
+        return " ".join(text for said_at, text in self._schedule if said_at == last)

@@ -87,7 +87,7 @@ class EnvironmentKeywords(TypedDict, total=False):
     meshes: str
 
 
-ENVIRONMENT_OPTIONS = tuple(one.name for one in fields(EnvironmentOptions))
+ENVIRONMENT_OPTIONS = tuple(option.name for option in fields(EnvironmentOptions))
 """The names of all options."""
 
 
@@ -113,4 +113,6 @@ def check_observe_every(value: object) -> int | None:
     Raises:
         InvalidValueError: it is neither None nor a whole number from 1 on.
     """
-    return None if value is None else check_whole("observe_every", value)
+    if value is None:
+        return None
+    return check_whole("observe_every", value)

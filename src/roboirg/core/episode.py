@@ -49,8 +49,17 @@ SlotValue = str | int | tuple[str, ...] | tuple[int, ...]
 Value = TypeVar("Value")
 
 
+def _times(number: object) -> str:
+    """Return a number of repetitions in words."""
+    if number == 1:
+        return "once"
+    if number == 2:  # noqa: PLR2004
+        return "twice"
+    return f"{number} times"
+
+
 _SLOT_WORDS: Mapping[str, Callable[[Any], str]] = {
-    "repeats": lambda number: {1: "once", 2: "twice"}.get(number, f"{number} times"),
+    "repeats": _times,
     "visit": "on visit {}".format,
     "placement": "on target {} of the video".format,
     "relation": "on the target {} the press".format,
@@ -64,12 +73,24 @@ def values_in(content: SlotValue) -> tuple[str | int, ...]:
 
 
 def describe_goal(goal: Mapping[str, Any]) -> str:
-    """Return a goal, or what a model takes for one, in words: ``red, 3 times``."""
+    """Return a goal, or what a model takes for one, in words.
+
+    ``{"color": "red", "repeats": 3}`` -> ``red, 3 times``; ``{"colors": ["red", "blue"], "counts":
+    [2, 1]}`` -> ``2 red, 1 blue``. Counted colors come last.
+    """
     values = {slot: values_in(content) for slot, content in goal.items()}
-    if {"colors", "counts"} <= values.keys():
-        amounts = itertools.zip_longest(values.pop("counts"), values.pop("colors"), fillvalue="?")
-        values["amounts"] = tuple(f"{count} {color}" for count, color in amounts)
-    return ", ".join(_SLOT_WORDS.get(slot, str)(one) for slot, own in values.items() for one in own)
+    amounts: list[str] = []
+    if "colors" in values and "counts" in values:
+        counts = values.pop("counts")
+        colors = values.pop("colors")
+        # A model may give more counts than colors, or fewer.
+        pairs = itertools.zip_longest(counts, colors, fillvalue="?")
+        amounts = [f"{count} {color}" for count, color in pairs]
+    words = []
+    for slot, slot_values in values.items():
+        in_words = _SLOT_WORDS.get(slot, str)
+        words += [in_words(value) for value in slot_values]
+    return ", ".join(words + amounts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +161,10 @@ class Scene:
 
     def hidden_in(self, container: str) -> SceneObject | None:
         """Return the cube under the named container, or None if that container is empty."""
-        return next((item for item in self.objects if item.inside == container), None)
+        for item in self.objects:
+            if item.inside == container:
+                return item
+        return None
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,6 +212,7 @@ class Goal:
         return tuple(zip(self.texts("colors"), self.numbers("counts"), strict=True))
 
     def _value(self, slot: str, kind: type[Value]) -> Value:
+        """Return the value of a slot, which must be of a kind."""
         value = self[slot]
         if not isinstance(value, kind):
             raise TypeError(f"slot {slot!r} holds {value!r}, which is no {kind.__name__}")

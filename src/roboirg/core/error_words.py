@@ -12,25 +12,35 @@ import sysconfig
 import traceback
 from collections.abc import Mapping
 from types import FrameType
+from typing import NamedTuple
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.plain_text import clip_text
 
-OUR_PACKAGES = "roboirg", "roboirg_learn"
+OUR_PACKAGES = ("roboirg", "roboirg_learn")
 """Their code is not the user's; their kinds of policies may read the simulator's state."""
 
 MAX_CAUSE_LENGTH = 400
+_ADDRESS = re.compile(r"0x[0-9a-fA-F]{6,}")
+"""Where an object is in memory: another place in every process."""
 _LIBRARY = re.compile(
     r"[\\/](site|dist)-packages[\\/]|<(?!frozen|string|stdin|python-input|ipython-input)"
 )
 """Files that no user edits: of installed packages, or code that one has generated."""
 
 
+class _Step(NamedTuple):
+    """A step of a traceback."""
+
+    frame: FrameType
+    line: int
+
+
 def one_line(error: BaseException) -> str:
     """Return an exception as one line: its kind, its message, and file and line of the user's code.
 
-    It is the same in every process. To a key that an observation or a demonstration lacks, it adds
-    those that are there.
+    ``ValueError: no such joint (lab/walk.py, line 12)``. It is the same in every process. To a key
+    that an observation or a demonstration lacks, it adds those that are there.
     """
     try:
         text = str(error)
@@ -38,14 +48,18 @@ def one_line(error: BaseException) -> str:
         text = "its text cannot be read"
     where = ""
     with contextlib.suppress(Exception):  # their variables may raise anything, too
-        if (step := _last_step(error)) is not None:
-            frame, line = step
-            where = f" ({_from_import_path(frame.f_code.co_filename)}, line {line})"
-            text += _keys_there(error, frame)
-    words = text if isinstance(error, RoboIRGError) else f"{type(error).__name__}: {text}"
+        step = _last_step(error)
+        if step is not None:
+            file = _from_import_path(step.frame.f_code.co_filename)
+            where = f" ({file}, line {step.line})"
+            text += _keys_there(error, step.frame)
+
+    words = text
+    if not isinstance(error, RoboIRGError):
+        words = f"{type(error).__name__}: {text}"
     # Splitting a text of a hundred megabytes would take minutes.
     words = " ".join(words[: 10 * MAX_CAUSE_LENGTH].split())
-    words = re.sub(r"0x[0-9a-fA-F]{6,}", "0x…", words).rstrip(": ")
+    words = re.sub(_ADDRESS, "0x…", words).rstrip(": ")
     where = clip_text(where, MAX_CAUSE_LENGTH // 2)
     return clip_text(words, MAX_CAUSE_LENGTH - len(where)) + where
 
@@ -53,22 +67,30 @@ def one_line(error: BaseException) -> str:
 def is_of_others(error: BaseException) -> bool:
     """Return whether an exception comes from code of users: files of theirs, or their packages."""
     step = _last_step(error)
-    return step is not None and _is_users(step[0])
+    return step is not None and _is_users(step.frame)
 
 
-def _last_step(error: BaseException) -> tuple[FrameType, int] | None:
-    """Return frame and line of the last step in code of users; else in what we called first."""
-    theirs = [
-        (frame, line)
-        for frame, line in traceback.walk_tb(error.__traceback__)
-        if _package(frame) not in OUR_PACKAGES and not _is_python(frame.f_code.co_filename)
-    ]
-    users = [one for one in theirs if _is_users(one[0])]
-    found = users or [one for one in theirs if _package(one[0]) == _package(theirs[0][0])]
-    return found[-1] if found else None
+def _last_step(error: BaseException) -> _Step | None:
+    """Return the last step in code of users; without any, the last in the package we called first.
+
+    Steps in our own code and in Python's do not count; None if there are no others.
+    """
+    steps_outside = []
+    for frame, line in traceback.walk_tb(error.__traceback__):
+        if _package(frame) not in OUR_PACKAGES and not _is_python(frame.f_code.co_filename):
+            steps_outside.append(_Step(frame, line))
+    if not steps_outside:
+        return None
+    candidates = [step for step in steps_outside if _is_users(step.frame)]
+    if not candidates:
+        # Deeper packages, such as NumPy under PyTorch, are not what we called.
+        called = _package(steps_outside[0].frame)
+        candidates = [step for step in steps_outside if _package(step.frame) == called]
+    return candidates[-1]
 
 
 def _package(frame: FrameType) -> str:
+    """Return the name of the package whose code runs in a frame."""
     return str(frame.f_globals.get("__name__")).partition(".")[0]
 
 
@@ -85,24 +107,39 @@ def _is_users(frame: FrameType) -> bool:
 
 @functools.cache
 def _extensions() -> frozenset[str]:
-    """Return the installed packages that add something to ours."""
+    """Return the installed packages that add something to ours, by entry points."""
     find = importlib.metadata.entry_points
-    groups = (find(group=one) for one in find().groups if one.startswith("roboirg."))
-    return frozenset(entry.module.partition(".")[0] for group in groups for entry in group)
+    packages = set()
+    for group in find().groups:
+        if group.startswith("roboirg."):
+            packages |= {entry.module.partition(".")[0] for entry in find(group=group)}
+    return frozenset(packages)
 
 
 def _from_import_path(file: str) -> str:
-    """Return the path of a file from where it was imported, which other machines share."""
-    roots = (os.path.join(os.path.abspath(one), "") for one in sys.path)  # noqa: PTH100, PTH118
-    return file.removeprefix(max(filter(file.startswith, roots), key=len, default=""))
+    """Return the path of a file from where it was imported, which other machines share.
+
+    With ``/home/me`` on the import path, ``/home/me/lab/walk.py`` is ``lab/walk.py``.
+    """
+    longest = ""
+    for folder in sys.path:
+        root = os.path.join(os.path.abspath(folder), "")  # noqa: PTH100, PTH118
+        if file.startswith(root) and len(root) > len(longest):
+            longest = root
+    return file.removeprefix(longest)
 
 
 def _keys_there(error: BaseException, frame: FrameType) -> str:
-    """Return the keys of an observation or a demonstration in a frame that lacks an error's key."""
-    if isinstance(error, KeyError):
-        for value in frame.f_locals.values():
-            is_ours = isinstance(value, Mapping) and "joint_positions" in value
-            if is_ours and error.args[0] not in value:
-                kind = "observation" if "instruction" in value else "demonstration"
-                return f"; the {kind} has {', '.join(sorted(value))}"
+    """Return the keys of an observation or a demonstration in a frame that lacks an error's key.
+
+    For ``observation["front"]``: *; the observation has front_rgb, gripper, …*; empty for others.
+    """
+    if not isinstance(error, KeyError):
+        return ""
+    for value in frame.f_locals.values():
+        # Both have joint positions; only an observation has an instruction.
+        is_ours = isinstance(value, Mapping) and "joint_positions" in value
+        if is_ours and error.args[0] not in value:
+            kind = "observation" if "instruction" in value else "demonstration"
+            return f"; the {kind} has {', '.join(sorted(value))}"
     return ""

@@ -21,9 +21,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TypeVar
 
-from roboirg.core.plain_text import printable
+from roboirg.core.plain_text import clip_text, printable
 
 Name = TypeVar("Name", bound=str)
+_MOST_SHOWN = 200
+"""Characters of an unknown name, which may be any text."""
 
 
 class RoboIRGError(Exception):
@@ -47,12 +49,15 @@ class UnknownNameError(InvalidValueError):
         names = list(known)
         import difflib  # here, because only a mistake needs it
 
-        close = difflib.get_close_matches(
-            str(name).lower(), [known_name.lower() for known_name in names], n=1
-        )
-        nearest = [known_name for known_name in names if known_name.lower() in close]
-        hint = f" Did you mean {nearest[0]!r}?" if nearest else ""
-        super().__init__(f"There is no {kind} {name!r}; known: {', '.join(names)}.{hint}")
+        # Compared in lower case, suggested as it is spelled.
+        lower_names = [known_name.lower() for known_name in names]
+        close = difflib.get_close_matches(str(name).lower(), lower_names, n=1)
+        hint = ""
+        if close:
+            nearest = names[lower_names.index(close[0])]
+            hint = f" Did you mean {nearest!r}?"
+        shown = clip_text(repr(name), _MOST_SHOWN)
+        super().__init__(f"There is no {kind} {shown}; known: {', '.join(names)}.{hint}")
 
 
 def check_names(kind: str, names: Iterable[object], known: Iterable[str]) -> None:

@@ -23,26 +23,33 @@ def extra_needed(sentence: str, extra: str) -> Iterator[None]:
     """
     try:
         yield
-    except ImportError as error:
-        if isinstance(error, MissingDependencyError):
-            raise
-        missing = isinstance(error, ModuleNotFoundError)
+    except MissingDependencyError:  # is an ImportError that says it already
+        raise
+    except ModuleNotFoundError as error:
         raise MissingDependencyError(
-            f"{sentence}, which {'is not installed' if missing else 'cannot be loaded'} ({error}); "
-            f"run: {install_command(extra)}{'' if missing else ', then roboirg doctor'}"
+            f"{sentence}, which is not installed ({error}); run: {install_command(extra)}"
+        ) from error
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"{sentence}, which cannot be loaded ({error}); run: {install_command(extra)}, then "
+            "roboirg doctor"
         ) from error
 
 
 def install_command(extra: str) -> str:
     """Return the command that adds an extra to this installation of the package.
 
-    It names what the package was installed from: a checkout, a file, a repository, or an index.
+    It names what the package was installed from: ``.[report]`` in a checkout, ``name[report] @
+    git+https://…`` from a repository, ``name[report]`` from an index.
     """
     if (_CHECKOUT / "pyproject.toml").is_file():
         folder = "." if Path.cwd() == _CHECKOUT else _CHECKOUT
         return f"{_pip()} install -e '{folder}[{extra}]'"
+    requirement = f"{DISTRIBUTION}[{extra}]"
     origin = _origin()
-    return f"{_pip()} install '{DISTRIBUTION}[{extra}]{f' @ {origin}' if origin else ''}'"
+    if origin:
+        requirement += f" @ {origin}"
+    return f"{_pip()} install '{requirement}'"
 
 
 def _pip() -> str:
@@ -63,10 +70,14 @@ def _origin() -> str | None:
     from importlib import metadata
 
     try:
-        noted = json.loads(metadata.distribution(DISTRIBUTION).read_text("direct_url.json") or "{}")
+        content = metadata.distribution(DISTRIBUTION).read_text("direct_url.json")
     except metadata.PackageNotFoundError:
         return None
+    if not content:
+        return None
+    noted = json.loads(content)
     url: str | None = noted.get("url")
-    if vcs := noted.get("vcs_info"):
-        return f"{vcs['vcs']}+{url}@{vcs['commit_id']}"
+    repository = noted.get("vcs_info")
+    if repository:
+        return f"{repository['vcs']}+{url}@{repository['commit_id']}"
     return url

@@ -303,18 +303,18 @@ def fact_traits(kind: FactKind) -> FactTraits:
     A kind that is not registered, as in a record of a task that is not installed, is a state
     called by its name.
     """
-    return FACT_TRAITS.get(kind) or FactTraits(
-        FactRole.STATE, (), "", f"{kind.replace('_', ' ')} {{subject}}", kind.replace("_", " ")
+    traits = FACT_TRAITS.get(kind)
+    if traits is not None:
+        return traits
+    words = kind.replace("_", " ")
+    return FactTraits(
+        role=FactRole.STATE, subjects=(), holds_while="", past=f"{words} {{subject}}", state=words
     )
 
 
 def raised_kind(object_kind: str) -> FactKind | None:
     """Return the kind of fact that says that an object of a kind is in the hand and up."""
-    return next(
-        (
-            kind
-            for kind, traits in FACT_TRAITS.items()
-            if traits.role is FactRole.RAISE and object_kind in traits.subjects
-        ),
-        None,
-    )
+    for kind, traits in FACT_TRAITS.items():
+        if traits.role is FactRole.RAISE and object_kind in traits.subjects:
+            return kind
+    return None

@@ -67,7 +67,7 @@ FAILURES: Mapping[FailureName, FailureMeaning] = {
         "grounding",
         "`wrong_object` or `wrong_place` with exactly the object that the words single out with "
         "left and right exchanged",
-        '"the container farthest to your left", and the one farthest to its right is lifted',
+        '"the container all the way on the left", and the one all the way on the right is lifted',
     ),
     "wrong_count": FailureMeaning(
         "grounding",

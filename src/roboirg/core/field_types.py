@@ -13,6 +13,7 @@ from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 
 MOST_NAME_LETTERS = 1000
 CONTROLS = "\\x00-\\x1f\\x7f-\\x9f\\u200e\\u200f\\u202a-\\u202e\\u2066-\\u2069"
+"""Characters that control a terminal or the direction of reading, for a set in a pattern."""
 NAME = f"^[^{CONTROLS}]{{0,{MOST_NAME_LETTERS}}}\\Z"
 """A name in a record: text without characters that control a terminal or reorder what is read."""
 
@@ -79,5 +80,11 @@ def described(text: str) -> dict[str, str]:
 
 def as_name(text: str) -> str:
     """Return the text of a stranger as a name: what a name may not hold is written as escapes."""
-    shown = re.sub(f"[{CONTROLS}]", lambda one: ascii(one[0])[1:-1], text)
+    shown = re.sub(f"[{CONTROLS}]", _escape, text)
     return clip_text(shown, MOST_NAME_LETTERS)
+
+
+def _escape(found: re.Match[str]) -> str:
+    r"""Return a character as an escape: ``\x1b``."""
+    quoted = ascii(found[0])
+    return quoted[1:-1]

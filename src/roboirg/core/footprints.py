@@ -34,9 +34,11 @@ class Rectangle:
         return Rectangle(self.x, self.y, self.half_x + by, self.half_y + by, self.yaw)
 
     def to_local(self, x: float, y: float) -> tuple[float, float]:
-        """Return a world point in the rectangle's frame."""
-        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
-        dx, dy = x - self.x, y - self.y
+        """Return a world point in the rectangle's frame: from its center, x along its yaw."""
+        cos = math.cos(self.yaw)
+        sin = math.sin(self.yaw)
+        dx = x - self.x
+        dy = y - self.y
         return cos * dx + sin * dy, cos * dy - sin * dx
 
 
@@ -73,15 +75,14 @@ class Region(NamedTuple):
 
     def draw(self, rng: np.random.Generator, inset: float = 0.0) -> tuple[float, float]:
         """Draw a uniform point of the region, shrunk by `inset` on each side."""
-        u, v = rng.random(2).tolist()
-        return (
-            self.x + (2.0 * u - 1.0) * (self.half_x - inset),
-            self.y + (2.0 * v - 1.0) * (self.half_y - inset),
-        )
+        share_x, share_y = rng.random(2).tolist()
+        x = self.x + (2.0 * share_x - 1.0) * (self.half_x - inset)
+        y = self.y + (2.0 * share_y - 1.0) * (self.half_y - inset)
+        return x, y
 
 
 def overlap(first: Footprint, second: Obstacle) -> bool:
-    """Return whether a footprint touches or overlaps an obstacle.
+    """Return whether a footprint touches or overlaps an obstacle: a case for each pair of shapes.
 
     As in RoboMME, a line next to a rectangle counts as clear of it only if their projections on a
     side of the rectangle or on the line are apart: not those across the line.
@@ -90,31 +91,42 @@ def overlap(first: Footprint, second: Obstacle) -> bool:
         thin = Rectangle(second.x, second.y, second.half, 0.0, second.yaw)
         if isinstance(first, Circle):
             return overlap(first, thin)
-        return not (any(_separations(first, thin)) or _separations(thin, first)[0])
+        # The second axis of the line, across it, is the one that does not count.
+        are_apart_along_line, _ = _separations(thin, first)
+        return not are_apart_along_line and not any(_separations(first, thin))
     if isinstance(first, Rectangle) and isinstance(second, Rectangle):
-        return not any((*_separations(first, second), *_separations(second, first)))
+        return not any(_separations(first, second)) and not any(_separations(second, first))
     if isinstance(first, Circle) and isinstance(second, Circle):
-        return math.hypot(first.x - second.x, first.y - second.y) <= first.radius + second.radius
+        distance = math.hypot(first.x - second.x, first.y - second.y)
+        return distance <= first.radius + second.radius
     if isinstance(first, Circle) and isinstance(second, Rectangle):
         return distance_to(second, first.x, first.y) <= first.radius
-    return overlap(second, first)
+    return overlap(second, first)  # a rectangle and a circle, the other way round
 
 
 def distance_to(rectangle: Rectangle, x: float, y: float) -> float:
     """Return the Euclidean distance from a point to a rectangle, meters; 0 inside."""
     local_x, local_y = rectangle.to_local(x, y)
-    return math.hypot(
-        max(abs(local_x) - rectangle.half_x, 0.0), max(abs(local_y) - rectangle.half_y, 0.0)
-    )
+    beyond_x = max(abs(local_x) - rectangle.half_x, 0.0)
+    beyond_y = max(abs(local_y) - rectangle.half_y, 0.0)
+    return math.hypot(beyond_x, beyond_y)
 
 
 def _separations(first: Rectangle, second: Rectangle) -> tuple[bool, bool]:
-    """Return for either axis of `first` whether it separates the two (separating-axis test)."""
+    """Return for either axis of `first`, x and y, whether it separates the two.
+
+    An axis separates them if their shadows on it do not touch. Two rectangles are apart if one of
+    the four axes of both separates them (separating-axis test).
+    """
     center_x, center_y = first.to_local(second.x, second.y)
-    cos, sin = abs(math.cos(second.yaw - first.yaw)), abs(math.sin(second.yaw - first.yaw))
+    cos = abs(math.cos(second.yaw - first.yaw))
+    sin = abs(math.sin(second.yaw - first.yaw))
+    # How far the second reaches from its center along the axes of the first.
     reach_x = cos * second.half_x + sin * second.half_y
     reach_y = sin * second.half_x + cos * second.half_y
-    return abs(center_x) > first.half_x + reach_x, abs(center_y) > first.half_y + reach_y
+    are_apart_in_x = abs(center_x) > first.half_x + reach_x
+    are_apart_in_y = abs(center_y) > first.half_y + reach_y
+    return are_apart_in_x, are_apart_in_y
 
 
 def place(

@@ -17,3 +17,5 @@ SLOT_TYPE_NAMES: Mapping[str, SlotTypeName] = {
 }
 """The type of each goal slot; counted colors are amounts, together with their counts."""
 COLOR_SLOTS = ("color", "colors")
+MOMENTS = ("before", "after")
+"""The values of a relation, in the order of time: right before and right after a button press."""

@@ -10,12 +10,20 @@ from __future__ import annotations
 
 import base64
 import html
+import math
 import re
 
 LEAST_LETTERS = 8
 """A shorter text, such as ``none`` or ``Bearer``, is no secret, and may be a word of an answer."""
 _BREAK = r"(?>(?:\s|\\[nr])*)"
 """Between letters of Base64, which may be wrapped into lines."""
+
+_BYTES_OF_GROUP = 3
+_BITS_OF_BYTE = 8
+_BITS_OF_LETTER = 6
+"""Of Base64."""
+_OTHER_SPELLINGS = {"+": "[-+]", "/": r"\\?[/_]"}
+"""Letters of Base64 that are others in addresses, or escaped."""
 
 _spellings: set[re.Pattern[str]] = set()
 """Of all keys that this process hands to others."""
@@ -26,12 +34,17 @@ def remember_key(key: str | None) -> None:
 
     Of ``Bearer KEY`` the last word is one, too.
     """
-    whole = (key or "").strip()
-    for secret in {whole, *whole.split()[-1:]}:
-        if len(secret) >= LEAST_LETTERS:
-            letters = re.findall(r"\\+|[^\\]", secret)
-            ways = ["".join(map(_letter_pattern, letters)), *_base64_patterns(secret.encode())]
-            _spellings.add(re.compile("|".join(ways), re.IGNORECASE))
+    if key is None or not key.strip():
+        return
+    whole = key.strip()
+    last_word = whole.split()[-1]
+    for secret in {whole, last_word}:
+        if len(secret) < LEAST_LETTERS:
+            continue
+        letters = re.findall(r"\\+|[^\\]", secret)  # backslashes in a row are one
+        in_letters = "".join(_letter_pattern(letter) for letter in letters)
+        spellings = [in_letters, *_base64_patterns(secret.encode())]
+        _spellings.add(re.compile("|".join(spellings), re.IGNORECASE))
 
 
 def _letter_pattern(letter: str) -> str:
@@ -44,33 +57,46 @@ def _letter_pattern(letter: str) -> str:
         count = len(letter)
         return rf"(?>(?:%5c|\\{{1,4}}u005c){{{count}}}|\\{{{count},{4 * count}}})"
     code = ord(letter)
+    percent_encoded = "".join(f"%{byte:02x}" for byte in letter.encode())
     ways = [
-        "".join(f"%{byte:02x}" for byte in letter.encode()),
-        rf"\\{{1,4}}u{code:04x}",
-        f"&#(?:0{{0,4}}{code}|x0{{0,4}}{code:x});",
+        percent_encoded,
+        rf"\\{{1,4}}u{code:04x}",  # \u0041, escaped once or twice
+        f"&#(?:0{{0,4}}{code}|x0{{0,4}}{code:x});",  # &#65; or &#x41;
         r"\\{0,4}" + re.escape(letter),
     ]
-    named = html.escape(letter)
-    if named != letter:
-        ways.insert(0, re.escape(named))
+    html_name = html.escape(letter)
+    if html_name != letter:
+        ways.insert(0, re.escape(html_name))
     return f"(?>{'|'.join(ways)})"
 
 
 def _base64_patterns(secret: bytes) -> list[str]:
-    """Return the letters of Base64 that a secret decides, wherever in a text it begins."""
-    found: list[str] = []
-    for start in range(3):
-        encoded = base64.b64encode(bytes(start) + secret).decode()
-        first, end = -(-8 * start // 6), 8 * (start + len(secret)) // 6
-        letters = [
-            {"+": "[-+]", "/": r"\\?[/_]"}.get(letter, letter) for letter in encoded[first:end]
-        ]
-        found.append(_BREAK.join(letters) + "[A-Za-z0-9+/_-]?={0,2}")
-    return found
+    """Return patterns of the letters of Base64 that a secret decides, wherever in a text it begins.
+
+    Base64 writes three bytes (24 bits) as four letters of 6 bits, so there are three places to
+    begin. Letters that hold bits of the bytes next to the secret, too, are not decided by it, and
+    are left out. ``key`` -> ``a2V5`` at the first place, ``tle`` at the second, ``rZX`` at the
+    third.
+    """
+    patterns: list[str] = []
+    for start in range(_BYTES_OF_GROUP):
+        bytes_before = bytes(start)  # zeros: their letters are left out below
+        encoded = base64.b64encode(bytes_before + secret).decode()
+        first_bit = _BITS_OF_BYTE * start
+        end_bit = _BITS_OF_BYTE * (start + len(secret))
+        # The first letter that begins in the secret, and the end of the last that ends in it.
+        first = math.ceil(first_bit / _BITS_OF_LETTER)
+        end = end_bit // _BITS_OF_LETTER
+        letters = [_OTHER_SPELLINGS.get(letter, letter) for letter in encoded[first:end]]
+        patterns.append(_BREAK.join(letters) + "[A-Za-z0-9+/_-]?={0,2}")
+    return patterns
 
 
 def without_keys(text: str) -> str:
-    """Return a text with an asterisk for each letter of a key."""
+    """Return a text with an asterisk for each letter of a key.
+
+    The longest first: a key may be part of another one, whose rest would stay.
+    """
     longest_first = sorted(_spellings, key=lambda spelling: len(spelling.pattern), reverse=True)
     for spelling in longest_first:
         text = spelling.sub(lambda found: "*" * len(found[0]), text)
@@ -79,4 +105,6 @@ def without_keys(text: str) -> str:
 
 def bytes_without_keys(data: bytes) -> bytes:
     """Return data with an asterisk for each byte of a key, so that messages keep their lengths."""
-    return without_keys(data.decode("latin-1")).encode("latin-1") if _spellings else data
+    if not _spellings:
+        return data
+    return without_keys(data.decode("latin-1")).encode("latin-1")

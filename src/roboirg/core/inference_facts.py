@@ -12,8 +12,10 @@ from typing import Annotated, Any
 
 import msgspec
 
-Word = Annotated[str, msgspec.Meta(max_length=100)]
-Words = Annotated[tuple[Word, ...], msgspec.Meta(max_length=20)]
+_MOST_LETTERS = 100
+_MOST_WORDS = 20
+Word = Annotated[str, msgspec.Meta(max_length=_MOST_LETTERS)]
+Words = Annotated[tuple[Word, ...], msgspec.Meta(max_length=_MOST_WORDS)]
 
 LIBRARIES = (
     "roboirgbench",
@@ -30,8 +32,11 @@ LIBRARIES = (
 """Distributions whose version is reported if the process has imported them."""
 
 _MODULES = {"google-genai": "google.genai", "roboirgbench": "roboirg"}
+"""Modules of distributions of another name."""
 _DEPTH = 5
+"""How far below a policy networks are looked for: attributes, theirs, and so on."""
 _MOST_OBJECTS = 200
+"""That are looked at on each level."""
 
 
 class InferenceFacts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -45,7 +50,7 @@ class InferenceFacts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     """
 
     python: Word
-    libraries: Annotated[dict[Word, Word], msgspec.Meta(max_length=20)] = {}
+    libraries: Annotated[dict[Word, Word], msgspec.Meta(max_length=_MOST_WORDS)] = {}
     dtypes: Words = ()
     devices: Words = ()
 
@@ -61,45 +66,56 @@ def inference_facts(policy: object) -> InferenceFacts:
     dtypes: Counter[str] = Counter()
     devices: Counter[str] = Counter()
     for parameter in _parameters(policy):
-        for counts, value in ((dtypes, parameter.dtype), (devices, parameter.device)):
-            counts[str(value).removeprefix("torch.")[:100]] += int(parameter.numel())
+        size = int(parameter.numel())
+        dtypes[_word(parameter.dtype)] += size
+        devices[_word(parameter.device)] += size
     return InferenceFacts(
         python=platform.python_version(),
         libraries=_libraries(),
-        dtypes=tuple(name for name, _ in dtypes.most_common(20)),
-        devices=tuple(name for name, _ in devices.most_common(20)),
+        dtypes=tuple(name for name, _ in dtypes.most_common(_MOST_WORDS)),
+        devices=tuple(name for name, _ in devices.most_common(_MOST_WORDS)),
     )
 
 
+def _word(value: object) -> str:
+    """Return what PyTorch calls a number type or a device: ``float32`` for ``torch.float32``."""
+    return str(value).removeprefix("torch.")[:_MOST_LETTERS]
+
+
 def _libraries() -> dict[str, str]:
-    found = {}
+    """Return the versions of the libraries that this process has imported."""
+    versions = {}
     for name in LIBRARIES:
         if _MODULES.get(name, name) in sys.modules:
             with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-                found[name] = importlib.metadata.version(name)[:100]
-    return found
+                versions[name] = importlib.metadata.version(name)[:_MOST_LETTERS]
+    return versions
 
 
 def _parameters(policy: object) -> Iterator[Any]:
-    """Yield the parameters of PyTorch networks among the attributes of an object, and of theirs."""
-    torch = sys.modules.get("torch")
-    module = getattr(getattr(torch, "nn", None), "Module", None)
-    if module is None:
+    """Yield the parameters of PyTorch networks among the attributes of an object, and of theirs.
+
+    Searches level by level: the object, what it holds, what these hold, and so on; each object
+    once, as they may hold each other.
+    """
+    torch = sys.modules.get("torch")  # a process that has not imported it has no networks
+    network_class = getattr(getattr(torch, "nn", None), "Module", None)
+    if network_class is None:
         return
-    seen: set[int] = set()
+    seen_ids: set[int] = set()
     level: list[object] = [policy]
     for _ in range(_DEPTH):
-        below: list[object] = []
-        for one in level[:_MOST_OBJECTS]:
-            if id(one) in seen:
+        next_level: list[object] = []
+        for value in level[:_MOST_OBJECTS]:
+            if id(value) in seen_ids:
                 continue
-            seen.add(id(one))
-            if isinstance(one, module):
-                yield from one.parameters()
-            elif isinstance(one, Mapping):
-                below += one.values()
-            elif isinstance(one, list | tuple):
-                below += one
-            elif hasattr(one, "__dict__"):
-                below += vars(one).values()
-        level = below
+            seen_ids.add(id(value))
+            if isinstance(value, network_class):
+                yield from value.parameters()
+            elif isinstance(value, Mapping):
+                next_level += value.values()
+            elif isinstance(value, list | tuple):
+                next_level += value
+            elif hasattr(value, "__dict__"):
+                next_level += vars(value).values()
+        level = next_level

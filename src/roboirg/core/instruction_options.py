@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypedDict
 
@@ -14,7 +14,6 @@ DEFAULT_DISTRACTOR = "neutral"
 DEFAULT_DISTRACTORS = 1
 DEFAULT_FRAME = "robot"
 DEFAULT_DELIVERY = "prompt"
-DEFAULT_LANGUAGE = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,21 +71,6 @@ class InstructionOptions:
             "prompt: the whole instruction at once; turns: one utterance after another."
         ),
     )
-    language: Whole = field(
-        default=DEFAULT_LANGUAGE,
-        metadata=described(
-            "Version of our words: 3; or 4, whole scenarios, for tasks that have them."
-        ),
-    )
-
-
-def identifying(options: InstructionOptions) -> dict[str, Any]:
-    """Return the fields of options that names and fingerprints hash: the usual language is none.
-
-    Those from before there was another language do not have it.
-    """
-    usual = ("language", DEFAULT_LANGUAGE)
-    return {name: value for name, value in asdict(options).items() if (name, value) != usual}
 
 
 class WordKeywords(TypedDict, total=False):
@@ -98,7 +82,6 @@ class WordKeywords(TypedDict, total=False):
     frame: str
     wordings: str | Path | None
     delivery: str
-    language: int
 
 
 class InstructionKeywords(WordKeywords, total=False):
@@ -108,12 +91,14 @@ class InstructionKeywords(WordKeywords, total=False):
     form: str
 
 
-OPTION_NAMES = tuple(one.name for one in fields(InstructionOptions))
+OPTION_NAMES = tuple(option.name for option in fields(InstructionOptions))
 """The names of all options."""
 
 
 def as_fields(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return keyword arguments of options as fields, whose stages are a tuple."""
-    stages = given.get("stages", ())
-    several = tuple(stages) if isinstance(stages, Iterable) else (stages,)
-    return {**given, "stages": several} if "stages" in given else dict(given)
+    values = dict(given)
+    if "stages" in values:
+        stages = values["stages"]
+        values["stages"] = tuple(stages) if isinstance(stages, Iterable) else (stages,)
+    return values

@@ -78,11 +78,17 @@ BESIDE = 0.05
 """How far from the outline of an object, in the plane, a hand is next to it."""
 UNCLEAR = 0.015
 """Closing fingers mean two objects if the distances to their outlines differ by less."""
-HAND_HIGH, HAND_RAISED, HAND_LOWERED, HAND_LOW = 0.25, 0.1, 0.08, 0.06
-"""Heights of the tool center: above the first it is at no object; closed fingers that were above
-the second and come below it let go; what is held below the third is being put down; closed fingers
-press below the fourth."""
-FINGERS_SHUT, FINGERS_OPEN = 0.004, 0.03
-"""Largest position of a finger that has closed on nothing, and smallest of one that is open."""
+HAND_HIGH = 0.25
+"""Height of the tool center above which it is at no object."""
+HAND_RAISED = 0.1
+"""Closed fingers that were above this height and come below it let go."""
+HAND_LOWERED = 0.08
+"""What is held below this height is being put down."""
+HAND_LOW = 0.06
+"""Closed fingers press below this height."""
+FINGERS_SHUT = 0.004
+"""Largest position of a finger that has closed on nothing."""
+FINGERS_OPEN = 0.03
+"""Smallest position of a finger that is open."""
 LINGER_STEPS = 60
 """Control steps for which a hand that stays where it is lingers."""

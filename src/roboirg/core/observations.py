@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from roboirg.core.errors import InvalidValueError, check_names
 
-FRONT, WRIST = "front", "wrist"
+FRONT = "front"
+WRIST = "wrist"
 CAMERAS = (FRONT, WRIST)
 
 DemonstrationSource = Literal["none", "recorded", "planned"]
@@ -98,7 +99,9 @@ class FetchedDemonstration(Mapping[str, NDArray[Any]]):
         arrays: Demonstration,
         fetch: Callable[[Sequence[str]], Demonstration],
     ) -> None:
-        self._fields, self._arrays, self._fetch = tuple(fields), dict(arrays), fetch
+        self._fields = tuple(fields)
+        self._arrays = dict(arrays)
+        self._fetch = fetch
 
     @property
     def length(self) -> int:

@@ -15,10 +15,14 @@ def printable(text: str) -> str:
     text = without_keys(text)
     if text.isprintable():
         return text
-    return "".join(
-        one if one.isprintable() or one in "\n\t" else one.encode("unicode_escape").decode()
-        for one in text
-    )
+    return "".join(_shown(character) for character in text)
+
+
+def _shown(character: str) -> str:
+    """Return a character, as an escape if it would control a terminal."""
+    if character.isprintable() or character in "\n\t":
+        return character
+    return character.encode("unicode_escape").decode()
 
 
 def clip_text(text: str, limit: int) -> str:
@@ -37,8 +41,9 @@ def is_encodable(text: str) -> bool:
 
 def counted(count: int, noun: str, plural: str | None = None) -> str:
     """Return a count with its noun: ``1 episode``, ``2,550 episodes``, ``0 tries``."""
-    word = noun if count == 1 else plural or f"{noun}s"
-    return f"{count:,} {word}"
+    if count == 1:
+        return f"{count} {noun}"
+    return f"{count:,} {plural or f'{noun}s'}"
 
 
 _SINGULAR_VERBS = {"are": "is", "were": "was", "have": "has", "do": "does"}

@@ -35,17 +35,20 @@ def merge_cameras(one: tuple[str, ...], other: tuple[str, ...]) -> tuple[str, ..
 def merge_demonstration_frames(
     one: DemonstrationFrames, other: DemonstrationFrames
 ) -> DemonstrationFrames:
-    """Return the frames of the video that contain those that each needs."""
+    """Return the frames of the video that contain those that each needs.
+
+    Every 4th and every 6th -> every 2nd; none and every 4th -> every 4th; every 2nd and 3rd -> all.
+    """
     strides = [1 if frames == "all" else int(frames) for frames in (one, other) if frames != "none"]
     if not strides:
         return "none"
-    every = math.gcd(*strides)
-    return "all" if every == 1 else every
+    stride = math.gcd(*strides)
+    return "all" if stride == 1 else stride
 
 
 def merge_observe_every(one: int | None, other: int | None) -> int | None:
     """Return the control steps between observations that contain those that each needs."""
-    periods = [every for every in (one, other) if every is not None]
+    periods = [period for period in (one, other) if period is not None]
     return math.gcd(*periods) if periods else None
 
 
@@ -53,26 +56,31 @@ def merge_trained_tasks(
     one: tuple[str, ...] | None, other: tuple[str, ...] | None
 ) -> tuple[str, ...] | None:
     """Return the tasks that both were trained on; None names none and leaves out none."""
-    known = [tasks for tasks in (one, other) if tasks is not None]
-    return tuple(task for task in known[0] if task in known[-1]) if known else None
+    if one is None:
+        return other
+    if other is None:
+        return one
+    return tuple(task for task in one if task in other)
 
 
 def _check_trained_tasks(tasks: object) -> tuple[str, ...]:
-    if not (isinstance(tasks, tuple | list) and all(isinstance(one, str) for one in tasks)):
-        raise InvalidValueError(
-            f"trained_tasks is {tasks!r}; it must be a tuple of names such as ('PickXtimes',), or "
-            "None."
-        )
-    return tuple(tasks)
+    """Return a value as names of tasks."""
+    if isinstance(tasks, tuple | list) and all(isinstance(task, str) for task in tasks):
+        return tuple(tasks)
+    raise InvalidValueError(
+        f"trained_tasks is {tasks!r}; it must be a tuple of names such as ('PickXtimes',), or None."
+    )
 
 
 def _check_flag(name: str, value: object) -> bool:
+    """Return a value if it is True or False."""
     if not isinstance(value, bool):
         raise InvalidValueError(f"{name} is {value!r}; it must be True or False.")
     return value
 
 
 def _check_tokenizer(path: object) -> str:
+    """Return a value if it may be the path of a file."""
     if not (isinstance(path, str) and path):
         raise InvalidValueError(f"tokenizer is {path!r}; it must be the path of a file, or None.")
     return path
@@ -159,11 +167,12 @@ class PolicyNeeds:
     )
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            value = getattr(self, one.name)
-            is_undeclared = value is None and one.default is None
+        for need in fields(self):
+            value = getattr(self, need.name)
+            is_undeclared = value is None and need.default is None
             if not is_undeclared:
-                object.__setattr__(self, one.name, one.metadata["check"](value))
+                checked = need.metadata["check"](value)
+                object.__setattr__(self, need.name, checked)  # as the dataclass is frozen
         if self.history_cameras is None:
             object.__setattr__(self, "history_cameras", self.cameras)
         for name in ("depth", "calibration"):
@@ -182,13 +191,15 @@ class PolicyNeeds:
         Raises:
             InvalidValueError: an attribute has an invalid value.
         """
-        return cls(**_declared(policy, names or [one.name for one in fields(cls)]))
+        wanted = names or [need.name for need in fields(cls)]
+        return cls(**_declared(policy, wanted))
 
     @classmethod
     def of_planner(cls, planner: object) -> Self:
         """Return what a planner declares; by default, it needs no pictures."""
-        unseen = {"cameras": (), "demonstration_frames": "none"}
-        return cls(**{**unseen, **_declared(planner, _names(cls, "merge"))})
+        values: dict[str, Any] = {"cameras": (), "demonstration_frames": "none"}
+        values |= _declared(planner, _names(cls, "merge"))
+        return cls(**values)
 
     @property
     def action_space(self) -> ActionSpace:
@@ -198,38 +209,39 @@ class PolicyNeeds:
     @property
     def env_options(self) -> dict[str, Any]:
         """The options of an environment that meets the needs, as `roboirg.make` takes them."""
-        return {one: getattr(self, one) for one in _names(type(self), "env")}
+        return {name: getattr(self, name) for name in _names(type(self), "env")}
 
     @property
     def declared(self) -> dict[str, Any]:
-        """The needs without those that are None, as JSON values."""
-        values = {one.name: getattr(self, one.name) for one in fields(self)}
-        return {
-            name: list(value) if isinstance(value, tuple) else value
-            for name, value in values.items()
-            if value is not None
-        }
+        """The needs without those that are None, as JSON values: tuples become lists."""
+        declared = {}
+        for need in fields(self):
+            value = getattr(self, need.name)
+            if value is not None:
+                declared[need.name] = list(value) if isinstance(value, tuple) else value
+        return declared
 
     def merge(self, planner: PolicyNeeds) -> Self:
-        """Return the needs of this policy together with those of its planner."""
-        return replace(
-            self,
-            **{
-                one.name: merged(getattr(self, one.name), getattr(planner, one.name))
-                for one in fields(self)
-                if (merged := one.metadata["merge"]) is not None
-            },
-        )
+        """Return the needs of this policy together with those of its planner.
+
+        Needs that planners do not have, such as the action space, stay this policy's.
+        """
+        merged = {}
+        for need in fields(self):
+            merge = need.metadata["merge"]
+            if merge is not None:
+                merged[need.name] = merge(getattr(self, need.name), getattr(planner, need.name))
+        return replace(self, **merged)
 
     def declare_on(self, policy: object) -> None:
         """Set the attributes of a policy, or of what stands for one, so that `of` reads these."""
-        for one in fields(self):
-            setattr(policy, one.name, getattr(self, one.name))
+        for need in fields(self):
+            setattr(policy, need.name, getattr(self, need.name))
 
 
 def _names(needs: type[PolicyNeeds], rule: str) -> tuple[str, ...]:
-    """Return the names of the fields that have a rule."""
-    return tuple(one.name for one in fields(needs) if one.metadata[rule])
+    """Return the names of the needs that have a rule of `need_rules`, such as ``env``."""
+    return tuple(need.name for need in fields(needs) if need.metadata[rule])
 
 
 ENV_NEEDS = _names(PolicyNeeds, "env")
@@ -237,12 +249,16 @@ ENV_NEEDS = _names(PolicyNeeds, "env")
 
 
 def _declared(policy: object, names: Iterable[str]) -> dict[str, Any]:
-    """Return the attributes of those names that a policy, or a class of policies, has."""
+    """Return the attributes of those names that a policy, or a class of policies, has.
+
+    A policy with ``cameras = ("front",)`` and nothing else -> ``{"cameras": ("front",)}``.
+    """
     is_class = inspect.isclass(policy)
-    known = [
-        name
-        for name in names
-        if not (is_class and hasattr(inspect.getattr_static(policy, name, None), "__get__"))
-    ]
-    found = {name: getattr(policy, name, _MISSING) for name in known}
-    return {name: value for name, value in found.items() if value is not _MISSING}
+    declared = {}
+    for name in names:
+        if is_class and hasattr(inspect.getattr_static(policy, name, None), "__get__"):
+            continue  # a property, whose value only an object has
+        value = getattr(policy, name, _MISSING)
+        if value is not _MISSING:
+            declared[name] = value
+    return declared

@@ -15,7 +15,9 @@ UNKNOWN_VERSION = "unknown"
 PRIVILEGED = "privileged:"
 """Before the spec of a policy of others: the user lets it read the simulator's state."""
 HANDS = "hands"
-SCRIPTED, ELSEWHERE = "scripted", "elsewhere"
+"""Option of a planner: what follows its subgoals, a policy or one of the next two."""
+SCRIPTED = "scripted"
+ELSEWHERE = "elsewhere"
 """Hands next to the world; and none, as a planner's own process has none."""
 
 Place = Literal["world", "own", "split", "server", "python"]

@@ -22,12 +22,23 @@ _STEPS = re.compile(r" for (\d{1,4}) steps?$")
 
 
 def split_steps(words: str) -> tuple[str, int | None]:
-    """Return words without the number of control steps at their end, and that number."""
+    """Return words without the number of control steps at their end, and that number.
+
+    ``hold still for 20 steps`` becomes ``hold still`` and 20.
+    """
     found = _STEPS.search(words)
-    return _STEPS.sub("", words), None if found is None else int(found[1])
+    if found is None:
+        return words, None
+    return _STEPS.sub("", words), int(found[1])
 
 
 def split_point(subgoal: str) -> tuple[str, Point | None]:
-    """Return the words of a subgoal without points, and its first point."""
+    """Return the words of a subgoal without points, and its first point.
+
+    ``pick up the cube at <120, 80>`` becomes ``pick up the cube`` and (120, 80).
+    """
     found = _POINT.search(subgoal)
-    return _POINT.sub("", subgoal), None if found is None else (int(found[1]), int(found[2]))
+    if found is None:
+        return subgoal, None
+    point = (int(found[1]), int(found[2]))
+    return _POINT.sub("", subgoal), point

@@ -16,34 +16,47 @@ _ORDINAL = "(?:first|second|third|fourth|fifth|sixth|seventh|eighth|ninth|tenth)
 _TIME = rf"(?: for the {_ORDINAL} time)?"
 _PICK = "pick (?:up )?(?:the|a)"
 _HELD = r"(?:it|the (?:\w+ )?(?:cube|tape|container))"
-_FORMS: tuple[tuple[str, PrimitiveKind, str | None], ...] = (
-    (
+
+
+class _Form(NamedTuple):
+    """The words of a subgoal, as a regular expression, and what they ask for.
+
+    The object to select is of a `thing`, if the words do not name one; None if they select none.
+    Words about what is hidden or correct are read and select nothing.
+    """
+
+    words: str
+    kind: PrimitiveKind
+    thing: str | None = None
+
+
+_FORMS = (
+    _Form(
         rf"{_PICK} (?:{_ORDINAL} )?(?:correct )?{_COLOR}(?P<thing>cube|tape)(?: up)?{_TIME}",
         "pick_cube",
-        None,
     ),
-    (
+    _Form(
         rf"{_PICK} (?:correct )?container(?: up)?(?: that hides the \w+ cube)?",
         "pick_container",
         "container",
     ),
-    (rf"(?:place|put|drop) {_HELD} on(?:to)? (?:the )?(?:correct )?target", "place_on", "target"),
-    (rf"(?:place|put|drop) {_HELD} in(?:to)? the bin", "drop_into", "bin"),
-    (rf"(?:place|put|drop) {_HELD} in(?:to)? the {_COLOR}box", "put_into", "box"),
-    (
+    _Form(
+        rf"(?:place|put|drop) {_HELD} on(?:to)? (?:the )?(?:correct )?target", "place_on", "target"
+    ),
+    _Form(rf"(?:place|put|drop) {_HELD} in(?:to)? the bin", "drop_into", "bin"),
+    _Form(rf"(?:place|put|drop) {_HELD} in(?:to)? the {_COLOR}box", "put_into", "box"),
+    _Form(
         rf"move to the top of the (?:(?P<side>right|left)(?:-side)? )?target{_TIME}",
         "move_over",
         "target",
     ),
-    (rf"(?:place|put|drop) {_HELD} on(?:to)? (?:the )?table", "put_down", None),
-    (rf"put (?:{_HELD} down|down {_HELD})", "put_down", None),
-    (r"move to the top of the button(?: to prepare)?", "hover", "button"),
-    (r"press the button to stop the cube on the target", "press", "target"),
-    (rf"press the (?:{_ORDINAL} )?button(?: to stop| to finish)?", "press", "button"),
-    (r"(?:remain )?static|hold still|leave the tapes where they are", "hold", None),
+    _Form(rf"(?:place|put|drop) {_HELD} on(?:to)? (?:the )?table", "put_down"),
+    _Form(rf"put (?:{_HELD} down|down {_HELD})", "put_down"),
+    _Form(r"move to the top of the button(?: to prepare)?", "hover", "button"),
+    _Form(r"press the button to stop the cube on the target", "press", "target"),
+    _Form(rf"press the (?:{_ORDINAL} )?button(?: to stop| to finish)?", "press", "button"),
+    _Form(r"(?:remain )?static|hold still|leave the tapes where they are", "hold"),
 )
-"""The words of each form; the primitive; the kind of object that a point or the words select, if
-one does. Words about what is hidden or correct are read and select nothing."""
 
 
 class Request(NamedTuple):
@@ -67,18 +80,24 @@ class Request(NamedTuple):
 
 
 def read_subgoal(subgoal: str) -> Request | None:
-    """Return what a subgoal asks for; None if it has no form of the grammar."""
-    words, point = split_point(" ".join(subgoal.lower().split()).rstrip("."))
+    """Return what a subgoal asks for; None if it has no form of the grammar.
+
+    *Pick up the red cube at <120, 80>.* -> ``pick_cube`` of a red cube, at row 120, column 80.
+    """
+    plain = " ".join(subgoal.lower().split()).rstrip(".")
+    words, point = split_point(plain)
     words, steps = split_steps(words)
-    for form, kind, thing in _FORMS:
-        if (found := re.fullmatch(form, words)) is not None:
-            said = found.groupdict()
-            return Request(
-                kind,
-                said.get("thing") or thing,
-                said.get("color"),
-                said.get("side"),
-                point,
-                WAIT_STEPS if steps is None else steps,
-            )
+    for form in _FORMS:
+        found = re.fullmatch(form.words, words)
+        if found is None:
+            continue
+        groups = found.groupdict()
+        return Request(
+            form.kind,
+            thing=groups.get("thing") or form.thing,
+            color=groups.get("color"),
+            side=groups.get("side"),
+            point=point,
+            steps=WAIT_STEPS if steps is None else steps,
+        )
     return None

@@ -8,10 +8,12 @@ NO_VERSION = "none"
 """Of a server that reported none, and without a server."""
 
 Makeup = tuple[tuple[str, str], ...]
-"""What a policy is besides its version, wherever it is: what makes it, under `POLICY`, then the
-options that change what it sees or does, but not those with their defaults. Empty if unknown."""
+"""What a policy is besides its version, wherever it is, as names and values: what makes it, under
+the name `POLICY`, then the options that change what it sees or does, but not those with their
+defaults. Empty if unknown."""
 
 POLICY = "policy"
+"""Names what makes a policy, among the names of its options."""
 WORDS = "words version"  # differs if the words of a task and pool do
 _DEFAULT = "at its default"
 
@@ -25,10 +27,11 @@ class Mismatch(NamedTuple):
 
     @property
     def label(self) -> str:
-        """The first value for a table, with the name of what it is."""
+        """The first value for a table, with the name of what it is, such as ``environment 1``."""
         if self.what == POLICY:
             return str(self.first)
-        return f"{self.what.removeprefix('option ').removesuffix(' version')} {self.first}"
+        name = self.what.removeprefix("option ").removesuffix(" version")
+        return f"{name} {self.first}"
 
 
 class Versions(NamedTuple):
@@ -53,23 +56,40 @@ class Versions(NamedTuple):
     words_version: str | None = None
 
     def differences(self, other: Versions) -> list[Mismatch]:
-        """Return all in which two differ, in the order of the fields."""
+        """Return all in which two differ, in the order of the fields.
+
+        Environment versions 1 and 2 -> ``Mismatch("environment version", 1, 2)``. What one of the
+        two does not know is no difference.
+        """
         if self == other:
             return []
-        first, second = dict(self.makeup), dict(other.makeup)
-        maker = Mismatch(POLICY, first.pop(POLICY, None), second.pop(POLICY, None))
-        found = [maker]
-        if maker.first == maker.second:
-            for name in sorted(first | second):
-                what = f"option {name}"
-                found.append(Mismatch(what, first.get(name, _DEFAULT), second.get(name, _DEFAULT)))
-        for field in self._fields[1:]:
-            what = field.replace("_", " ")
-            found.append(Mismatch(what, getattr(self, field), getattr(other, field)))
-        return [pair for pair in found if pair.first != pair.second and None not in pair]
+        pairs = _makeup_pairs(dict(self.makeup), dict(other.makeup))
+        for field in self._fields:
+            if field != "makeup":
+                what = field.replace("_", " ")
+                pairs.append(Mismatch(what, getattr(self, field), getattr(other, field)))
+        return [pair for pair in pairs if pair.first != pair.second and None not in pair]
+
+
+def _makeup_pairs(first: dict[str, str], second: dict[str, str]) -> list[Mismatch]:
+    """Return what makes two policies, and their options if the same makes both, equal or not."""
+    maker = Mismatch(POLICY, first.pop(POLICY, None), second.pop(POLICY, None))
+    if maker.first != maker.second:
+        return [maker]  # the options of another policy are others, too
+    pairs = [maker]
+    for name in sorted(first | second):
+        first_value = first.get(name, _DEFAULT)
+        second_value = second.get(name, _DEFAULT)
+        pairs.append(Mismatch(f"option {name}", first_value, second_value))
+    return pairs
 
 
 def makeup_text(makeup: Makeup) -> str | None:
-    """Return what makes a policy, with its options; None if it is not known."""
+    """Return what makes a policy, with its options; None if it is not known.
+
+    ``(("policy", "oracle"), ("noise", "2"))`` -> ``oracle noise=2``.
+    """
+    if not makeup:
+        return None
     words = [value if name == POLICY else f"{name}={value}" for name, value in makeup]
-    return " ".join(words) or None
+    return " ".join(words)

@@ -36,7 +36,7 @@ _listeners: list[WaitListener] = []
 _native_listeners: list[Callable[[NativeCode, float], None]] = []
 _waits: list[Wait] = []
 _queued = [0.0]
-"""Seconds that this process has waited for its turn."""
+"""Seconds that this process has waited for its turn: one number, in a list to be changed."""
 
 
 @contextlib.contextmanager
@@ -47,14 +47,14 @@ def waiting(what: str, *, is_queue: bool = False) -> Iterator[None]:
     """
     wait = Wait(what, is_queue, time.monotonic())
     _waits.append(wait)
-    _tell()
+    _report()
     try:
         yield
     finally:
         _waits.remove(wait)
         if is_queue:
             _queued[0] += time.monotonic() - wait.since
-        _tell()
+        _report()
 
 
 class NativeCall(NamedTuple):
@@ -74,7 +74,8 @@ class NativeCall(NamedTuple):
             listener(self.code, 0.0)
 
 
-DRAWING, PHYSICS = NativeCall("drawing"), NativeCall("physics")
+DRAWING = NativeCall("drawing")
+PHYSICS = NativeCall("physics")
 
 
 def listen(listener: WaitListener, native: Callable[[NativeCode, float], None]) -> None:
@@ -93,6 +94,8 @@ def queued_seconds() -> float:
     return _queued[0]
 
 
-def _tell() -> None:
+def _report() -> None:
+    """Report the innermost wait, or that there is none."""
+    wait = _waits[-1] if _waits else None
     for listener in _listeners:
-        listener(_waits[-1] if _waits else None)
+        listener(wait)

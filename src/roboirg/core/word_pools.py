@@ -6,8 +6,7 @@ and validation episodes speak from one pool, all others from the other; no wordi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Generic, Literal, NamedTuple, TypeVar, get_args
+from typing import Literal, get_args
 
 PoolName = Literal["train", "test"]
 POOLS: tuple[PoolName, ...] = get_args(PoolName)
@@ -15,34 +14,6 @@ ROBOMME_NAME = "robomme"
 """Name of the wordings with RoboMME's sentences, before the @ of their identity."""
 TRAINING_SPLITS = ("train", "val")
 """The splits whose words a policy may have been trained on."""
-
-Option = TypeVar("Option")
-
-
-class Pools(NamedTuple, Generic[Option]):
-    """The wordings of one kind, by pool; iterate over `everything` for all of them.
-
-    Attributes:
-        train: those of training and validation.
-        test: those held out from both.
-    """
-
-    train: tuple[Option, ...]
-    test: tuple[Option, ...]
-
-    @classmethod
-    def shared(cls, *options: Option) -> Pools[Option]:
-        """Return pools that both hold the same wordings."""
-        return cls(options, options)
-
-    @property
-    def everything(self) -> Iterator[Option]:
-        """Every wording once, those of training first."""
-        return iter(dict.fromkeys((*self.train, *self.test)))
-
-    def of(self, pool: PoolName) -> tuple[Option, ...]:
-        """Return the wordings of one pool."""
-        return self.train if pool == "train" else self.test
 
 
 def pool_of(split: str, wordings: str | None = None) -> PoolName:
@@ -63,6 +34,8 @@ def outside_words(wordings: str | None) -> str | None:
 
 def words_label(wordings: str | None) -> str:
     """Return whose words instructions have, from a pool or the identity of a wording file."""
+    if wordings is None:
+        return "our own words"
     if wordings in POOLS:
         return f"our own words for {wordings}"
-    return "our own words" if wordings is None else f"the words of {wordings}"
+    return f"the words of {wordings}"

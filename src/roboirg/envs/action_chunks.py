@@ -36,8 +36,9 @@ class ActionChunks(gymnasium.Wrapper[dict[str, Any], NDArray[Any], dict[str, Any
         super().__init__(env)
         check_whole("length", length)
         self._inner = cast("RoboIRGEnv", env.unwrapped)
-        one = find_action_space(self._inner.actions)
-        low, high = (np.tile(limits, (length, 1)) for limits in (one.low, one.high))
+        space = find_action_space(self._inner.actions)
+        low = np.tile(space.low, (length, 1))
+        high = np.tile(space.high, (length, 1))
         self.action_space = spaces.Box(low, high, dtype=np.float64)
 
     def step(self, action: ArrayLike) -> StepResult:
@@ -50,7 +51,8 @@ class ActionChunks(gymnasium.Wrapper[dict[str, Any], NDArray[Any], dict[str, Any
             InvalidActionError: wrong shape, not numeric or not finite; nothing has moved.
             ResetNeeded: the episode is over or has not been reset.
         """
-        if (shape := np.shape(action)) != self.action_space.shape:
+        shape = np.shape(action)
+        if shape != self.action_space.shape:
             raise InvalidActionError(
                 f"A chunk has shape {self.action_space.shape}; got shape {shape}."
             )

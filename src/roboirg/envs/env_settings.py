@@ -86,7 +86,8 @@ class EnvSettings:
 
     def __post_init__(self) -> None:
         self.environment.check()
-        check_names("render mode", {self.render_mode} - {None}, RENDER_MODES)
+        if self.render_mode is not None:
+            check_names("render mode", [self.render_mode], RENDER_MODES)
         check_arm(self.arm)
 
     @property
@@ -120,22 +121,38 @@ class EnvSettings:
         return self.with_options(options)
 
     def with_options(self, options: Mapping[str, Any]) -> EnvSettings:
-        """Return the settings with other values of keyword arguments; opens the wording file."""
+        """Return the settings with some values replaced; opens the wording file if one is named.
+
+        Args:
+            options: keyword arguments of `make`. Those of the instruction go into `words`, those of
+                the environment into `environment`, and all others are fields of the settings.
+        """
         check_names("option of make()", options, EnvOptions.__annotations__)
-        words = as_fields({name: options[name] for name in OPTION_NAMES if name in options})
+        words: dict[str, Any] = {}
+        environment: dict[str, Any] = {}
+        others: dict[str, Any] = {}
+        for name, value in options.items():
+            if name in OPTION_NAMES:
+                words[name] = value
+            elif name in ENVIRONMENT_OPTIONS:
+                environment[name] = value
+            else:
+                others[name] = value
+        words = as_fields(words)
         if "wordings" in words:
             words["wordings"] = open_wordings(words["wordings"])
-        played = {name: options[name] for name in ENVIRONMENT_OPTIONS if name in options}
         return replace(
             self,
             words=replace(self.words, **words),
-            environment=replace(self.environment, **played),
-            **{name: one for name, one in options.items() if name not in {*words, *played}},
+            environment=replace(self.environment, **environment),
+            **others,
         )
 
     def find_episode(self, task: str | Episode, index: int) -> Episode:
         """Return the episode to play: number `index`, or `task` itself if it is an episode."""
-        return task if isinstance(task, Episode) else get_episode(task, self.split, index)
+        if isinstance(task, Episode):
+            return task
+        return get_episode(task, self.split, index)
 
 
 def choose_index(settings: EnvSettings, seed: int | None, last: int | None) -> int:
@@ -150,4 +167,6 @@ def choose_index(settings: EnvSettings, seed: int | None, last: int | None) -> i
         return settings.episode
     if seed is not None:
         return seed % settings.episodes
-    return 0 if last is None else (last + 1) % settings.episodes
+    if last is None:
+        return 0
+    return (last + 1) % settings.episodes

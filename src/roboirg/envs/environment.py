@@ -11,7 +11,7 @@ from gymnasium import spaces
 from numpy.typing import ArrayLike, NDArray
 
 from roboirg.core.actions import CHOICE, Actions, check_action, check_chunk, find_action_space
-from roboirg.core.choices import check_choices
+from roboirg.core.choices import Choice, check_choices
 from roboirg.core.delivery import SpokenInstruction
 from roboirg.core.episode import Episode, Stage
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
@@ -101,17 +101,22 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
     observation_space: spaces.Dict
 
     def __init__(self, task: str | Episode, **options: Unpack[EnvOptions]) -> None:
-        self._task, self._settings = task, EnvSettings.of(options)
+        self._task = task
+        self._settings = EnvSettings.of(options)
         self._last_index: int | None = None
+        # What the words of `instruction` were made for: they are made once.
         self._instructed: tuple[Episode, InstructionOptions, str] | None = None
         self.episode: Episode
         self.instruction: Instruction
         self.original: Episode | None
         self._select_episode(self._settings, choose_index(self._settings, None, None))
+
         self._space = find_action_space(self._settings.environment.actions)
         self._spec = self._settings.observation_spec()
-        self.actions, self.cameras = self._space.name, tuple(self._spec.cameras)
-        self.depth, self.calibration = self._spec.depth, self._spec.calibration
+        self.actions = self._space.name
+        self.cameras = tuple(self._spec.cameras)
+        self.depth = self._spec.depth
+        self.calibration = self._spec.calibration
         self.demonstration_frames = self._spec.demonstration_frames
         self.observe_every = self._spec.observe_every
         self.history_cameras = tuple(self._spec.for_history.cameras)
@@ -121,6 +126,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
         self.draws = True
         self.observation_space = make_observation_space(self._spec)
         self.action_space = spaces.Box(self._space.low, self._space.high, dtype=np.float64)
+
         self._state: EpisodeState | None = None
         self._frame_hook: FrameHook | None = None
         self._hook_period = 1
@@ -137,25 +143,32 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
     @property
     def status(self) -> str:
         """Episode status: ongoing, success, failure or timeout."""
-        session, is_late = self.session, self._current.steps >= self.max_steps
+        session = self.session
+        is_late = self._current.steps >= self.max_steps
+        # In the arm other-goal the episode goes on after the verdict, until both are decided.
         if not session.is_decided and not is_late:
-            return "ongoing"  # in the arm other-goal even after the verdict
-        return "timeout" if session.status is Status.ONGOING else str(session.status)
+            return "ongoing"
+        if session.status is Status.ONGOING:
+            return "timeout"
+        return str(session.status)
 
     @property
     def cause(self) -> str | None:
         """Why the episode ended without success, in words; None if it did not."""
-        if self.status == "timeout":
+        status = self.status
+        if status == "ongoing":
+            return None
+        if status == "timeout":
             return f"not done after {self.max_steps} steps"
-        return None if self.status == "ongoing" else self.session.judge.cause
+        return self.session.judge.cause
 
     @property
     def subgoal(self) -> str:
         """The current subgoal in words; with `grounded`, with the pixel of its object."""
-        state, stage = self._current, self.due_stage
-        if state.pixel_grounding is not None:
-            return state.pixel_grounding.text
-        return COMPLETED if stage is None else plain_subgoal(stage)
+        grounding = self._current.pixel_grounding
+        if grounding is not None:
+            return grounding.text
+        return _subgoal_of(self.due_stage)
 
     @property
     def due_stage(self) -> Stage | None:
@@ -193,7 +206,9 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
     @property
     def render_device(self) -> str:
         """Name of the render device, or "none" if nothing is rendered."""
-        return describe_device(find_render_device()).name if self._renders else "none"
+        if not self._renders:
+            return "none"
+        return describe_device(find_render_device()).name
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -221,16 +236,15 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
         )
         self._after_step(self.session.judge.published)
         state = self._current
-        shown: dict[str, Any] = {
-            "demonstration": make_video(
-                self.episode, recording, self._spec, state.video_proprioception
-            ),
-            "demonstration_subgoals": state.video_subgoals,
-            "demonstration_source": recording.source,
-        }
+        video = make_video(self.episode, recording, self._spec, state.video_proprioception)
+        observation = self._observe()
+        info = self._info()
+        info["demonstration"] = video
+        info["demonstration_subgoals"] = state.video_subgoals
+        info["demonstration_source"] = recording.source
         if self.choices:
-            shown["available_multi_choices"] = [one.as_dict() for one in self.choices]
-        return self._observe(), {**self._info(), **shown}
+            info["available_multi_choices"] = [choice.as_dict() for choice in self.choices]
+        return observation, info
 
     def step(self, action: ArrayLike) -> StepResult:
         """Execute one action: one control step, or many in the waypoint space.
@@ -301,7 +315,8 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
 
         Also makes pictures available if observations hold none. Takes effect at the next reset.
         """
-        self._frame_hook, self._hook_period = hook, every
+        self._frame_hook = hook
+        self._hook_period = every
 
     def end_state(self) -> tuple[NDArray[np.float64], str]:
         """Return the state in numbers, as `EpisodeSession.state_numbers`, and as a hash."""
@@ -313,37 +328,49 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
 
     @property
     def _renders(self) -> bool:
-        drawn = bool(self.cameras) or self.grounded or self.render_mode is not None
-        return drawn or self._frame_hook is not None
+        """Whether anything needs pictures."""
+        is_asked = bool(self.cameras) or self.grounded or self.render_mode is not None
+        return is_asked or self._frame_hook is not None
 
     @property
     def _current(self) -> EpisodeState:
+        """The state since the last reset; raises `ResetNeeded` before the first."""
         if self._state is None:
             raise gymnasium.error.ResetNeeded("Call reset() first.")
         return self._state
 
     def _choose_episode(self, seed: int | None, options: dict[str, Any]) -> None:
         """Choose the episode and the instruction of a reset."""
-        if isinstance(self._task, Episode) and (fixed := {"split", "episode"} & set(options)):
+        choosing = {"split", "episode"} & options.keys()
+        if isinstance(self._task, Episode) and choosing:
             raise InvalidValueError(
-                f"This environment was made for one episode; reset takes no {min(fixed)!r}."
+                f"This environment was made for one episode; reset takes no {min(choosing)!r}."
             )
         settings = self._settings.with_reset_options(options)
         self._select_episode(settings, choose_index(settings, seed, self._last_index))
         self._last_index = self.episode.index
 
     def _select_episode(self, settings: EnvSettings, index: int) -> None:
-        chosen = settings.find_episode(self._task, index), settings.words, settings.arm
-        if self._instructed != chosen:
-            self.episode, self.instruction, self.original = say_arm(*chosen)
-            self._instructed = chosen
+        """Make an episode the current one, with its words.
+
+        Words are slow to make, so they are kept while episode, options and arm are the same.
+        """
+        wanted = (settings.find_episode(self._task, index), settings.words, settings.arm)
+        if self._instructed != wanted:
+            said = say_arm(*wanted)
+            self.episode = said.episode
+            self.instruction = said.instruction
+            self.original = said.original
+            self._instructed = wanted
         self.delivery = settings.words.delivery
-        is_choice = settings.environment.actions == CHOICE.name
-        self.choices = choices_of(self.episode) if is_choice else ()
+        self.choices: tuple[Choice, ...] = ()
+        if settings.environment.actions == CHOICE.name:
+            self.choices = choices_of(self.episode)
 
     def _play_demonstration(self, recording: Recording | None) -> Recording:
-        """Start the episode and play its demonstration."""
-        state = self._state = self._start_episode()
+        """Start the episode and play its demonstration: a recording, or planned without one."""
+        state = self._start_episode()
+        self._state = state
 
         def record_step(stage: Stage) -> None:
             self._after_step(stage, demonstration=True)
@@ -353,6 +380,7 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
         return state.session.play_demonstration(record_step, recording)
 
     def _start_episode(self) -> EpisodeState:
+        """Return the state at the beginning, with a new world."""
         session = EpisodeSession(
             self.episode,
             visible=self._renders,
@@ -392,31 +420,41 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
             demonstration: whether the step belongs to the video.
         """
         self._current.after_step(stage)
-        due = self.session.world.elapsed % self._hook_period == 0
-        if self._frame_hook is not None and (due or self.status != "ongoing"):
+        if self._frame_hook is None:
+            return
+        is_due = self.session.world.elapsed % self._hook_period == 0
+        if is_due or self.status != "ongoing":
             self._frame_hook(self, demonstration)
 
     def _record_history(self) -> None:
-        """Append an observation to the history after every n-th control step."""
-        if self.observe_every is not None and self._current.steps % self.observe_every == 0:
-            entry = self._current.observation_builder.read_history_entry()
-            said = self._current.spoken.said_at(self._current.steps)
-            self._current.history.append({**entry, "instruction": said})
+        """Append an observation to the history, after every `observe_every`-th control step."""
+        state = self._current
+        if self.observe_every is None or state.steps % self.observe_every:
+            return
+        entry = state.observation_builder.read_history_entry()
+        state.history.append({**entry, "instruction": state.spoken.said_at(state.steps)})
 
     def _observe(self) -> dict[str, Any]:
-        spoken = self._current.spoken
+        """Return what the policy sees now, and let it hear what has been said."""
+        state = self._current
         if self.status == "ongoing":  # afterwards no policy hears anything
-            spoken.hear(self._current.steps)
-        builder = self._current.observation_builder
-        seen = builder.read() if self.draws else builder.read_proprioception()
-        observation = {**seen, "instruction": spoken.prompt}
+            state.spoken.hear(state.steps)
+        builder = state.observation_builder
+        readings = builder.read() if self.draws else builder.read_proprioception()
+        observation = {**readings, "instruction": state.spoken.prompt}
         if self.observe_every is not None:
-            observation["history"] = tuple(self._current.history)
-            self._current.history.clear()
+            observation["history"] = tuple(state.history)
+            state.history.clear()
         return observation
 
     def _info(self) -> dict[str, Any]:
-        state, judge = self._current, self.session.judge
+        """Return the info of a reset or step, with the events and utterances since the last info.
+
+        In the arm other-goal it also has how the episode stands for the stated goal (``verdict``)
+        and for the scene's own goal (``original``).
+        """
+        state = self._current
+        judge = self.session.judge
         info = {
             "status": self.status,
             "is_success": self.status == Status.SUCCESS,
@@ -424,19 +462,27 @@ class RoboIRGEnv(gymnasium.Env[dict[str, Any], Actions]):
             "steps": state.steps,
             "elapsed_steps": self.session.world.elapsed,
             "events": [event.as_dict() for event in state.take_new_events()],
-            "heard": [one._asdict() for one in state.take_new_utterances()],
-            "subgoal": COMPLETED if judge.published is None else plain_subgoal(judge.published),
+            "heard": [utterance._asdict() for utterance in state.take_new_utterances()],
+            "subgoal": _subgoal_of(judge.published),
         }
         if state.pixel_grounding is not None:
             info["grounded_subgoal"] = state.pixel_grounding.text
         if self.session.original is not None:
-            info |= {"verdict": str(judge.status), "original": str(self.session.original.status)}
+            info["verdict"] = str(judge.status)
+            info["original"] = str(self.session.original.status)
         return info
+
+
+def _subgoal_of(stage: Stage | None) -> str:
+    """Return the subgoal of a stage that is due in words; None is after the last stage."""
+    return COMPLETED if stage is None else plain_subgoal(stage)
 
 
 def _shipped_recording(episode: Episode) -> Recording | None:
     """Return RoboMME's recording of the demonstration; None if there is none."""
     slot = (episode.task, episode.split, episode.index)
-    if not episode.recorded or not is_recorded(*slot):  # episodes can be made by hand
+    # An episode that is made by hand may have the place of one that was recorded.
+    if not episode.recorded or not is_recorded(*slot):
         return None
-    return Recording(*recorded_actions(*slot), end="")
+    recorded = recorded_actions(*slot)
+    return Recording(*recorded, end="")

@@ -56,16 +56,18 @@ class EpisodeState:
 
     def describe_stage(self, stage: Stage) -> str:
         """Return the subgoal of a video's stage, grounded if requested."""
-        return self.pixel_grounding.text if self.pixel_grounding else plain_subgoal(stage)
+        if self.pixel_grounding is not None:
+            return self.pixel_grounding.text
+        return plain_subgoal(stage)
 
     def take_new_events(self) -> Sequence[Event]:
-        """Return the events since the last call."""
-        fresh = self.session.events[self.reported_events :]
-        self.reported_events += len(fresh)
-        return fresh
+        """Return the events since the last call, which counts them as reported."""
+        new_events = self.session.events[self.reported_events :]
+        self.reported_events += len(new_events)
+        return new_events
 
     def take_new_utterances(self) -> Sequence[HeardUtterance]:
-        """Return the utterances that the policy has heard since the last call."""
-        fresh = self.spoken.heard[self.reported_utterances :]
-        self.reported_utterances += len(fresh)
-        return fresh
+        """Return the utterances that the policy has heard since the last call, likewise."""
+        new_utterances = self.spoken.heard[self.reported_utterances :]
+        self.reported_utterances += len(new_utterances)
+        return new_utterances

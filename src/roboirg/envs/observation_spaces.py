@@ -19,9 +19,12 @@ from roboirg.simulation.observation_builder import (
 )
 
 MAX_INSTRUCTION_LENGTH = 100_000
-PRINTABLE = "".join(chr(code) for code in range(32, 127))
+PRINTABLE = "".join(chr(code) for code in range(ord(" "), ord("~") + 1))
 _SLACK = 0.1
 """Radians by which joints may exceed their limits under load."""
+_GRIPPER_LOW = -0.01
+_GRIPPER_HIGH = 0.05
+"""Meters: a finger moves from 0 to 0.04, and a little beyond under load."""
 
 
 class InstructionSpace(spaces.Text):
@@ -56,22 +59,27 @@ class _TextView(Sequence[str]):
 
 @shared_memory.create_shared_memory.register(InstructionSpace)
 def _create(space: InstructionSpace, n: int = 1, ctx: Any = None) -> Any:  # noqa: ANN401, ARG001
+    """Return shared memory for the texts of `n` environments."""
     return ctx.Array(ctypes.c_uint8, n * MAX_INSTRUCTION_LENGTH)
 
 
 @shared_memory.write_to_shared_memory.register(InstructionSpace)
 def _write(space: InstructionSpace, index: int, values: str, block: Any) -> None:  # noqa: ANN401, ARG001
-    text, row = values.encode("ascii"), _TextView(block).rows[index]
+    """Write the text of an environment, with zeros up to the end of its place."""
+    text = values.encode("ascii")
+    row = _TextView(block).rows[index]
     row[: len(text)] = np.frombuffer(text, np.uint8)
     row[len(text) :] = 0
 
 
 @shared_memory.read_from_shared_memory.register(InstructionSpace)
 def _read(space: InstructionSpace, block: Any, n: int = 1) -> _TextView:  # noqa: ANN401, ARG001
+    """Return a view of the texts of all environments."""
     return _TextView(block)
 
 
 def make_observation_space(spec: ObservationSpec) -> spaces.Dict:
+    """Return the space of observations with these fields, and of their history if they have one."""
     instruction = InstructionSpace()
     fields: dict[str, spaces.Space[Any]] = {**_spaces(spec), "instruction": instruction}
     if spec.observe_every is not None:
@@ -82,18 +90,24 @@ def make_observation_space(spec: ObservationSpec) -> spaces.Dict:
 
 def _spaces(spec: ObservationSpec) -> dict[str, spaces.Space[Any]]:
     """Return the space of each field of `ObservationBuilder.read`."""
-    fields = {**picture_fields(spec), **proprioception_fields(spec)}
-    return {name: _space(name, kind) for name, kind in fields.items()}
+    formats = picture_fields(spec) | proprioception_fields(spec)
+    return {name: _space(name, format_) for name, format_ in formats.items()}
 
 
-def _space(field: str, kind: FieldFormat) -> spaces.Box:
-    shape, dtype = kind
-    if field == "joint_positions":
-        low, high = JOINT_LOW - _SLACK, JOINT_HIGH + _SLACK
-        return spaces.Box(low.astype(np.float32), high.astype(np.float32))
-    if field == "gripper":
-        return spaces.Box(-0.01, 0.05, shape, np.float32)
-    if issubclass(dtype, np.integer):
-        range_of = np.iinfo(dtype)
-        return spaces.Box(int(range_of.min), int(range_of.max), shape, dtype)
-    return spaces.Box(-np.inf, np.inf, shape, cast("type[np.floating[Any]]", dtype))
+def _space(name: str, format_: FieldFormat) -> spaces.Box:
+    """Return the space of a field of observations, such as ``joint_positions``.
+
+    Joints and gripper have known bounds. A field of whole numbers has those of its type, such as 0
+    to 255, and any other field none.
+    """
+    if name == "joint_positions":
+        low = (JOINT_LOW - _SLACK).astype(np.float32)
+        high = (JOINT_HIGH + _SLACK).astype(np.float32)
+        return spaces.Box(low, high)
+    if name == "gripper":
+        return spaces.Box(_GRIPPER_LOW, _GRIPPER_HIGH, format_.shape, np.float32)
+    if issubclass(format_.dtype, np.integer):
+        limits = np.iinfo(format_.dtype)
+        return spaces.Box(int(limits.min), int(limits.max), format_.shape, format_.dtype)
+    dtype = cast("type[np.floating[Any]]", format_.dtype)
+    return spaces.Box(-np.inf, np.inf, format_.shape, dtype)

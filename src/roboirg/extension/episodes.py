@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Goal, Split
-from roboirg.core.instruction_options import DEFAULT_LANGUAGE, InstructionOptions
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.subgoal_words import read_subgoal
 from roboirg.language import FORMS
 from roboirg.language.scenarios.identity import language_label
@@ -48,14 +48,17 @@ def episodes_of(
         InvalidValueError: the split is shorter.
     """
     size = SIZES[split] if count is None else count
-    return tuple(get_episode(task, split, number) for task in tasks for number in range(size))
+    episodes: list[Episode] = []
+    for task in tasks:
+        for number in range(size):
+            episodes.append(get_episode(task, split, number))
+    return tuple(episodes)
 
 
 def spoken(
     episodes: Sequence[Episode],
     settings: Sequence[str],
     pool: str,
-    language: int = DEFAULT_LANGUAGE,
 ) -> Iterator[tuple[Episode, str]]:
     """Yield the implicit instructions of episodes, each with its episode.
 
@@ -63,8 +66,7 @@ def spoken(
         episodes: the episodes.
         settings: names; one that a task lacks, or that cannot express an episode, is left out.
         pool: of wordings: train or test.
-        language: version of our words.
     """
-    options = InstructionOptions(wordings=pool, language=language)
+    options = InstructionOptions(wordings=pool)
     for episode, instruction in instructions(episodes, settings, FORMS[:1], options):
         yield episode, instruction.text

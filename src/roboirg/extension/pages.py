@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from roboirg.evaluation.analysis.published import published_rows
-from roboirg.evaluation.analysis.stats.intervals import without_spread
-from roboirg.evaluation.analysis.stats.paired_tests import holm
-from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
-from roboirg.evaluation.analysis.tables.table import Row, Table, named_columns
-from roboirg.evaluation.plan.plan_file import read_plan_file
+from roboirg.analysis.published import published_rows
+from roboirg.analysis.tables.rendering.markdown import markdown
+from roboirg.analysis.tables.table import Row, Table, named_columns
+from roboirg.runs.plan.plan_file import read_plan_file
+from roboirg.stats.intervals import without_spread
+from roboirg.stats.paired_tests import holm
 
 __all__ = ["holm", "markdown_table", "published_rows", "read_plan_file", "without_spread"]
 
@@ -31,7 +31,7 @@ def markdown_table(
         notes: below it.
         heads: headings of the groups and of the names; a single one is of the names.
     """
-    made = Table(
+    table = Table(
         key=title,
         title=title,
         heads=heads,
@@ -39,4 +39,4 @@ def markdown_table(
         rows=[Row(*row) for row in rows],
         notes=notes,
     )
-    return markdown(made).rstrip("\n")
+    return markdown(table).rstrip("\n")

@@ -11,12 +11,14 @@ import sapien
 import sapien.physx
 from numpy.typing import ArrayLike, NDArray
 
+from roboirg.core.actions import WAYPOINT
 from roboirg.core.episode import ROBOT_BASE, Episode, SceneObject
 from roboirg.core.errors import MotionPlanningError
+from roboirg.core.motions import Point
 from roboirg.core.observations import FRONT, Demonstration, Pixels
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.factory import make
-from roboirg.policies.builtin.waypoint_expert import Disturbance, ExpertWaypoint, WaypointExpert
+from roboirg.policies.builtin.waypoint_expert import Disturbance, WaypointExpert
 from roboirg.policies.contract.play import EpisodeLoop
 from roboirg.simulation.bodies import Body
 from roboirg.simulation.controllers import WaypointController
@@ -81,7 +83,7 @@ def labeled_views(episode: Episode, later: int) -> tuple[LabeledView, ...]:
         later: control step of the second picture.
     """
     session = EpisodeSession(episode, visible=True)
-    # What comes later leaves the table with the first step, before anything is shown.
+    # With the first step, objects that appear only later in the episode leave the table.
     session.world.step(HOME_ACTION)
     views = [_view(session.world, episode)]
     if episode.demonstration:
@@ -92,7 +94,11 @@ def labeled_views(episode: Episode, later: int) -> tuple[LabeledView, ...]:
 
 
 def _view(world: World, episode: Episode) -> LabeledView:
-    names = []
+    """Return the front picture of a world, with class, center and position of each visible object.
+
+    Centers are (column, row) in pixels, positions (x, y) in meters.
+    """
+    names: list[str] = []
     centers = []
     positions = []
     pixels = pixels_by_object(world)
@@ -102,13 +108,18 @@ def _view(world: World, episode: Episode) -> LabeledView:
             names.append(class_of(item))
             centers.append((columns.mean(), rows.mean()))
             positions.append(world.bodies[item.name].position[:2])
-    points = (np.array(one, np.float32).reshape(-1, 2) for one in (centers, positions))
-    return LabeledView(world.picture(FRONT), tuple(names), *points)
+    return LabeledView(
+        picture=world.picture(FRONT),
+        names=tuple(names),
+        centers=np.array(centers, np.float32).reshape(-1, 2),
+        positions=np.array(positions, np.float32).reshape(-1, 2),
+    )
 
 
 def class_of(item: SceneObject) -> str:
     """Return the class of an object that a picture can show: its kind and color."""
-    return " ".join(filter(None, (item.kind.removeprefix("hidden_"), item.color)))
+    kind = item.kind.removeprefix("hidden_")
+    return f"{kind} {item.color}" if item.color else kind
 
 
 def pixels_by_object(world: World) -> dict[str, tuple[NDArray[np.intp], ...]]:
@@ -128,28 +139,55 @@ def shown_to_policy(episode: Episode, every: int) -> tuple[Pixels, Sequence[Pixe
     try:
         observation, info = env.reset()
         video = info["demonstration"]
-        frames = video[f"{FRONT}_rgb"] if video.length else ()
+        frames: Sequence[Pixels] = ()
+        if video.length:
+            frames = video[f"{FRONT}_rgb"]
         return observation[f"{FRONT}_rgb"], frames
     finally:
         env.close()
 
 
 def points_of(positions: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Return column and row (..., 2) in the front picture of positions (..., 3), m."""
+    """Return where the front picture shows positions, as of a pinhole camera.
+
+    Args:
+        positions: x, y and z (..., 3), m.
+
+    Returns:
+        Column and row (..., 2), pixels.
+    """
     matrix = front_camera_matrix()
-    seen = positions @ matrix[:3, :3].T + matrix[:3, 3]
-    flat: NDArray[np.float64] = SIZE / 2 + FOCAL_LENGTH * seen[..., :2] / seen[..., 2:]
-    return flat
+    rotation = matrix[:3, :3]
+    in_camera = positions @ rotation.T + matrix[:3, 3]
+    # Pixels to the right of the picture's center, and down from it.
+    offsets = FOCAL_LENGTH * in_camera[..., :2] / in_camera[..., 2:]
+    points: NDArray[np.float64] = SIZE / 2 + offsets
+    return points
 
 
 def places_of(points: NDArray[np.floating], heights: NDArray[np.floating]) -> Floats:
-    """Return x and y (n, 2), m, of points (n, 2), column and row, at heights (n,), m."""
+    """Return the positions that points of the front picture show, the reverse of `points_of`.
+
+    A point shows a ray from the camera; the position is where that has the given height.
+
+    Args:
+        points: column and row (n, 2), pixels.
+        heights: of the positions (n,), m.
+
+    Returns:
+        x and y (n, 2), m.
+    """
     matrix = front_camera_matrix()
-    rays = np.column_stack([(points - SIZE / 2) / FOCAL_LENGTH, np.ones(len(points))])
-    turned = rays @ matrix[:3, :3]
-    eye = -matrix[:3, :3].T @ matrix[:3, 3]
-    reach = (heights - eye[2]) / turned[:, 2]
-    return np.asarray(eye[:2] + reach[:, None] * turned[:, :2], np.float32)
+    rotation = matrix[:3, :3]
+    slopes = (points - SIZE / 2) / FOCAL_LENGTH
+    in_camera = np.column_stack([slopes, np.ones(len(points))])
+    # The matrix leads from the world to the camera, so its inverse is applied: the rotation's
+    # transpose, to the rays and to the camera's own position.
+    rays = in_camera @ rotation
+    camera = -rotation.T @ matrix[:3, 3]
+    lengths = (heights - camera[2]) / rays[:, 2]
+    places = camera[:2] + lengths[:, None] * rays[:, :2]
+    return np.asarray(places, np.float32)
 
 
 class ObservedRobot:
@@ -219,7 +257,7 @@ class ExpertRecording(NamedTuple):
 def record_expert(
     episode: Episode, drawn: range = range(0), *, disturbed: bool = True
 ) -> ExpertRecording:
-    """Let the expert play an episode in waypoints, and return what was to be seen.
+    """Let the expert play an episode in waypoints; return where things were, and its decisions.
 
     If a disturbance leads to where the arm cannot go on, the episode is recorded undisturbed. Of a
     scene in which not even the video can be planned, only key and status are returned.
@@ -229,7 +267,10 @@ def record_expert(
         drawn: numbers of the looks of which a picture is drawn.
         disturbed: whether some waypoints are moved, so that decisions show how to recover.
     """
-    for disturbance in (Disturbance(), None) if disturbed else (None,):
+    disturbances: list[Disturbance | None] = [None]
+    if disturbed:
+        disturbances.insert(0, Disturbance())
+    for disturbance in disturbances:
         env = make(
             episode,
             actions=WaypointExpert.actions,
@@ -241,8 +282,53 @@ def record_expert(
             return _LookRecorder(env, WaypointExpert(SEED, disturbance), drawn).record()
     nothing: NDArray[Any] = np.zeros(0)
     return ExpertRecording(
-        episode.key, (), (), *(nothing,) * 9, turns=(), pictures={}, status="unplanned"
+        key=episode.key,
+        names=(),
+        classes=(),
+        **dict.fromkeys(_ARRAYS, nothing),
+        turns=(),
+        pictures={},
+        status="unplanned",
     )
+
+
+_ARRAYS = (
+    "things",
+    "visible",
+    "tool",
+    "is_video",
+    "steps",
+    "done",
+    "looks",
+    "actions",
+    "anchors",
+)
+"""The arrays of a recording."""
+
+
+class _Look(NamedTuple):
+    """What was to be seen at a look; see the fields of the same names in `ExpertRecording`."""
+
+    things: list[tuple[float, ...]]
+    visible: list[bool]
+    tool: tuple[float, ...]
+    is_video: bool
+    steps: int
+    done: int
+
+
+class _Decision(NamedTuple):
+    """A decision of the expert; see `ExpertRecording` for look, anchor and turn."""
+
+    look: int
+    action: NDArray[np.float64]
+    anchor: int
+    turn: str
+
+
+def _column(rows: Sequence[_Look | _Decision], name: str, dtype: type) -> NDArray[Any]:
+    """Return a field of all rows as one array."""
+    return np.array([getattr(row, name) for row in rows], dtype)
 
 
 class _LookRecorder(EpisodeLoop):
@@ -252,47 +338,58 @@ class _LookRecorder(EpisodeLoop):
         super().__init__(env, policy)
         self._expert = policy
         self._drawn = drawn
-        self._rows: list[tuple[Any, ...]] = []
-        self._decisions: list[tuple[int, ExpertWaypoint]] = []
+        self._names = tuple(item.name for item in env.episode.scene.objects)
+        self._looks: list[_Look] = []
+        self._decisions: list[_Decision] = []
         self._pictures: dict[int, bytes] = {}
-        self._video_steps = self._steps = 0
+        self._video_steps = 0
+        self._steps = 0
         self._has_begun = False
 
     def record(self) -> ExpertRecording:
+        """Play the episode, and return what was noted."""
         self.env.set_frame_hook(self._after_step)
         info = self.play()
-        objects = self.env.episode.scene.objects
-        names = tuple(item.name for item in objects)
-        things, visible, tool, is_video, steps, done = zip(*self._rows, strict=True)
-        decided = [one for _, one in self._decisions]
+        looks = self._looks
+        decisions = self._decisions
         return ExpertRecording(
-            self.env.episode.key,
-            names,
-            tuple(map(class_of, objects)),
-            np.array(things, np.float32),
-            np.array(visible, bool),
-            np.array(tool, np.float32),
-            np.array(is_video, bool),
-            np.array(steps, np.int32),
-            np.array(done, np.int32),
-            np.array([look for look, _ in self._decisions], np.int32),
-            np.array([one.action for one in decided], np.float32).reshape(-1, 7),
-            np.array([names.index(one.anchor) if one.anchor else -1 for one in decided], np.int32),
-            tuple(one.turn for one in decided),
-            self._pictures,
-            info["status"],
+            key=self.env.episode.key,
+            names=self._names,
+            classes=tuple(map(class_of, self.env.episode.scene.objects)),
+            things=_column(looks, "things", np.float32),
+            visible=_column(looks, "visible", bool),
+            tool=_column(looks, "tool", np.float32),
+            is_video=_column(looks, "is_video", bool),
+            steps=_column(looks, "steps", np.int32),
+            done=_column(looks, "done", np.int32),
+            looks=_column(decisions, "look", np.int32),
+            actions=_column(decisions, "action", np.float32).reshape(-1, WAYPOINT.size),
+            anchors=_column(decisions, "anchor", np.int32),
+            turns=tuple(decision.turn for decision in decisions),
+            pictures=self._pictures,
+            status=info["status"],
         )
 
     def act(self, observation: dict[str, Any]) -> ArrayLike:
-        """Look if that is not done yet, and note the expert's decision."""
+        """Return the expert's action; note its decision, and the look that it belongs to."""
         action = super().act(observation)
-        if not self._rows or self._rows[-1][3] or self._rows[-1][4] != self._steps:
+        if not self._has_looked():
             self._look(is_video=False)
-        if self._expert.last is not None:
-            self._decisions.append((len(self._rows) - 1, self._expert.last))
+        decided = self._expert.last
+        anchor = -1 if decided.anchor is None else self._names.index(decided.anchor)
+        look = len(self._looks) - 1
+        self._decisions.append(_Decision(look, decided.action, anchor, decided.turn))
         return action
 
+    def _has_looked(self) -> bool:
+        """Return whether the newest look is of the policy's turn, at this step."""
+        if not self._looks:
+            return False
+        newest = self._looks[-1]
+        return not newest.is_video and newest.steps == self._steps
+
     def _after_step(self, env: RoboIRGEnv, is_demonstration: bool) -> None:
+        """Look after every `LOOK_EVERY`-th step; video and policy's turn are counted apart."""
         del env
         if is_demonstration:
             if self._video_steps % LOOK_EVERY == 0:
@@ -309,19 +406,33 @@ class _LookRecorder(EpisodeLoop):
         self._has_begun = True
 
     def _look(self, *, is_video: bool) -> None:
-        world = self.env.session.world
-        number = len(self._rows)
-        bodies = [world.bodies[item.name] for item in self.env.episode.scene.objects]
-        things = [(*body.position, body.yaw) for body in bodies]
+        """Note where everything is now, and what the camera sees of it: one *look*.
+
+        Of the looks in `drawn` the picture is drawn too. Then an object counts as visible only if
+        enough pixels show it; else what the robot hides counts as visible.
+        """
+        session = self.env.session
+        world = session.world
+        bodies = [world.bodies[name] for name in self._names]
         visible = visible_of(world, bodies)
+        number = len(self._looks)
         if number in self._drawn:
             pixels = pixels_by_object(world)
-            shown = [len(pixels[body.item.name][0]) >= MIN_PIXELS for body in bodies]
-            visible = [one and in_view for one, in_view in zip(visible, shown, strict=True)]
+            for index, name in enumerate(self._names):
+                rows, _ = pixels[name]
+                if len(rows) < MIN_PIXELS:
+                    visible[index] = False
             self._pictures[number] = encode_png(Picture(world.picture(FRONT)))
-        steps = self._video_steps if is_video else self._steps
-        done = max(0, self.env.session.judge.index - len(self.env.episode.demonstration))
-        self._rows.append((things, visible, _tool_of(world), is_video, steps, done))
+        done = session.judge.index - len(self.env.episode.demonstration)
+        look = _Look(
+            things=[(*body.position, body.yaw) for body in bodies],
+            visible=visible,
+            tool=_tool_of(world),
+            is_video=is_video,
+            steps=self._video_steps if is_video else self._steps,
+            done=max(0, done),
+        )
+        self._looks.append(look)
 
 
 def _tool_of(world: World) -> tuple[float, ...]:
@@ -331,21 +442,24 @@ def _tool_of(world: World) -> tuple[float, ...]:
 
 
 def visible_of(world: World, bodies: Sequence[Body]) -> list[bool]:
-    """Return which objects the front camera can see if the robot hides nothing."""
+    """Return for each body whether the front camera can see it if the robot hides nothing.
+
+    It cannot see what is absent, sites, and cubes below a container that stands on the table.
+    """
     absent = world.absent
-    lids = [
-        body.position
-        for body in bodies
-        if body.item.kind == "container"
-        and body.item.name not in absent
-        and body.position.z < ON_TABLE
-    ]
-    found = []
+    present = [body for body in bodies if body.item.name not in absent]
+    containers = [body.position for body in present if body.item.kind == "container"]
+    lids = [position for position in containers if position.z < ON_TABLE]
+    visible: list[bool] = []
     for body in bodies:
-        x, y, _ = body.position
-        is_there = body.item.name not in absent and body.item.kind != "site"
-        is_hidden = body.item.kind == "hidden_cube" and any(
-            np.hypot(lid.x - x, lid.y - y) < COVER for lid in lids
-        )
-        found.append(is_there and not is_hidden)
-    return found
+        kind = body.item.kind
+        can_be_seen = body.item.name not in absent and kind != "site"
+        # A *hidden cube* is one that a container may cover.
+        is_hidden = kind == "hidden_cube" and _is_covered(body.position, lids)
+        visible.append(can_be_seen and not is_hidden)
+    return visible
+
+
+def _is_covered(cube: Point, lids: Sequence[Point]) -> bool:
+    """Return whether a cube is below one of some containers."""
+    return any(np.hypot(lid.x - cube.x, lid.y - cube.y) < COVER for lid in lids)

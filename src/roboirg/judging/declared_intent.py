@@ -9,11 +9,12 @@ from roboirg.core.episode import Episode, SlotValue, describe_goal, values_in
 from roboirg.core.failures import FailureName
 from roboirg.judging.failure_attribution import FailureAttribution
 
-_OF_VERDICT: Mapping[str, FailureName] = {
+_FAILURES: Mapping[str, FailureName] = {
     "wrong_thing": "wrong_object",
     "wrong_place": "wrong_place",
     "wrong_count": "wrong_count",
 }
+"""The failure of a policy whose last subgoal got a verdict."""
 
 
 class DeclaredIntent(NamedTuple):
@@ -34,20 +35,29 @@ class DeclaredIntent(NamedTuple):
         """Return what the declaration makes of a failure that the acts show.
 
         Who declared something wrong failed by grounding, whatever the hands did; who declared the
-        right thing did not. A subgoal that was not due at all decides nothing.
+        right thing did not: then the hands did not follow. A subgoal that was not due at all
+        decides nothing.
         """
         if self.listens:
             return self._revise_listener(found, episode)
-        said = [verdict for step, verdict in self.verdicts if step <= found.step]
-        if said and (failure := _OF_VERDICT.get(said[-1])) and found.kind != "grounding":
+        last = self._last_verdict(found.step)
+        if last == "right":
+            return _not_followed(found)
+        if last in _FAILURES and found.kind != "grounding":
             words = f"named something else than what was due: {found.sentence[:-1]}"
-            return FailureAttribution.of(failure, found.subject, found.step, words)
-        return _not_followed(found) if said and said[-1] == "right" else found
+            return FailureAttribution.of(_FAILURES[last], found.subject, found.step, words)
+        return found
+
+    def _last_verdict(self, step: int) -> str:
+        """Return the verdict of the last subgoal up to a step; empty if there was none."""
+        verdicts = [verdict for said_at, verdict in self.verdicts if said_at <= step]
+        return verdicts[-1] if verdicts else ""
 
     def _revise_listener(self, found: FailureAttribution, episode: Episode) -> FailureAttribution:
-        meant = episode.goal.as_mapping()
+        """Return the failure by the goal that a listener named: none, a wrong one, or the right."""
         if self.understood is None:
             return FailureAttribution.of("no_answer", None, 0, "the model named no goal")
+        meant = episode.goal.as_mapping()
         if _slots(self.understood) != _slots(meant):
             words = f"understood {describe_goal(self.understood)}; meant {describe_goal(meant)}"
             return FailureAttribution.of("misunderstood", None, 0, words)
@@ -63,4 +73,5 @@ def _not_followed(found: FailureAttribution) -> FailureAttribution:
 
 
 def _slots(goal: Mapping[str, SlotValue]) -> dict[str, tuple[str | int, ...]]:
+    """Return the slots of a goal so that they can be compared: each with all of its values."""
     return {slot: values_in(content) for slot, content in goal.items()}

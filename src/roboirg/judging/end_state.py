@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from roboirg.core.conditions import Elapsed, Fact, facts_of
+from roboirg.core.episode import Stage
 from roboirg.core.fact_traits import FactRole, raised_kind
 from roboirg.core.failures import FailureName
 from roboirg.core.motions import Shuttle
 from roboirg.judging.episode_replay import EpisodeReplay, FactInterval
 from roboirg.judging.failure_attribution import FailureAttribution
-from roboirg.judging.grounding_errors import classify_grounding_error
+from roboirg.judging.grounding_errors import classify_grounding_error, next_stage_with
 from roboirg.judging.judge import describe_act, describe_expected, describe_object
 from roboirg.judging.meant_objects import meant_objects
 from roboirg.judging.slips import (
+    MISSES,
     SETTLED_STEPS,
     Slip,
     drop_before,
@@ -25,7 +28,13 @@ STOPPED_STEPS = 150
 """Control steps for which the hand must linger at the end, seven and a half seconds and the three
 after which it lingers, to count as stopped. A hand five times slower than the oracle's does not."""
 
-_WORDS = {
+_SOON_STEPS = SETTLED_STEPS // 4
+"""Control steps within which an object that moves by itself must come near its place, after a press
+that may have been meant for that moment."""
+_PAUSE_FACTOR = 1.5
+"""How many times as long as any pause before it a rest must be to count as stopping."""
+
+_WORDS: Mapping[FailureName, str] = {
     "missed_grasp": "did not get hold of {}",
     "missed_press": "came down next to {} without pressing it",
     "dropped": "dropped {}",
@@ -56,36 +65,52 @@ explain it |
     | the hand still moved, and had been at something that is expected | ``out_of_time`` |
     | it moved elsewhere | ``no_attempt`` |
     """
-    wanted, slips = replay.unmet(), find_slips(replay)
-    unexpected = _unexpected_act(replay, wanted)
-    if unexpected is not None and drop_before(slips, unexpected[0]) is None:
-        act, failure = unexpected
-        found = explain_early_act(replay, slips, act.fact)
-        return found or _describe_act(replay, failure, act)
-    in_hand = {one.subject for one in wanted} & {
-        fact.subject for fact in replay.facts[-1] if fact.traits.grips
-    }
-    short = _stopped_short(replay) or _done_too_early(replay)
-    if short is not None:
-        left = range(replay.expected_stage, len(replay.stages))
-        short = explain_missing(replay, slips, left) or short
-    tried = None if in_hand else judge_tries(replay, slips)
-    return tried or short or _at_rest(replay)
+    slips = find_slips(replay)
+    unmet = replay.unmet()
+    unexpected = _unexpected_act(replay, unmet)
+    # An object that fell where it lies was not put there: then the drop, a slip, decides below.
+    if unexpected is not None and drop_before(slips, unexpected.act) is None:
+        explained = explain_early_act(replay, slips, unexpected.act.fact)
+        return explained or _describe_act(replay, unexpected.failure, unexpected.act)
+
+    # With the expected object in the hand, the tries to take it have succeeded: none decides.
+    if not _is_in_hand(replay, unmet):
+        failed_try = judge_tries(replay, slips)
+        if failed_try is not None:
+            return failed_try
+
+    misunderstanding = _stopped_short(replay) or _done_too_early(replay)
+    if misunderstanding is None:
+        return _at_rest(replay)
+    # Who missed a grasp and went on without noticing has misunderstood nothing.
+    stages_left = range(replay.expected_stage, len(replay.stages))
+    return explain_missing(replay, slips, stages_left) or misunderstanding
+
+
+def _is_in_hand(replay: EpisodeReplay, facts: Sequence[Fact]) -> bool:
+    """Return whether the object of any of some facts is in the hand at the end."""
+    held = {fact.subject for fact in replay.facts[-1] if fact.traits.grips}
+    return any(fact.subject in held for fact in facts)
 
 
 def explain_early_act(
     replay: EpisodeReplay, slips: Sequence[Slip], act: Fact
 ) -> FailureAttribution | None:
-    """Return the slips or tries before an act that a later stage expects, if they explain it."""
-    current, stages = replay.expected_stage, replay.stages
-    later = range(current + 1, len(stages))
-    index = next((one for one in later if act in facts_of(stages[one].expects)), None)
-    if index is None:
+    """Return the slips or tries before an act that a later stage expects, if they explain it.
+
+    The button is pressed although two of three cubes are in the bin: a grasp that was missed
+    unnoticed explains it (execution), and so do tries at a wrong cube (grounding). None otherwise.
+    """
+    current = replay.expected_stage
+    stage_of_act = next_stage_with(act, replay.stages, current)
+    if stage_of_act is None:
         return None
-    if explained := explain_missing(replay, slips, range(current, index)):
+    explained = explain_missing(replay, slips, range(current, stage_of_act))
+    if explained is not None:
         return explained
-    tried = judge_tries(replay, slips)
-    return tried if tried is not None and tried.kind == "grounding" else None
+    # A failed try at the right object is no reason to go on with a later act.
+    failed_try = judge_tries(replay, slips)
+    return failed_try if failed_try is not None and failed_try.kind == "grounding" else None
 
 
 def explain_missing(
@@ -93,24 +118,72 @@ def explain_missing(
 ) -> FailureAttribution | None:
     """Return the first of the unnoticed slips if they account for all acts that are missing.
 
-    A slip accounts for one object that was to be handled, from its pick on; places that were passed
-    are counted one by one. `skipped` has the indices of the stages that are missing.
+    Two cubes are missing in the bin and two grasps were missed unnoticed: the first of them is the
+    failure. With one missed grasp, the other cube was left out on purpose: None.
+
+    A slip accounts for one object that was to be handled, from its pick on. Where the object in the
+    hand is to be carried over several places, a pass next to one of them accounts for that place
+    only. `skipped` has the indices of the stages that are missing.
     """
-    early = {one.fact for one in replay.started(FactRole.RAISE, after=replay.acted_since)}
-    acts = [set(facts_of(replay.stages[one].expects)) for one in skipped]
-    roles = [{fact.traits.role for fact in own} for own in acts if not own & early]
-    raises = [index for index, own in enumerate(roles) if FactRole.RAISE in own]
-    head = [own for own in roles[: raises[0] if raises else None] if own - {FactRole.RELEASE}]
-    own = [
-        one
-        for one in slips
-        if one.subjects <= _meant(replay, skipped) and not is_noticed(replay, one, slips)
+    meant = _meant_by_any(replay, skipped)
+    unnoticed = [
+        slip for slip in slips if slip.subjects <= meant and not is_noticed(replay, slip, slips)
     ]
-    visits = sum(FactRole.CARRY in roles for roles in head)
-    passed = sum(one.failure == "misplaced" for one in own) if visits else 0
-    if not own or len(own) - passed + bool(visits and passed >= visits) < len(raises) + bool(head):
+    if not unnoticed:
         return None
-    return describe_slip(replay, own[0])
+
+    missing = _missing_acts(replay, skipped)
+    explained_objects = len(unnoticed)
+    if missing.visits:
+        passes = sum(slip.failure == "misplaced" for slip in unnoticed)
+        explained_objects -= passes
+        if passes >= missing.visits:
+            explained_objects += 1  # the object that was carried past all places
+    if explained_objects < missing.objects:
+        return None
+    return describe_slip(replay, unnoticed[0])
+
+
+class _Missing(NamedTuple):
+    """What was to be done and was not.
+
+    Attributes:
+        objects: how many objects were to be handled: one for each pick, and the one in the hand.
+        visits: over how many places the one in the hand was to be carried.
+    """
+
+    objects: int
+    visits: int
+
+
+def _missing_acts(replay: EpisodeReplay, skipped: range) -> _Missing:
+    """Return what some stages ask for, without those whose object was picked up before.
+
+    Of *pick the red cube, put it in, pick the blue one, put it in*, two objects are missing; of
+    *put it in, pick the blue one, put it in*, two as well, the first of them in the hand.
+    """
+    since = replay.acted_since
+    picked_up = {interval.fact for interval in replay.started(FactRole.RAISE, after=since)}
+    picks = 0
+    visits = 0
+    has_one_in_hand = False
+    for index in skipped:
+        stage = replay.stages[index]
+        if not picked_up.isdisjoint(facts_of(stage.expects)):
+            continue
+        roles = _roles(stage)
+        if FactRole.RAISE in roles:
+            picks += 1
+        elif picks == 0 and roles - {FactRole.RELEASE}:
+            # Before any pick, a stage is about what the hand already holds.
+            has_one_in_hand = True
+            visits += FactRole.CARRY in roles
+    return _Missing(picks + has_one_in_hand, visits)
+
+
+def _roles(stage: Stage) -> set[FactRole]:
+    """Return the roles of the facts that a stage expects; none if it only waits."""
+    return {fact.traits.role for fact in facts_of(stage.expects)}
 
 
 def judge_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> FailureAttribution | None:
@@ -123,59 +196,83 @@ def judge_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> FailureAttribut
     | something else | ``wrong_object`` |
     | what the stage expects or another thing, which is not clear | ``ambiguous_act`` |
     """
-    right, ahead = _right_now(replay), range(replay.expected_stage, len(replay.stages))
-    tries = [one for one in slips if one.step >= replay.acted_since]
-    clear = [one for one in tries if one.subjects <= right]
-    off = [one for one in tries if not one.subjects & right]
-    if clear and len(clear) >= len(off):
-        lost = [one for one in clear if one.failure not in ("missed_grasp", "missed_press")]
-        return describe_slip(replay, (lost or clear)[-1])
-    if off:
-        is_later = off[-1].subjects & _meant(replay, ahead)
-        failure: FailureName = "wrong_order" if is_later else "wrong_object"
-        return describe_slip(replay, off[-1], failure)
-    return describe_slip(replay, tries[-1], "ambiguous_act") if tries else None
+    tries = [slip for slip in slips if slip.step >= replay.acted_since]
+    if not tries:
+        return None
+    right_objects = _meant_at_end(replay)
+    # What can have been about a right object or about another one is in neither list.
+    at_right = [slip for slip in tries if slip.subjects <= right_objects]
+    at_wrong = [slip for slip in tries if slip.subjects.isdisjoint(right_objects)]
+
+    if at_right and len(at_right) >= len(at_wrong):
+        losses = [slip for slip in at_right if slip.failure not in MISSES]
+        decisive = losses or at_right
+        return describe_slip(replay, decisive[-1])
+    if not at_wrong:
+        return describe_slip(replay, tries[-1], "ambiguous_act")
+
+    stages_left = range(replay.expected_stage, len(replay.stages))
+    if at_wrong[-1].subjects.isdisjoint(_meant_by_any(replay, stages_left)):
+        return describe_slip(replay, at_wrong[-1], "wrong_object")
+    return describe_slip(replay, at_wrong[-1], "wrong_order")
 
 
-def _right_now(replay: EpisodeReplay) -> frozenset[str]:
-    """Return the objects that the stage means that is current at the end."""
+def _meant_at_end(replay: EpisodeReplay) -> frozenset[str]:
+    """Return the names of the objects that the stage means that is current at the end."""
     current = max(replay.expected_stage, 0)
     return meant_objects(replay.stages, current, replay.episode.scene, replay.facts[-1])
 
 
-def _meant(replay: EpisodeReplay, indices: range) -> set[str]:
-    """Return the objects that some stages mean."""
-    return {
-        name for one in indices for name in meant_objects(replay.stages, one, replay.episode.scene)
-    }
+def _meant_by_any(replay: EpisodeReplay, indices: range) -> set[str]:
+    """Return the names of the objects that any of some stages means."""
+    names: set[str] = set()
+    for index in indices:
+        names |= meant_objects(replay.stages, index, replay.episode.scene)
+    return names
 
 
 def describe_slip(
     replay: EpisodeReplay, slip: Slip, failure: FailureName | None = None
 ) -> FailureAttribution:
-    """Return a slip as a failure, by default its own; a press has the failure of its moment."""
-    name, moment = failure or slip.failure, judge_moment(replay, slip.step)
-    if name == "missed_press" and moment is not None and moment != "mistimed":
-        name = moment
-    subject, expected = min(slip.subjects), describe_expected(replay.stage_at(slip.step))
-    words = _WORDS[name].format(describe_object(subject, replay.episode.scene))
-    return FailureAttribution.of(name, subject, slip.step, f"{words}; {expected}")
+    """Return a slip as a failure in words, by default that of the slip.
+
+    A drop of the red cube -> ``dropped``, *Dropped the red cube; expected: put it into the bin.* A
+    press that missed the button at a wrong moment is the failure of the moment.
+    """
+    if failure is None:
+        failure = slip.failure
+    if failure == "missed_press":
+        moment = judge_moment(replay, slip.step)
+        # At about the right moment, it is the button that was missed.
+        if moment not in (None, "mistimed"):
+            failure = moment
+
+    subject = min(slip.subjects)
+    words = _WORDS[failure].format(describe_object(subject, replay.episode.scene))
+    expected = describe_expected(replay.stage_at(slip.step))
+    return FailureAttribution.of(failure, subject, slip.step, f"{words}; {expected}")
 
 
 def judge_moment(replay: EpisodeReplay, step: int) -> FailureName | None:
-    """Return what pressing at a step is if it must be at a moment and is not; else None.
+    """Return which failure a press at a step is, in a task that asks for a moment; else None.
 
-    The moment is that of the oracle's press, the middle of a pass of the object that moves.
+    The right moment is that of the oracle's press, the middle of a pass of the moving object.
+    Within half a pass of it, the press is ``mistimed``; when the object is at its place on another
+    pass, ``wrong_time``; and elsewhere ``ambiguous_act``.
     """
-    press, runs = replay.stages[-1].primitive, replay.episode.scene.motions_of(Shuttle)
+    press = replay.stages[-1].primitive
+    runs = replay.episode.scene.motions_of(Shuttle)
     if not runs or press.kind != "press_below":
         return None
     (run,) = runs
     if abs(step - press.steps) <= run.interval / 2:
         return "mistimed"
-    coming = replay.facts[step : step + SETTLED_STEPS // 4]
-    is_near = any(fact.subject == run.subject and fact.place for now in coming for fact in now)
-    return "wrong_time" if is_near else "ambiguous_act"
+    for facts in replay.facts[step : step + _SOON_STEPS]:
+        for fact in facts:
+            is_at_place = fact.subject == run.subject and fact.place is not None
+            if is_at_place:
+                return "wrong_time"
+    return "ambiguous_act"
 
 
 def _describe_act(
@@ -194,21 +291,39 @@ def _describe(
     return FailureAttribution.of(failure, subject, step, f"{words}; {expected}")
 
 
-def _unexpected_act(
-    replay: EpisodeReplay, wanted: tuple[Fact, ...]
-) -> tuple[FactInterval, FailureName] | None:
-    """Return the last act that stands and is not expected, and what it is."""
-    for interval in reversed(list(_standing_acts(replay))):
-        fact = interval.fact
-        if fact.subject not in {other.subject for other in wanted}:
-            failure: FailureName | None = _classify(replay, fact)
-        elif fact.traits.grips and fact.subject not in _right_now(replay):
-            failure = "wrong_object"
-        else:
-            misplaced = fact.traits.role is FactRole.PLACING and fact not in wanted
-            failure = "wrong_place" if misplaced else None
+class _UnexpectedAct(NamedTuple):
+    """An act that is not expected, and the failure that it is."""
+
+    act: FactInterval
+    failure: FailureName
+
+
+def _unexpected_act(replay: EpisodeReplay, unmet: Sequence[Fact]) -> _UnexpectedAct | None:
+    """Return the last act that has not been undone and is not expected; None without any.
+
+    `unmet` are the facts that the stage expects and that do not hold.
+    """
+    acts = list(_standing_acts(replay))
+    for act in reversed(acts):
+        failure = _failure_of(replay, act.fact, unmet)
         if failure is not None:
-            return interval, failure
+            return _UnexpectedAct(act, failure)
+    return None
+
+
+def _failure_of(replay: EpisodeReplay, fact: Fact, unmet: Sequence[Fact]) -> FailureName | None:
+    """Return the failure that an act is; None if it may lead to what the stage expects.
+
+    With *put the red cube on the target* unmet: a red cube in the hand -> None, on the wrong target
+    -> ``wrong_place``; a green cube in the hand -> as `classify_grounding_error` says.
+    """
+    if all(fact.subject != other.subject for other in unmet):
+        return _classify(replay, fact)
+    # A stage may expect any cube, of which only some are meant.
+    if fact.traits.grips and fact.subject not in _meant_at_end(replay):
+        return "wrong_object"
+    if fact.traits.role is FactRole.PLACING and fact not in unmet:
+        return "wrong_place"
     return None
 
 
@@ -219,78 +334,120 @@ def _standing_acts(replay: EpisodeReplay) -> Iterator[FactInterval]:
     that a later stage expects, a press where the stage expects another button, and placing an
     object that was picked up.
     """
-    since, roles = replay.acted_since, FactRole
-    ahead = replay.stages[replay.expected_stage + 1 :]
-    later = {fact for stage in ahead for fact in facts_of(stage.expects)}
-    expected = facts_of(replay.stages[replay.expected_stage].expects)
-    # An object that was not picked up was there before and has only been touched.
-    raised = {one.fact.subject for one in replay.started(roles.RAISE)}
-    acts = (roles.GRIP, roles.RAISE, roles.PLACING, roles.PRESS)
-    for interval in replay.started(*acts):
-        fact, traits = interval.fact, interval.fact.traits
-        stands = {
-            roles.RAISE: not traits.undone_by_release and fact in later,
-            roles.PRESS: fact in later or any(one.traits.role is roles.PRESS for one in expected),
-            roles.PLACING: interval.end is None and not traits.lasts and fact.subject in raised,
-        }
-        in_hand = traits.grips and interval.end is None
-        if in_hand or (interval.start > since and stands.get(traits.role, False)):
-            yield interval
+    roles = (FactRole.GRIP, FactRole.RAISE, FactRole.PLACING, FactRole.PRESS)
+    stage_began = replay.acted_since
+    for act in replay.started(*roles):
+        is_in_hand = act.fact.traits.grips and act.end is None
+        if is_in_hand or (act.start > stage_began and _is_not_undone(replay, act)):
+            yield act
+
+
+def _is_not_undone(replay: EpisodeReplay, act: FactInterval) -> bool:
+    """Return whether an act of the current stage, other than holding an object, still counts."""
+    current = replay.expected_stage
+    is_due_later = act.fact in _expected_facts(replay.stages[current + 1 :])
+    match act.role:
+        case FactRole.RAISE:
+            return is_due_later and not act.fact.traits.undone_by_release
+        case FactRole.PRESS:
+            return is_due_later or FactRole.PRESS in _roles(replay.stages[current])
+        case FactRole.PLACING:
+            # An object that was not picked up was there before and has only been touched.
+            raised = {raised.subject for raised in replay.started(FactRole.RAISE)}
+            return act.end is None and not act.fact.traits.lasts and act.subject in raised
+        case _:
+            return False
+
+
+def _expected_facts(stages: Sequence[Stage]) -> set[Fact]:
+    """Return all facts that any of some stages expects."""
+    facts: set[Fact] = set()
+    for stage in stages:
+        facts.update(facts_of(stage.expects))
+    return facts
 
 
 def _classify(replay: EpisodeReplay, fact: Fact) -> FailureName:
     """Classify an act; taking hold of an object counts as lifting it."""
     if fact.traits.role is FactRole.GRIP:
         kind = raised_kind(replay.episode.scene[fact.subject].kind)
-        fact = fact if kind is None else Fact(kind, fact.subject)
+        if kind is not None:
+            fact = Fact(kind, fact.subject)
     return classify_grounding_error(fact, replay.stages, replay.expected_stage)
 
 
 def _stopped_short(replay: EpisodeReplay) -> FailureAttribution | None:
-    """Return ``wrong_count`` if the robot stopped where a shorter task would have ended.
+    """Return ``wrong_count`` if the robot stopped where a shorter task would have ended; else None.
 
-    A shorter task would have ended with an act like the last stage's, so the stage before must have
-    asked for one; letting go does not count as an act. A task that ends by leaving all alone for a
-    time could have ended after any stage.
+    A task of two lifted containers ends with a lift; who stops after the first lift has counted
+    wrong. A task that ends with a press has no such end before the press. So the last completed
+    act, letting go not counted, must be like that of the last stage. A task that ends by leaving
+    all alone for a time could have ended after any stage.
     """
-    roles = [{fact.traits.role for fact in facts_of(stage.expects)} for stage in replay.stages]
-    before = [own for own in roles[: replay.expected_stage] if own != {FactRole.RELEASE}]
-    since, last = _lingers_since(replay), replay.stages[-1].expects
-    if since is None or not before or not (isinstance(last, Elapsed) or before[-1] == roles[-1]):
+    stopped_at = _stopped_since(replay)
+    completed = [_roles(stage) for stage in replay.stages[: replay.expected_stage]]
+    acts = [roles for roles in completed if roles != {FactRole.RELEASE}]
+    if stopped_at is None or not acts:
         return None
-    return _describe(replay, "wrong_count", None, since, "came to rest")
+    last = replay.stages[-1]
+    ends_alone = isinstance(last.expects, Elapsed)
+    if ends_alone or acts[-1] == _roles(last):
+        return _describe(replay, "wrong_count", None, stopped_at, "came to rest")
+    return None
 
 
 def _done_too_early(replay: EpisodeReplay) -> FailureAttribution | None:
-    """Return ``wrong_order`` if what the stage expects was done before it was expected."""
-    stages, current, since = replay.stages, replay.expected_stage, replay.acted_since
-    before = {fact for stage in stages[:current] for fact in facts_of(stage.expects)}
-    wanted = set(facts_of(stages[current].expects)) - before
-    acts = replay.started(FactRole.RAISE, FactRole.PRESS)
-    act = next((one for one in acts if one.fact in wanted and one.start < since), None)
-    return None if act is None else _describe_act(replay, "wrong_order", act)
+    """Return ``wrong_order`` if what the stage expects was done before it was expected; else None.
+
+    Facts that an earlier stage expected, too, were done for that stage.
+    """
+    current = replay.expected_stage
+    expected = facts_of(replay.stages[current].expects)
+    first_due_now = set(expected) - _expected_facts(replay.stages[:current])
+    stage_began = replay.acted_since
+    for act in replay.started(FactRole.RAISE, FactRole.PRESS):
+        if act.fact in first_due_now and act.start < stage_began:
+            return _describe_act(replay, "wrong_order", act)
+    return None
 
 
-def _lingers_since(replay: EpisodeReplay) -> int | None:
-    """Return since when the hand lingers at the end, if that is long enough to have stopped."""
+def _stopped_since(replay: EpisodeReplay) -> int | None:
+    """Return the step since which the hand rests at the end; None if it may only have paused.
+
+    The rest must take 150 steps, and one and a half times as long as any pause before: after a
+    pause of 200 steps, a rest of 300.
+    """
     rests = list(replay.tried("lingering"))
     if not rests or rests[-1].end is not None:
         return None
-    # Who goes slowly, or pauses, has lingered as long before. A deadline leaves no time for that.
-    pauses = [1.5 * (one.end - one.start) for one in rests if one.end is not None]
-    least = 0 if replay.judge.violation else max([STOPPED_STEPS, *pauses])
-    return rests[-1].start if replay.last_step - rests[-1].start >= least else None
+
+    longest_pause = max((replay.end_of(rest) - rest.start for rest in rests[:-1]), default=0)
+    least_steps = max(STOPPED_STEPS, _PAUSE_FACTOR * longest_pause)
+    if replay.judge.violation is not None:
+        least_steps = 0  # a deadline ended the episode, which leaves no time for a long rest
+    start = rests[-1].start
+    return start if replay.last_step - start >= least_steps else None
 
 
 def _at_rest(replay: EpisodeReplay) -> FailureAttribution:
-    """Return ``stopped``, ``no_attempt`` or ``out_of_time``, as the table says."""
-    names = _meant(replay, range(len(replay.stages)))
-    went = [*replay.tried("above"), *replay.started(FactRole.APPROACH)]
-    acts = replay.started(FactRole.GRIP, FactRole.RAISE, FactRole.PRESS)
-    has_begun = replay.expected_stage > 0 or any(one.fact.place in names for one in went)
-    since = _lingers_since(replay)
-    failure: FailureName = "out_of_time" if since is None else "stopped"
-    if not has_begun and not any(acts):
+    """Return ``stopped``, ``no_attempt`` or ``out_of_time``, as `describe_end_state` defines."""
+    stopped_at = _stopped_since(replay)
+    step = replay.last_step
+    failure: FailureName = "out_of_time"
+    if stopped_at is not None:
+        step = stopped_at
+        failure = "stopped"
+    if not _has_begun(replay):
         failure = "no_attempt"
-    step = replay.last_step if since is None else since
     return _describe(replay, failure, None, step, _WORDS[failure])
+
+
+def _has_begun(replay: EpisodeReplay) -> bool:
+    """Return whether the hand has done anything, or was at an object that any stage means."""
+    acts = replay.started(FactRole.GRIP, FactRole.RAISE, FactRole.PRESS)
+    if replay.expected_stage > 0 or any(acts):
+        return True
+    places = {approach.fact.place for approach in replay.started(FactRole.APPROACH)}
+    places |= {above.fact.place for above in replay.tried("above")}
+    meant = _meant_by_any(replay, range(len(replay.stages)))
+    return not places.isdisjoint(meant)

@@ -28,6 +28,27 @@ class FactInterval(NamedTuple):
     start: int
     end: int | None
 
+    @property
+    def subject(self) -> str:
+        """Name of the object that the fact is about."""
+        return self.fact.subject
+
+    @property
+    def role(self) -> FactRole:
+        """What the fact says about the hand and its object."""
+        return self.fact.traits.role
+
+    def lasts_until(self, step: int) -> bool:
+        """Return whether the fact, once it holds, has not ceased before a step."""
+        return self.end is None or self.end >= step
+
+
+class Completion(NamedTuple):
+    """A stage of the policy, by its index, and the step that completed it."""
+
+    stage: int
+    step: int
+
 
 class Decision(NamedTuple):
     """How an episode ended for a goal.
@@ -84,42 +105,66 @@ class EpisodeReplay:
 
         That time passes is no act.
         """
-        acts = (step for done, step in self.completions() if facts_of(self.stages[done].expects))
-        return max(acts, default=self.policy_start_step)
+        since = self.policy_start_step
+        for completion in self.completions():
+            if facts_of(self.stages[completion.stage].expects):
+                since = completion.step
+        return since
 
-    def completions(self) -> Iterator[tuple[int, int]]:
-        """Yield the index of each completed stage of the policy, and the step that completed it."""
-        pairs = pairwise((*self.expected_stages, self.expected_stage))
-        return ((now, step) for step, (now, then) in enumerate(pairs) if then != now >= 0)
+    def completions(self) -> Iterator[Completion]:
+        """Yield the completed stages of the policy, in order.
+
+        Expected stages 0, 0, 1 at steps 0, 1, 2 -> stage 0 was completed at step 1.
+        """
+        expected_stages = (*self.expected_stages, self.expected_stage)
+        for step, (stage, next_stage) in enumerate(pairwise(expected_stages)):
+            if stage >= 0 and stage != next_stage:  # negative in the demonstration
+                yield Completion(stage, step)
 
     def started(self, *roles: FactRole, after: int | None = None) -> Iterator[FactInterval]:
         """Yield the intervals of facts with some roles that start later than a step.
 
         By default, those that start in the policy's turn.
         """
-        start = self.policy_start_step if after is None else after
-        return (
-            one for one in self.intervals if one.start > start and one.fact.traits.role in roles
-        )
+        if after is None:
+            after = self.policy_start_step
+        for interval in self.intervals:
+            if interval.start > after and interval.role in roles:
+                yield interval
 
-    def tried(self, kind: FactKind, *subjects: str) -> Iterator[FactInterval]:
-        """Yield the attempts of a kind in the policy's turn, with some subjects or with any."""
-        start = self.policy_start_step
-        own = (one for one in self.attempts if one.fact.kind == kind and one.start > start)
-        return (one for one in own if not subjects or one.fact.subject in subjects)
+    def tried(self, kind: FactKind, subject: str | None = None) -> Iterator[FactInterval]:
+        """Yield the attempts of a kind in the policy's turn, with one subject or with any."""
+        for attempt in self.attempts:
+            if attempt.fact.kind != kind or attempt.start <= self.policy_start_step:
+                continue
+            if subject in (None, attempt.subject):
+                yield attempt
+
+    def end_of(self, interval: FactInterval) -> int:
+        """Return the step at which an interval ends: the last one if its fact still holds."""
+        return self.last_step if interval.end is None else interval.end
 
     def stage_at(self, step: int) -> Stage:
         """Return the policy's stage that was tested at a step, or its first before its turn."""
-        return self.stages[min(max(self.expected_stages[step], 0), len(self.stages) - 1)]
+        index = max(self.expected_stages[step], 0)
+        return self.stages[min(index, len(self.stages) - 1)]
 
     def unmet(self) -> tuple[Fact, ...]:
-        """Return the facts in all parts of the expected condition that are not met at the end."""
+        """Return the facts in all parts of the expected condition that are not met at the end.
+
+        If *both buttons have been pressed* is expected and the left one was, that on the right.
+        """
         history = FactHistory()
         for step, facts in enumerate(self.facts):
             history.update(step, facts)
+
         expects = self.stages[self.expected_stage].expects
         parts: tuple[Condition, ...] = expects.of if isinstance(expects, All) else (expects,)
-        return tuple(f for part in parts if not history.holds(part) for f in facts_of(part))
+        unmet: list[Fact] = []
+        for part in parts:
+            if not history.holds(part):
+                unmet += facts_of(part)
+        return tuple(unmet)
 
 
 def rejudge(
@@ -129,23 +174,35 @@ def rejudge(
     elapsed_steps: int,
     attempts: Sequence[Event] = (),
 ) -> EpisodeReplay:
-    """Judge an episode again by all its events, in order; steps count since the world began."""
-    facts = facts_by_step(events, elapsed_steps)
+    """Judge an episode again by all its events, in order; steps count since the world began.
+
+    The judge evaluates only steps at which something may change; between two of them, every step
+    has the same expected stage.
+    """
     judge = Judge.of(episode)
-    expected_stages: list[int] = []
     expected = -len(episode.demonstration)
-    for step in _evaluations(judge, events, elapsed_steps):
+    expected_stages: list[int] = []
+    for step in _evaluate(judge, events, elapsed_steps):
+        # The evaluation at the step itself still tests the stage that was expected before.
         expected_stages += [expected] * (step + 1 - len(expected_stages))
         expected = judge.index - len(episode.demonstration)
-    expected_stages += [expected] * (len(facts) - len(expected_stages))
-    parts = _intervals(events), judge, _intervals(attempts)
-    return EpisodeReplay(episode, policy_start_step, tuple(expected_stages), facts, *parts)
+    expected_stages += [expected] * (elapsed_steps + 1 - len(expected_stages))
+
+    return EpisodeReplay(
+        episode,
+        policy_start_step,
+        tuple(expected_stages),
+        facts_by_step(events, elapsed_steps),
+        _intervals(events),
+        judge,
+        _intervals(attempts),
+    )
 
 
 def decide(episode: Episode, events: Sequence[Event], elapsed_steps: int) -> Decision:
     """Judge an episode again up to its verdict; faster than `rejudge`."""
     judge = Judge.of(episode)
-    for step in _evaluations(judge, events, elapsed_steps):
+    for step in _evaluate(judge, events, elapsed_steps):
         if judge.status is not Status.ONGOING:
             return Decision(judge, step)
     return Decision(judge, elapsed_steps)
@@ -156,22 +213,26 @@ def completed_stages(
 ) -> dict[int, int]:
     """Return the steps that completed stages of the policy, by index; faster than `rejudge`."""
     judge = Judge.of(episode)
-    found: dict[int, int] = {}
-    for step in _evaluations(judge, events, elapsed_steps):
-        found.setdefault(judge.index - len(episode.demonstration) - 1, step)
-    return {stage: step for stage, step in found.items() if stage >= 0}
+    steps: dict[int, int] = {}
+    for step in _evaluate(judge, events, elapsed_steps):
+        last_completed = judge.index - len(episode.demonstration) - 1
+        if last_completed >= 0:
+            steps.setdefault(last_completed, step)
+    return steps
 
 
-def _evaluations(judge: Judge, events: Sequence[Event], elapsed_steps: int) -> Iterator[int]:
-    """Evaluate at each step at which anything may change, and yield the step."""
-    spans = _changing_facts(events, elapsed_steps)
-    ends = [*(start for start, _ in spans[1:]), elapsed_steps + 1]
-    for (step, facts), end in zip(spans, ends, strict=True):
-        moment = float(step)
-        while moment < end:
-            judge.update(int(moment), facts)
-            yield int(moment)
-            moment = judge.next_change()
+def _evaluate(judge: Judge, events: Sequence[Event], elapsed_steps: int) -> Iterator[int]:
+    """Let a judge evaluate each step at which anything may change, and yield the step.
+
+    These are the steps with an event, and those at which a time that a condition asks for is over.
+    """
+    for span in _spans(events, elapsed_steps):
+        next_step: float = span.start
+        while next_step < span.end:
+            step = int(next_step)
+            judge.update(step, span.facts)
+            yield step
+            next_step = judge.next_change()
 
 
 def facts_by_step(events: Sequence[Event], elapsed_steps: int) -> tuple[frozenset[Fact], ...]:
@@ -180,30 +241,57 @@ def facts_by_step(events: Sequence[Event], elapsed_steps: int) -> tuple[frozense
     Steps without an event share one set.
     """
     all_facts: list[frozenset[Fact]] = []
-    before: frozenset[Fact] = frozenset()
-    for step, facts in _changing_facts(events, elapsed_steps):
-        all_facts += [before] * (step - len(all_facts))
-        before = facts
-    return (*all_facts, *[before] * (elapsed_steps + 1 - len(all_facts)))
+    for span in _spans(events, elapsed_steps):
+        all_facts += [span.facts] * (span.end - span.start)
+    return tuple(all_facts)
 
 
-def _changing_facts(
-    events: Sequence[Event], elapsed_steps: int
-) -> list[tuple[int, frozenset[Fact]]]:
-    """Return all facts that hold from step 0 and from each step with an event."""
-    by_step: dict[int, list[Event]] = {0: []}
-    for event in events:
-        by_step.setdefault(event.step, []).append(event)
-    now: set[Fact] = set()
-    spans = []
-    for step in sorted(step for step in by_step if 0 <= step <= elapsed_steps):
-        for event in by_step[step]:
-            (now.add if event.holds else now.remove)(event.fact)
-        spans.append((step, frozenset(now)))
+class _Span(NamedTuple):
+    """The steps between two events, or before and after all.
+
+    Attributes:
+        start: the first step.
+        end: the first step after them.
+        facts: all that hold at each of them.
+    """
+
+    start: int
+    end: int
+    facts: frozenset[Fact]
+
+
+def _spans(events: Sequence[Event], elapsed_steps: int) -> list[_Span]:
+    """Divide all steps, from 0 to `elapsed_steps`, at those with an event.
+
+    Events at 3 and 7 of 10 steps -> the spans 0 to 2, 3 to 6 and 7 to 10.
+    """
+    by_step = _events_by_step(events)
+    starts = sorted(step for step in by_step if 0 <= step <= elapsed_steps)
+    facts: set[Fact] = set()
+    spans: list[_Span] = []
+    for start, end in pairwise((*starts, elapsed_steps + 1)):
+        for event in by_step[start]:
+            if event.holds:
+                facts.add(event.fact)
+            else:
+                facts.remove(event.fact)
+        spans.append(_Span(start, end, frozenset(facts)))
     return spans
 
 
+def _events_by_step(events: Sequence[Event]) -> dict[int, list[Event]]:
+    """Return the events at each step that has any, and at step 0."""
+    by_step: dict[int, list[Event]] = {0: []}
+    for event in events:
+        by_step.setdefault(event.step, []).append(event)
+    return by_step
+
+
 def _intervals(events: Sequence[Event]) -> tuple[FactInterval, ...]:
+    """Return from when to when each fact held, in the order of the starts.
+
+    A fact that starts at step 3 and ceases at 7 -> 3 to 7; one that never ceases ends with None.
+    """
     starts: dict[Fact, int] = {}
     intervals: list[FactInterval] = []
     for event in events:

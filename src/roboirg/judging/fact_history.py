@@ -28,7 +28,8 @@ class FactHistory:
         if facts is not self.facts:
             for fact in facts - self.facts:
                 self._start_steps.setdefault(fact, []).append(step)
-        self.step, self.facts = step, facts
+        self.step = step
+        self.facts = facts
 
     def start_timer(self, name: str) -> None:
         """Start a timer at this evaluation, unless it is running."""
@@ -40,30 +41,51 @@ class FactHistory:
             case Fact():
                 return condition in self.facts
             case FactCount(facts, least, most):
-                return _within(sum(fact in self.facts for fact in facts), least, most)
+                return _is_within(self._count_holding(facts), least, most)
             case OccurrenceCount(facts, least, until):
-                return sum(self._occurrences(fact, until) for fact in facts) >= least
+                return self._count_occurrences(facts, until) >= least
             case Elapsed(least, most, timer):
-                start = 0 if timer is None else self._timers.get(timer)
-                return start is not None and _within(self.step - start, least, most)
-            case All(of):
-                return all(self.holds(part) for part in of)
+                start = self._timer_start(timer)
+                return start is not None and _is_within(self.step - start, least, most)
+            case All(parts):
+                return all(self.holds(part) for part in parts)
 
     def next_change(self, condition: Elapsed) -> float:
-        """Return the next step at which the condition begins or ceases to be met; or infinity."""
-        start = 0 if condition.timer is None else self._timers.get(condition.timer)
+        """Return the next step at which the condition begins or ceases to be met; or infinity.
+
+        50 to 60 steps after reset: at step 10 -> 50, at step 55 -> 61, at step 70 -> infinity.
+        """
+        start = self._timer_start(condition.timer)
         if start is None:
             return math.inf
-        steps = [start + condition.least]
-        if condition.most is not None:
-            steps.append(start + condition.most + 1)
-        return min((step for step in steps if step > self.step), default=math.inf)
+        begin = start + condition.least
+        if begin > self.step:
+            return begin
+        if condition.most is None:
+            return math.inf
+        end = start + condition.most + 1
+        return end if end > self.step else math.inf
 
-    def _occurrences(self, fact: Fact, until: int | None) -> int:
-        """Return how many times a fact has started to hold, at or before a step if one is given."""
-        steps = self._start_steps.get(fact, [])
-        return len(steps) if until is None else bisect.bisect_right(steps, until)
+    def _count_holding(self, facts: tuple[Fact, ...]) -> int:
+        """Return how many of some facts hold at the last evaluation."""
+        count = 0
+        for fact in facts:
+            if fact in self.facts:
+                count += 1
+        return count
+
+    def _count_occurrences(self, facts: tuple[Fact, ...], until: int | None) -> int:
+        """Return how many times some facts have started to hold, up to a step if one is given."""
+        count = 0
+        for fact in facts:
+            steps = self._start_steps.get(fact, [])
+            count += len(steps) if until is None else bisect.bisect_right(steps, until)
+        return count
+
+    def _timer_start(self, timer: str | None) -> int | None:
+        """Return the step at which a timer started, or None; without a name, that of reset."""
+        return 0 if timer is None else self._timers.get(timer)
 
 
-def _within(number: int, least: int, most: int | None) -> bool:
+def _is_within(number: int, least: int, most: int | None) -> bool:
     return number >= least and (most is None or number <= most)

@@ -91,50 +91,74 @@ def attribute_failure(
         intent: what the policy declared, which comes before what it did; None if it did not.
     """
     replay = rejudge(episode, events, policy_start_step, elapsed_steps, attempts)
-    has_ended = replay.judge.violation or timed_out or cause is not None
-    if replay.judge.status is Status.SUCCESS or not has_ended:
+    has_failed = replay.judge.violation is not None or timed_out or cause is not None
+    if replay.judge.status is Status.SUCCESS or not has_failed:
         return None
-    first = min(_deviations(replay), key=lambda one: one.step, default=None)
+
+    # The first deviation comes before the end, as what follows it can no longer succeed.
+    place = None
+    first = min(_deviations(replay), key=lambda deviation: deviation.step, default=None)
     if first is not None and first.act is not None:
         found = _attribute_act(replay, first, first.act)
-    elif first is None and not timed_out:
-        found = FailureAttribution.of(
-            "unreachable", None, replay.last_step, f"could not reach a pose: {cause}"
-        )
-    else:
+        place = first.act.place
+    elif first is not None:
+        found = _attribute_time(replay, first)
+    elif timed_out:
         found = describe_end_state(replay)
-        if first is not None and found.failure == "out_of_time":
-            words = _describe_deviation(replay, first)
-            found = FailureAttribution.of(first.failure or "out_of_time", None, first.step, words)
-    act = None if first is None else first.act
-    found = refine_wrong_object(found, replay, mirrored or {}, None if act is None else act.place)
+    else:
+        words = f"could not reach a pose: {cause}"
+        found = FailureAttribution.of("unreachable", None, replay.last_step, words)
+
+    found = refine_wrong_object(found, replay, mirrored or {}, place)
+    # Up to here, steps count since the world began; a declaration counts them in the policy's turn.
     found = found._replace(step=found.step - policy_start_step)
     return found if intent is None else intent.revise(found, episode)
 
 
+def _attribute_time(replay: EpisodeReplay, deviation: _Deviation) -> FailureAttribution:
+    """Return the failure of letting time pass: what was tried until then, if anything was."""
+    found = describe_end_state(replay)
+    if found.failure != "out_of_time":
+        return found
+    words = _describe_deviation(replay, deviation)
+    return FailureAttribution.of(deviation.failure or "out_of_time", None, deviation.step, words)
+
+
 def _attribute_act(replay: EpisodeReplay, deviation: _Deviation, act: Fact) -> FailureAttribution:
-    """Return the failure of a forbidden act, or the slips that explain it."""
-    slips, step = find_slips(replay), deviation.step
-    failure = deviation.failure
-    if failure == "mistimed":
-        failure = judge_moment(replay, step)
+    """Return the failure of a forbidden act, or the slips that explain it.
+
+    A red cube on the wrong disc -> ``wrong_place``; if it fell there -> ``dropped``. A failure that
+    the violated rule names stays, but for presses: these depend on their moment, and on whether the
+    hand meant to press at all.
+    """
+    step = deviation.step
+    slips = find_slips(replay)
     dropped = drop_before(slips, FactInterval(act, step, None))
     if act.traits.role is FactRole.PLACING and dropped is not None:
         return describe_slip(replay, dropped)
-    if act.traits.role is FactRole.PRESS and _is_touched(replay, step):
+
+    failure = deviation.failure
+    if failure == "mistimed":
+        failure = judge_moment(replay, step)
+    if act.traits.role is FactRole.PRESS and _is_pressed_by_held(replay, step):
         failure = "ambiguous_act"
-    if failure is None:
-        explained = explain_early_act(replay, slips, act) if step == replay.last_step else None
+
+    # Explanations look at the end of the replay, so they fit an act that ended it.
+    if failure is None and step == replay.last_step:
+        explained = explain_early_act(replay, slips, act)
         if explained is not None:
             return explained
-        failure = classify_grounding_error(act, replay.stages, max(replay.expected_stages[step], 0))
-    return FailureAttribution.of(failure, act.subject, step, _describe_deviation(replay, deviation))
+    if failure is None:
+        expected_stage = max(replay.expected_stages[step], 0)
+        failure = classify_grounding_error(act, replay.stages, expected_stage)
+    words = _describe_deviation(replay, deviation)
+    return FailureAttribution.of(failure, act.subject, step, words)
 
 
-def _is_touched(replay: EpisodeReplay, step: int) -> bool:
-    """Return whether something in the hand, and next to the button, pressed it."""
+def _is_pressed_by_held(replay: EpisodeReplay, step: int) -> bool:
+    """Return whether a held object, not the hand, pressed the button: the hand is not at it."""
     roles = {fact.traits.role for fact in replay.facts[step]}
-    return roles & {FactRole.GRIP, FactRole.APPROACH} == {FactRole.GRIP}
+    return FactRole.GRIP in roles and FactRole.APPROACH not in roles
 
 
 def _deviations(replay: EpisodeReplay) -> Iterator[_Deviation]:
@@ -144,54 +168,70 @@ def _deviations(replay: EpisodeReplay) -> Iterator[_Deviation]:
         yield from _wasted_occurrences(replay, rule)
     violation = replay.judge.violation
     if violation is not None:
-        step = replay.last_step
-        yield _Deviation(step, violation, _latest_act(replay, violation, step))
+        act = _latest_act(replay, violation, replay.last_step)
+        yield _Deviation(replay.last_step, violation, act)
 
 
 def _lasting_deviations(replay: EpisodeReplay) -> Iterator[_Deviation]:
-    """Yield the rules of current and later stages whose conditions come to hold for good."""
-    history, last_stages = FactHistory(), _last_stages(replay)
+    """Yield the rules of current and later stages whose conditions come to hold for good.
+
+    A third red cube falls into the bin where the goal has two: a cube never leaves the bin, so the
+    rule of the last stage is already sure to be violated. Each rule is yielded once.
+    """
+    history = FactHistory()
+    open_rules = _last_stages(replay)
     for step, facts in enumerate(replay.facts):
-        changed = facts is not history.facts
+        has_changed = facts is not history.facts  # steps without an event share one set
         history.update(step, facts)
-        if not changed or step <= replay.policy_start_step:
+        if not has_changed or step <= replay.policy_start_step:
             continue
-        current = replay.expected_stages[step]
-        for rule in [rule for rule, stage in last_stages.items() if stage >= current]:
-            if _lasts(rule.condition) and history.holds(rule.condition):
-                del last_stages[rule]
+        for rule, last_stage in list(open_rules.items()):
+            is_in_force = last_stage >= replay.expected_stages[step]
+            if is_in_force and _lasts(rule.condition) and history.holds(rule.condition):
+                del open_rules[rule]
                 yield _Deviation(step, rule, _latest_act(replay, rule, step))
 
 
 def _wasted_occurrences(replay: EpisodeReplay, rule: Rule) -> Iterator[_Deviation]:
-    """Yield the first occurrence too many for a limit, given those that the stages still need."""
-    if not isinstance(rule.condition, OccurrenceCount) or rule.condition.until is not None:
+    """Yield the first occurrence too many for a limit, given those that the stages need.
+
+    A rule that fails at five swings over a target, where the stages need three, leaves one to
+    waste: four are allowed. The second swing that completes no stage is the first too many, since
+    the three that are still needed will then be five in all.
+    """
+    limit = rule.condition
+    if not isinstance(limit, OccurrenceCount) or limit.until is not None:
         return
-    counted = rule.condition.facts
-    needed = sum(stage.expects in counted for stage in replay.stages)
-    spare = rule.condition.least - 1 - needed
-    occurrences = [interval for interval in replay.intervals if interval.fact in counted]
+    most_allowed = limit.least - 1
+    needed = sum(stage.expects in limit.facts for stage in replay.stages)
+    may_be_wasted = most_allowed - needed
+    occurrences = [interval for interval in replay.intervals if interval.fact in limit.facts]
     wasted = [interval for interval in occurrences if not _completes_stage(replay, interval)]
-    if 0 <= spare < len(wasted) and wasted[spare].start > replay.policy_start_step:
-        yield _Deviation(wasted[spare].start, rule, wasted[spare].fact)
+    if not 0 <= may_be_wasted < len(wasted):
+        return
+    too_many = wasted[may_be_wasted]
+    if too_many.start > replay.policy_start_step:
+        yield _Deviation(too_many.start, rule, too_many.fact)
 
 
 def _completes_stage(replay: EpisodeReplay, interval: FactInterval) -> bool:
-    end = replay.last_step + 1 if interval.end is None else interval.end
-    return any(
-        interval.start <= step < end and replay.stages[stage].expects == interval.fact
-        for stage, step in replay.completions()
-    )
+    """Return whether a fact that a stage expected completed it while it held."""
+    for stage, step in replay.completions():
+        is_expected = replay.stages[stage].expects == interval.fact
+        # At the step at which it ends, the fact no longer holds.
+        if is_expected and interval.start <= step and interval.lasts_until(step + 1):
+            return True
+    return False
 
 
 def _last_stages(replay: EpisodeReplay) -> dict[Rule, int]:
-    """Return all rules, each with the last stage in which it is in force."""
-    return {
-        one: index
-        for index, stage in enumerate(replay.stages)
-        for one in stage.forbids
-        if isinstance(one, Rule)
-    }
+    """Return all rules, each with the index of the last stage in which it is in force."""
+    last_stages: dict[Rule, int] = {}
+    for index, stage in enumerate(replay.stages):
+        for forbidden in stage.forbids:
+            if isinstance(forbidden, Rule):
+                last_stages[forbidden] = index
+    return last_stages
 
 
 def _lasts(condition: Condition) -> bool:
@@ -200,26 +240,33 @@ def _lasts(condition: Condition) -> bool:
         case Fact():
             return condition.traits.lasts
         case FactCount(facts, _, most):
-            return most is None and all(map(_lasts, facts))
+            return most is None and all(fact.traits.lasts for fact in facts)
         case OccurrenceCount():
             return True
-        case All(of):
-            return all(map(_lasts, of))
+        case All(parts):
+            return all(_lasts(part) for part in parts)
         case Elapsed():
             return False
 
 
 def _latest_act(replay: EpisodeReplay, violation: Fact | Rule, step: int) -> Fact | None:
-    """Return the latest of the acts that make a violation; None if it is only the time."""
+    """Return the latest of the acts that make a violation; None if it is only the time.
+
+    Acts whose fact still holds at the step come first.
+    """
     facts = facts_of(violation)
-    acts = [one for one in replay.intervals if one.fact in facts and one.start <= step]
-    holding = [one for one in acts if one.end is None or one.end > step]
-    return max(holding or acts, key=lambda interval: interval.start).fact if acts else None
+    acts = [act for act in replay.intervals if act.fact in facts and act.start <= step]
+    if not acts:
+        return None
+    still_holding = [act for act in acts if act.lasts_until(step + 1)]
+    latest = max(still_holding or acts, key=lambda act: act.start)
+    return latest.fact
 
 
 def _describe_deviation(replay: EpisodeReplay, deviation: _Deviation) -> str:
-    stage, scene = replay.stage_at(deviation.step), replay.episode.scene
-    return describe_violation(deviation.violation, stage, scene)
+    """Return a deviation in words: *pressed the button too early; expected: pick up the cube*."""
+    stage = replay.stage_at(deviation.step)
+    return describe_violation(deviation.violation, stage, replay.episode.scene)
 
 
 def refine_wrong_object(
@@ -227,16 +274,27 @@ def refine_wrong_object(
 ) -> FailureAttribution:
     """Return a ``mirrored_pick`` if the wrong object or place is the mirrored one.
 
-    The image is that of the object that the words mean and the current stage expects, or of any
-    that they mean if it expects none of them.
-    The step of `found` counts since the world began; `place` is None if the act has none.
+    *The left cube* means the red one, and with left and right exchanged the blue one: taking the
+    blue cube is a mirrored pick. What counts are the mirror images of the objects that the words
+    mean and the current stage expects, or of all that the words mean if it expects none of them.
+
+    Args:
+        found: the failure so far; its step counts since the world began.
+        replay: of the episode.
+        mirrored: the mirror images of each object that the words mean.
+        place: where the act was; None if it has no place.
     """
     if found.failure not in ("wrong_object", "wrong_place"):
         return found
-    facts = facts_of(replay.stage_at(found.step).expects)
-    names = {str(name) for fact in facts for name in (fact.subject, fact.place)}
-    sides = {other for name in names & mirrored.keys() or mirrored for other in mirrored[name]}
-    if not sides & {found.subject, place}:
+    expected: set[str | None] = set()
+    for fact in facts_of(replay.stage_at(found.step).expects):
+        expected.update((fact.subject, fact.place))
+    meant_and_expected = [name for name in mirrored if name in expected]
+
+    mirror_images: set[str | None] = set()
+    for name in meant_and_expected or mirrored:
+        mirror_images.update(mirrored[name])
+    if mirror_images.isdisjoint((found.subject, place)):
         return found
     words = f"{found.sentence[:-1]}; the words mean it only with left and right exchanged"
     return FailureAttribution.of("mirrored_pick", found.subject, found.step, words)

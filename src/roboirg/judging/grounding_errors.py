@@ -24,38 +24,59 @@ def classify_grounding_error(
     | was expected before: once too often | ``wrong_count`` |
     | is expected with the same object at another place | ``wrong_place`` |
     | is never expected | ``wrong_object`` |
+
+    The first row that fits decides. `expected_stage` is the index of the current stage.
     """
     expected = [facts_of(stage.expects) for stage in stages]
-    now, past = expected[expected_stage], expected[:expected_stage]
-    later = range(expected_stage + 1, len(stages))
-    next_use = next((index for index in later if fact in expected[index]), None)
-    if next_use is not None and not _repeats(fact, now, past):
-        return _classify_early(fact, expected[expected_stage:next_use])
+    now = expected[expected_stage]
+    past = expected[:expected_stage]
+    later_stage = next_stage_with(fact, stages, expected_stage)
+    # An act that was just done and is done again at once is one too many, though it is due later.
+    if later_stage is not None and not _repeats(fact, now, past):
+        return _classify_early(fact, expected[expected_stage:later_stage])
     if any(other.kind == fact.kind and other.subject != fact.subject for other in now):
         return "wrong_object"
     if any(fact in facts for facts in past):
         return "wrong_count"
-    return "wrong_place" if _is_misplaced(fact, expected) else "wrong_object"
+    if any(_is_elsewhere(fact, facts) for facts in expected):
+        return "wrong_place"
+    return "wrong_object"
+
+
+def next_stage_with(fact: Fact, stages: Sequence[Stage], current: int) -> int | None:
+    """Return the index of the first stage after the current one that expects a fact, if any."""
+    for index in range(current + 1, len(stages)):
+        if fact in facts_of(stages[index].expects):
+            return index
+    return None
 
 
 def _repeats(fact: Fact, now: tuple[Fact, ...], past: Sequence[tuple[Fact, ...]]) -> bool:
-    """Return whether the last stage expected the act and this one expects it at another place."""
-    again = bool(past) and fact in past[-1] and fact not in now
-    return again and any(_is_alike(fact, one) for one in now)
+    """Return whether the last stage expected the act and this one expects it at another place.
+
+    The cube goes over the right target again, where it is due over the left one now.
+    """
+    if not past or fact not in past[-1] or fact in now:
+        return False
+    return _is_elsewhere(fact, now)
 
 
 def _classify_early(fact: Fact, skipped: Sequence[tuple[Fact, ...]]) -> FailureName:
     """Classify an act before its time by the expected acts that it skips."""
-    only_releases = all(one.traits.role is FactRole.RELEASE for facts in skipped for one in facts)
-    ends_task = fact.traits.role is FactRole.PRESS
-    return "wrong_count" if ends_task and not only_releases else "wrong_order"
+    if fact.traits.role is not FactRole.PRESS:
+        return "wrong_order"
+    # A press often ends the task, so what it skips is never done.
+    for facts in skipped:
+        for skipped_act in facts:
+            if skipped_act.traits.role is not FactRole.RELEASE:
+                return "wrong_count"
+    return "wrong_order"
 
 
-def _is_misplaced(fact: Fact, expected: Sequence[tuple[Fact, ...]]) -> bool:
-    """Return whether any stage expects the same act with the same object at another place."""
-    alike = (one for facts in expected for one in facts if _is_alike(fact, one))
-    return any(one.place != fact.place for one in alike)
-
-
-def _is_alike(fact: Fact, other: Fact) -> bool:
-    return other.kind == fact.kind and other.subject == fact.subject
+def _is_elsewhere(fact: Fact, expected: tuple[Fact, ...]) -> bool:
+    """Return whether the same act with the same object is expected at another place."""
+    for other in expected:
+        is_same_act = other.kind == fact.kind and other.subject == fact.subject
+        if is_same_act and other.place != fact.place:
+            return True
+    return False

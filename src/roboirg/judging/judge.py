@@ -64,15 +64,19 @@ class Judge:
         return cls((*episode.demonstration, *episode.stages), episode.scene)
 
     def next_change(self) -> float:
-        """Return the next step at which an evaluation may change something though no fact does."""
+        """Return the next step at which an evaluation may change something though no fact does.
+
+        A stage that expects 100 steps to pass, evaluated at step 20 -> 100. Infinity if only facts
+        can change anything.
+        """
         stage = self.current
         if self.status is not Status.ONGOING or stage is None:
             return math.inf
         if self._evaluated != self.index:
-            return self._history.step + 1
+            return self._history.step + 1  # a new stage, which the next step evaluates first
         if not self._elapsed and not stage.lasting:
             return math.inf
-        changes = [self._history.next_change(one) for one in self._elapsed]
+        changes = [self._history.next_change(condition) for condition in self._elapsed]
         if stage.lasting and self._met_since is not None:
             changes.append(self._met_since + stage.lasting)
         return min(changes, default=math.inf)
@@ -83,7 +87,11 @@ class Judge:
         return self.stages[self.index] if self.index < len(self.stages) else None
 
     def update(self, step: int, facts: AbstractSet[Fact]) -> Status:
-        """Evaluate the facts that hold `step` control steps after reset, and return the status."""
+        """Evaluate the facts that hold `step` control steps after reset, and return the status.
+
+        What the stage forbids is tested first: who does what is expected and what is forbidden in
+        the same step fails.
+        """
         stage = self.current
         if self.status is not Status.ONGOING or stage is None:
             return self.status
@@ -93,44 +101,63 @@ class Judge:
             self._history.start_timer(stage.timer)
         is_first = self._evaluated != self.index
         if is_first:
-            self._evaluated, self._met_since = self.index, None
+            self._evaluated = self.index
+            self._met_since = None
             self._elapsed = tuple(_elapsed_parts(stage))
-        self.violation = next((rule for rule in stage.forbids if self._is_violated(rule)), None)
+
+        self.violation = self._first_violated(stage)
         if self.violation is not None:
             self.fail(describe_violation(self.violation, stage, self._scene))
-        elif self._completed(step, stage, is_first=is_first):
+        elif self._completes(step, stage, is_first=is_first):
             self.index += 1
             if self.index == len(self.stages):
-                self.status, self.published = Status.SUCCESS, None
+                self.status = Status.SUCCESS
+                self.published = None
         return self.status
 
     def fail(self, cause: str) -> None:
         """End the episode as a failure, unless it is over."""
         if self.status is Status.ONGOING:
-            self.status, self.cause = Status.FAILURE, cause
+            self.status = Status.FAILURE
+            self.cause = cause
 
-    def _is_violated(self, rule: Fact | Rule) -> bool:
-        return self._history.holds(rule.condition if isinstance(rule, Rule) else rule)
+    def _first_violated(self, stage: Stage) -> Fact | Rule | None:
+        """Return the first forbidden fact or rule that holds; None if none does."""
+        for forbidden in stage.forbids:
+            if self._history.holds(_condition_of(forbidden)):
+                return forbidden
+        return None
 
-    def _completed(self, step: int, stage: Stage, *, is_first: bool) -> bool:
-        met = self._history.holds(stage.expects)
+    def _completes(self, step: int, stage: Stage, *, is_first: bool) -> bool:
+        """Return whether a step completes a stage, and remember since when it has been met.
+
+        A stage with `lasting` is complete when what it expects has held for so many steps on end.
+        """
+        is_met = self._history.holds(stage.expects)
         if stage.lasting == 0:
-            return met
-        if not met:
+            return is_met
+        if not is_met:
             self._met_since = None
             return False
         if self._met_since is None:
+            # Later than at the stage's first evaluation, it has been met for one step already.
             self._met_since = step if is_first else step - 1
         return step - self._met_since >= stage.lasting
+
+
+def _condition_of(forbidden: Fact | Rule) -> Condition:
+    return forbidden.condition if isinstance(forbidden, Rule) else forbidden
 
 
 def _elapsed_parts(stage: Stage) -> Iterator[Elapsed]:
     """Yield the parts of a stage's conditions that depend on the time."""
     conditions: list[Condition] = [stage.expects]
-    conditions += [one.condition if isinstance(one, Rule) else one for one in stage.forbids]
-    for one in conditions:
-        parts = one.of if isinstance(one, All) else (one,)
-        yield from (part for part in parts if isinstance(part, Elapsed))
+    conditions += [_condition_of(forbidden) for forbidden in stage.forbids]
+    for condition in conditions:
+        parts = condition.of if isinstance(condition, All) else (condition,)
+        for part in parts:
+            if isinstance(part, Elapsed):
+                yield part
 
 
 def describe_violation(violation: Fact | Rule, stage: Stage, scene: Scene) -> str:
@@ -153,15 +180,21 @@ def describe_act(fact: Fact, scene: Scene) -> str:
 
 
 def describe_object(name: str, scene: Scene) -> str:
-    """Return words for an object, or its name if the scene does not have it."""
-    item = next((item for item in scene.objects if item.name == name), None)
-    if item is None:
+    """Return words for an object, or its name if the scene does not have it.
+
+    ``cube_red`` -> *the red cube*, ``target`` -> *the target*, ``container_2`` -> *the container
+    over the blue cube*, or *an empty container*.
+    """
+    if all(item.name != name for item in scene.objects):
         return name
+    item = scene[name]
     if item.kind != "container":
         noun = item.kind.removeprefix("hidden_")
         return f"the {item.color} {noun}" if item.color else f"the {item.kind}"
     hidden = scene.hidden_in(name)
-    return f"the container over the {hidden.color} cube" if hidden else "an empty container"
+    if hidden is None:
+        return "an empty container"
+    return f"the container over the {hidden.color} cube"
 
 
 def plain_subgoal(stage: Stage) -> str:

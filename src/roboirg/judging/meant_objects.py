@@ -1,4 +1,8 @@
-"""Which objects a stage means: equal ones may stand for each other, and free orders are free."""
+"""Which objects a stage means: which ones the policy may handle to complete it.
+
+A stage may expect any of several objects, as BinFill's stages expect any cube. Which of them are
+still meant depends on all stages that expect the same, since these may be done in any order.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +11,19 @@ from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 
 from roboirg.core.conditions import Fact, facts_of
-from roboirg.core.episode import Scene, Stage
+from roboirg.core.episode import Color, ObjectKind, Scene, Stage
+
+_Look = tuple[ObjectKind, Color | None]
+"""Kind and color of an object: those with the same look may stand for each other."""
 
 
 def meant_objects(
     stages: Sequence[Stage], index: int, scene: Scene, facts: AbstractSet[Fact] = frozenset()
 ) -> frozenset[str]:
     """Return the names of the objects with which a stage can rightly be completed.
+
+    BinFill with *two red cubes, one blue one*: at first every red and blue cube; when both red ones
+    are in the bin, every blue one.
 
     Args:
         stages: of the policy.
@@ -26,16 +36,25 @@ def meant_objects(
     subjects = _subjects(stage)
     if len(subjects) <= 1:
         return frozenset({*subjects, stage.primitive.subject})
-    looks = {name: (scene[name].kind, scene[name].color) for name in subjects}
-    alike = [
-        one
-        for one in stages
-        if one.primitive.kind == stage.primitive.kind and _subjects(one) == subjects
-    ]
-    needed = Counter(looks[one.primitive.subject] for one in alike)
-    needed -= Counter(looks[one.subject] for one in facts if one.traits.lasts)
-    return frozenset(name for name, look in looks.items() if look in needed)
+
+    looks = {name: _look(name, scene) for name in subjects}
+    # How many objects of each look the stages take, less those that are done for good.
+    still_needed: Counter[_Look] = Counter()
+    for other in stages:
+        if other.primitive.kind == stage.primitive.kind and _subjects(other) == subjects:
+            still_needed[looks[other.primitive.subject]] += 1
+    for fact in facts:
+        if fact.traits.lasts:
+            still_needed[looks[fact.subject]] -= 1
+    return frozenset(name for name, look in looks.items() if still_needed[look] > 0)
+
+
+def _look(name: str, scene: Scene) -> _Look:
+    """Return what an object looks like: ``("cube", "red")``."""
+    item = scene[name]
+    return item.kind, item.color
 
 
 def _subjects(stage: Stage) -> set[str]:
+    """Return the names of the objects in what a stage expects."""
     return {fact.subject for fact in facts_of(stage.expects)}

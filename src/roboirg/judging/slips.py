@@ -1,12 +1,15 @@
-"""What the hands tried and failed to do: misses, drops, releases and passes next to a place."""
+"""What the hands tried and failed to do: misses, drops, releases and passes next to a place.
+
+A *slip* is one such try. An object is *lost* if it had been up, was let go, and did not come to a
+place where it was expected.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import chain
 from typing import NamedTuple
 
-from roboirg.core.conditions import facts_of
+from roboirg.core.conditions import Fact, facts_of
 from roboirg.core.fact_traits import FactRole
 from roboirg.core.failures import FailureName
 from roboirg.judging.episode_replay import EpisodeReplay, FactInterval
@@ -16,6 +19,15 @@ SETTLED_STEPS = 40
 
 TREMOR_STEPS = 10
 """Control steps within which what the fingers hold again was not let go."""
+
+
+MISSES = ("missed_grasp", "missed_press")
+"""Slips at which the hand did not reach its object; at all others it lost it, or passed a place."""
+
+_OPEN_PLACES = ("bin", "box")
+"""Kinds of places into which an object falls that is let go in the air."""
+_PLACES = ("target", "site", *_OPEN_PLACES)
+"""Kinds of places at which an object comes to rest that is put down."""
 
 
 class Slip(NamedTuple):
@@ -33,131 +45,255 @@ class Slip(NamedTuple):
 
 
 def find_slips(replay: EpisodeReplay) -> tuple[Slip, ...]:
-    """Return all failed tries of the policy's turn, in order."""
-    parts = (_missed_grasps(replay), _missed_presses(replay), _lost(replay), _passes(replay))
-    return tuple(sorted(chain(*parts), key=lambda slip: slip.step))
+    """Return all failed tries of the policy's turn, in the order of their steps."""
+    slips = [
+        *_missed_grasps(replay),
+        *_missed_presses(replay),
+        *_lost_objects(replay),
+        *_missed_passes(replay),
+    ]
+    slips.sort(key=lambda slip: slip.step)
+    return tuple(slips)
 
 
 def drop_before(slips: Sequence[Slip], act: FactInterval) -> Slip | None:
     """Return the drop by which an object came to lie at a place; None if it was put there."""
-    name, start = act.fact.subject, act.start
-    drops = (one for one in slips if one.failure == "dropped" and name in one.subjects)
-    return next((one for one in drops if start - SETTLED_STEPS <= one.step <= start), None)
+    for slip in slips:
+        is_recent = act.start - SETTLED_STEPS <= slip.step <= act.start
+        if slip.failure == "dropped" and act.subject in slip.subjects and is_recent:
+            return slip
+    return None
 
 
 def is_noticed(replay: EpisodeReplay, slip: Slip, slips: Sequence[Slip]) -> bool:
     """Return whether the next that the hands did after a miss was to try the same again.
 
-    An empty hand at a place, a press, or another object shows that it went unnoticed. Whether a
-    loss was noticed does not show: where an object is handled several times, both look alike.
+    Missed the red cube, then took it: noticed. Missed it, then opened an empty hand at the bin,
+    pressed, or took another object: not noticed. A loss never counts as noticed: where an object is
+    handled several times, a new pick may be the next one that is due.
     """
-    if slip.failure not in ("missed_grasp", "missed_press"):
+    if slip.failure not in MISSES:
         return False
-    roles = (FactRole.RAISE, FactRole.PRESS)
-    acts = [(one.start, {one.fact.subject}) for one in replay.started(*roles, after=slip.step)]
-    acts += [(one.step, set(one.subjects)) for one in slips if one.step > slip.step]
-    acts += [(one.start, set()) for one in replay.tried("emptied") if one.start > slip.step]
-    _, subjects = min(acts, default=(0, set()), key=lambda act: act[0])
-    return bool(subjects & slip.subjects)
+    later_acts = [act for act in _acts_and_tries(replay, slips) if act.step > slip.step]
+    if not later_acts:
+        return False
+    next_act = min(later_acts, key=lambda act: act.step)
+    return not next_act.subjects.isdisjoint(slip.subjects)
+
+
+class _Act(NamedTuple):
+    """Something that the hands did, or tried: when, and with which objects if with any."""
+
+    step: int
+    subjects: frozenset[str]
+
+
+def _acts_and_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> Iterator[_Act]:
+    """Yield all that the hands did or tried, in no order; an empty hand is about no object."""
+    for act in replay.started(FactRole.RAISE, FactRole.PRESS):
+        yield _Act(act.start, frozenset({act.subject}))
+    for slip in slips:
+        yield _Act(slip.step, slip.subjects)
+    for emptied in replay.tried("emptied"):
+        yield _Act(emptied.start, frozenset())
 
 
 def _missed_grasps(replay: EpisodeReplay) -> Iterator[Slip]:
     """Yield where the hands meant to take something, and did not lift it.
 
-    Fingers closed on nothing next to it, held it for a while, or were where they take what is
-    expected and did not close.
+    The fingers closed on nothing next to it, they held it for a while without lifting it, or they
+    were at what is expected and did not close.
     """
-    missed = [*replay.tried("clutched")]
-    missed += [one for one in _holds(replay) if not _raises(replay, one)]
-    grips = [one.start for one in (*missed, *replay.started(FactRole.GRIP, after=0))]
-    for one in replay.started(FactRole.TOUCH):
-        end = replay.last_step if one.end is None else one.end + SETTLED_STEPS
-        expected = {fact.subject for fact in facts_of(replay.stage_at(one.start).expects)}
-        if one.fact.subject in expected and not any(one.start <= grip <= end for grip in grips):
-            missed.append(one)
-    closed: dict[int, set[str]] = {}
-    for one in missed:
-        closed.setdefault(one.start, set()).add(one.fact.subject)
-    yield from (Slip(step, "missed_grasp", frozenset(names)) for step, names in closed.items())
+    missed = [*replay.tried("clutched"), *_fruitless_holds(replay)]
+    grips = replay.started(FactRole.GRIP, after=0)
+    closing_steps = [interval.start for interval in (*missed, *grips)]
+    missed += _idle_touches(replay, closing_steps)
+
+    # Several objects that were missed at the same step are one try: it is not clear at which.
+    names_by_step: dict[int, set[str]] = {}
+    for interval in missed:
+        names = names_by_step.setdefault(interval.start, set())
+        names.add(interval.subject)
+    for step, names in names_by_step.items():
+        yield Slip(step, "missed_grasp", frozenset(names))
 
 
-def _holds(replay: EpisodeReplay) -> list[FactInterval]:
-    """Return when the fingers held something, until they let it go; not what they still hold."""
+def _fruitless_holds(replay: EpisodeReplay) -> Iterator[FactInterval]:
+    """Yield when the fingers held something that did not come up."""
+    for hold in _ended_holds(replay):
+        if not _raises(replay, hold):
+            yield hold
+
+
+def _idle_touches(replay: EpisodeReplay, closing_steps: Sequence[int]) -> Iterator[FactInterval]:
+    """Yield when the hand was at an expected object, and the fingers did not close then or soon.
+
+    `closing_steps` are those at which they closed, on an object or on nothing.
+    """
+    for touch in replay.started(FactRole.TOUCH):
+        end = replay.last_step
+        if touch.end is not None:
+            end = touch.end + SETTLED_STEPS
+        has_closed = any(touch.start <= step <= end for step in closing_steps)
+        expected = facts_of(replay.stage_at(touch.start).expects)
+        is_expected = any(fact.subject == touch.subject for fact in expected)
+        if is_expected and not has_closed:
+            yield touch
+
+
+def _ended_holds(replay: EpisodeReplay) -> Iterator[FactInterval]:
+    """Yield when the fingers held something until they let it go; not what they still hold.
+
+    Fingers that tremble lose an object and hold it again within a few steps: that is no end.
+    """
     grips = list(replay.started(FactRole.GRIP))
-    starts = {(one.fact.subject, one.start) for one in grips}
-    return [
-        one
-        for one in grips
-        if one.end is not None
-        if not any((one.fact.subject, one.end + late) in starts for late in range(TREMOR_STEPS))
-    ]
+    grip_starts = {(grip.subject, grip.start) for grip in grips}
+    for grip in grips:
+        if grip.end is None:
+            continue
+        steps_after = range(grip.end, grip.end + TREMOR_STEPS)
+        is_held_again = any((grip.subject, step) in grip_starts for step in steps_after)
+        if not is_held_again:
+            yield grip
 
 
 def _raises(replay: EpisodeReplay, hold: FactInterval) -> list[FactInterval]:
-    """Return the intervals in which an object was up while, or just before, it was held."""
-    raised = replay.started(FactRole.RAISE, after=0)
-    own = [one for one in raised if one.fact.subject == hold.fact.subject]
-    end = replay.last_step if hold.end is None else hold.end
-    return [one for one in own if one.start <= end and (one.end or end) >= hold.start]
+    """Return the intervals in which a held object was up: those that meet the hold in time."""
+    hold_end = replay.end_of(hold)
+    raises: list[FactInterval] = []
+    for raised in replay.started(FactRole.RAISE, after=0):
+        is_same_object = raised.subject == hold.subject
+        is_meanwhile = raised.start <= hold_end and raised.lasts_until(hold.start)
+        if is_same_object and is_meanwhile:
+            raises.append(raised)
+    return raises
 
 
 def _missed_presses(replay: EpisodeReplay) -> Iterator[Slip]:
+    """Yield where closed fingers came down next to a button that was not pressed about then.
+
+    *About then* is from `SETTLED_STEPS` before they came down until they are up again.
+    """
     presses = list(replay.started(FactRole.PRESS))
-    for one in replay.tried("pressed_beside"):
-        end = replay.last_step if one.end is None else one.end
-        if not any(
-            press.fact.subject == one.fact.subject
-            and one.start - SETTLED_STEPS <= press.start <= end + 1
-            for press in presses
-        ):
-            yield Slip(one.start, "missed_press", frozenset({one.fact.subject}))
+    for attempt in replay.tried("pressed_beside"):
+        first = attempt.start - SETTLED_STEPS
+        last = replay.end_of(attempt) + 1
+        pressed_buttons = [press.subject for press in presses if first <= press.start <= last]
+        if attempt.subject not in pressed_buttons:
+            yield Slip(attempt.start, "missed_press", frozenset({attempt.subject}))
 
 
-def _lost(replay: EpisodeReplay) -> Iterator[Slip]:
-    """Yield where an object that had been up was let go and did not come to an expected place."""
-    for hold in _holds(replay):
-        raises, step, name = _raises(replay, hold), hold.end or 0, hold.fact.subject
-        expected = {
-            fact for fact in facts_of(replay.stage_at(step).expects) if fact.subject == name
-        }
-        roles = {fact.traits.role for fact in expected} - {FactRole.RAISE, FactRole.RELEASE}
-        if not raises or not roles:
+class _Release(NamedTuple):
+    """The moment at which an object that had been up was let go.
+
+    Attributes:
+        step: when.
+        name: of the object.
+        is_in_air: whether it was let go above the table.
+        expected: what the stage expects of the object then.
+    """
+
+    step: int
+    name: str
+    is_in_air: bool
+    expected: tuple[Fact, ...]
+
+    @property
+    def roles(self) -> set[FactRole]:
+        """The roles of what is expected, but for being up and being let go."""
+        return {fact.traits.role for fact in self.expected} - {FactRole.RAISE, FactRole.RELEASE}
+
+    @property
+    def places(self) -> tuple[str, ...]:
+        """The kinds of places to which the object can come."""
+        return _OPEN_PLACES if self.is_in_air else _PLACES
+
+
+def _lost_objects(replay: EpisodeReplay) -> Iterator[Slip]:
+    """Yield where an object that had been up was let go and did not come to an expected place.
+
+    Letting go is no loss if the stage expects nothing more of the object, or if the object was put
+    down and is not to come to a place.
+    """
+    for release in _releases(replay):
+        can_be_lost = release.is_in_air or FactRole.PLACING in release.roles
+        if release.roles and can_be_lost and not _has_landed(replay, release):
+            failure = _failure_of(replay, release)
+            yield Slip(release.step, failure, frozenset({release.name}))
+
+
+def _releases(replay: EpisodeReplay) -> Iterator[_Release]:
+    """Yield the moments at which an object that had been up was let go.
+
+    It was in the air if it was still up, and the hand had not lowered it to put it down.
+    """
+    for hold in _ended_holds(replay):
+        raises = _raises(replay, hold)
+        if not raises:
             continue
-        lowered = any(
-            one.start < step <= (one.end or step) for one in replay.tried("lowered", name)
+        step = replay.end_of(hold)
+        name = hold.subject
+        is_lowered = any(
+            lowered.start < step and lowered.lasts_until(step)
+            for lowered in replay.tried("lowered", name)
         )
-        in_air = (raises[-1].end or step) >= step and not lowered
-        kinds = ("bin", "box") if in_air else ("target", "site", "bin", "box")
-        landed = {
-            fact
-            for facts in replay.facts[step : step + SETTLED_STEPS]
-            for fact in facts
-            if fact.subject == name and fact.traits.role is FactRole.PLACING
-            if fact in expected or replay.episode.scene[str(fact.place)].kind in kinds
-        }
-        if not landed and (FactRole.PLACING in roles or in_air):
-            near = _places_near(replay, name, step, kinds)
-            is_right = near & {fact.place for fact in expected}
-            is_put = is_right if in_air else not near or is_right
-            other: FailureName = "wrong_place" if near else "dropped"
-            yield Slip(step, "misplaced" if is_put else other, frozenset({name}))
+        is_in_air = raises[-1].lasts_until(step) and not is_lowered
+        expected_facts = facts_of(replay.stage_at(step).expects)
+        of_object = tuple(fact for fact in expected_facts if fact.subject == name)
+        yield _Release(step, name, is_in_air, of_object)
 
 
-def _places_near(
-    replay: EpisodeReplay, name: str, step: int, kinds: tuple[str, ...]
-) -> set[str | None]:
-    """Return the places of some kinds next to which an object was let go at a step."""
-    beside = replay.tried("beside", name)
-    near = {one.fact.place for one in beside if one.start <= step <= (one.end or step) + 1}
-    return {one for one in near if replay.episode.scene[str(one)].kind in kinds}
+def _has_landed(replay: EpisodeReplay, release: _Release) -> bool:
+    """Return whether an object soon lies at an expected place, or at one to which it can come."""
+    for facts in replay.facts[release.step : release.step + SETTLED_STEPS]:
+        for fact in facts:
+            if fact.subject != release.name or fact.traits.role is not FactRole.PLACING:
+                continue
+            kind = replay.episode.scene[str(fact.place)].kind
+            if fact in release.expected or kind in release.places:
+                return True
+    return False
 
 
-def _passes(replay: EpisodeReplay) -> Iterator[Slip]:
-    """Yield where an object was carried past a place over which it was expected."""
-    over = list(replay.started(FactRole.CARRY))
-    for one in replay.tried("beside"):
-        end = replay.last_step if one.end is None else one.end
-        expected = facts_of(replay.stage_at(one.start).expects)
-        wanted = {f for f in expected if f[1:] == one.fact[1:] and f.traits.role is FactRole.CARRY}
-        if wanted and not any(it.fact in wanted and one.start <= it.start <= end for it in over):
-            yield Slip(one.start, "misplaced", frozenset({one.fact.subject}))
+def _failure_of(replay: EpisodeReplay, release: _Release) -> FailureName:
+    """Return which failure the loss of an object is, by the places next to which it was let go.
+
+    Next to the place where it is expected -> ``misplaced``; next to another place ->
+    ``wrong_place``; next to none -> ``dropped`` from the air, ``misplaced`` on the table.
+    """
+    places_nearby: set[str | None] = set()
+    for carried in replay.tried("beside", release.name):
+        place = carried.fact.place
+        kind = replay.episode.scene[str(place)].kind
+        is_now = carried.start <= release.step and carried.lasts_until(release.step - 1)
+        if is_now and kind in release.places:
+            places_nearby.add(place)
+    if not places_nearby:
+        return "dropped" if release.is_in_air else "misplaced"
+    is_at_right_place = any(fact.place in places_nearby for fact in release.expected)
+    return "misplaced" if is_at_right_place else "wrong_place"
+
+
+def _missed_passes(replay: EpisodeReplay) -> Iterator[Slip]:
+    """Yield where an object was carried past a place over which it was expected.
+
+    It was next to the place, and not over it before it was away again.
+    """
+    carries = list(replay.started(FactRole.CARRY))
+    for attempt in replay.tried("beside"):
+        end = replay.end_of(attempt)
+        reached = {carry.fact for carry in carries if attempt.start <= carry.start <= end}
+        expected = _expected_carries(replay, attempt)
+        if expected and expected.isdisjoint(reached):
+            yield Slip(attempt.start, "misplaced", frozenset({attempt.subject}))
+
+
+def _expected_carries(replay: EpisodeReplay, attempt: FactInterval) -> set[Fact]:
+    """Return the facts, expected at an attempt, that its object is carried over its place."""
+    expected: set[Fact] = set()
+    for fact in facts_of(replay.stage_at(attempt.start).expects):
+        is_same_object = fact.subject == attempt.subject
+        is_same_place = fact.place == attempt.fact.place
+        if is_same_object and is_same_place and fact.traits.role is FactRole.CARRY:
+            expected.add(fact)
+    return expected

@@ -8,12 +8,11 @@ from roboirg.language.mirrored_landmarks import mirrored_objects
 from roboirg.language.request import STAGE_SETS
 from roboirg.language.scenarios.wording_store import open_wordings
 from roboirg.language.settings import plain_settings, setting_names, settings_of
-from roboirg.language.templates import LANGUAGE_VERSION, LANGUAGE_VERSIONS
+from roboirg.language.word_sampler import LANGUAGE_VERSION
 
 __all__ = [
     "FORMS",
     "LANGUAGE_VERSION",
-    "LANGUAGE_VERSIONS",
     "STAGE_SETS",
     "Instruction",
     "Mention",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import re
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -100,70 +101,116 @@ def say_arm(episode: Episode, options: InstructionOptions, arm: str = TOLD) -> A
         InvalidValueError: the options cannot express the goal, the scene has no other goal, or
             there is no further paraphrase.
     """
-    stated = arm_episode(episode, arm)
-    told = instruct_with(stated, options)
-    number = paraphrase_number(arm)
+    judged = arm_episode(episode, arm)
+    original = None if judged is episode else episode
+    instruction = instruct_with(judged, options)
+    number = paraphrase_number(arm)  # None for other arms
     if number is not None:
-        told = _paraphrase(stated, options, told, number)
-    elif arm in SILENT_TEXTS:
-        # No words leave all goals, where scrambled ones have a meaning that is not known.
-        nothing = None if told.meaning is None else Meaning({})
-        told = _with_texts(told, (SILENT_TEXTS[arm],), nothing)
+        instruction = _paraphrase(judged, options, instruction, number)
     elif arm == SCRAMBLED:
-        told = _scramble(stated, told)
-    return ArmWords(stated, told, None if stated is episode else episode)
+        instruction = _scramble(judged, instruction)
+    elif arm in SILENT_TEXTS:
+        instruction = _silence(instruction, SILENT_TEXTS[arm])
+    return ArmWords(judged, instruction, original)
 
 
 def word_trial(episode: Episode, options: InstructionOptions, arm: str = TOLD) -> TrialWords:
     """Return everything that is said of an arm of an episode; raises like `say_arm`."""
-    stated, told, _ = say_arm(episode, options, arm)
-    is_explicit = (options.setting, arm) == (EXPLICIT, TOLD)
-    explicit = told if is_explicit else instruct_with(stated, replace(options, setting=EXPLICIT))
-    every = get_task(stated.task).goals(stated.scene)
-    goals = {goal_name(goal): with_goal(stated, goal) for goal in every}
-    return TrialWords(stated, told, explicit.text, goal_name(stated.goal), goals)
+    words = say_arm(episode, options, arm)
+    judged = words.episode
+    explicit = words.instruction
+    if options.setting != EXPLICIT or arm != TOLD:
+        explicit = instruct_with(judged, replace(options, setting=EXPLICIT))
+    return TrialWords(
+        judged,
+        words.instruction,
+        command=explicit.text,
+        stated=goal_name(judged.goal),
+        goals=_episodes_by_goal(judged),
+    )
+
+
+def _episodes_by_goal(episode: Episode) -> dict[str, Episode]:
+    """Return an episode with each goal that its scene allows, by the goal's words."""
+    goals = get_task(episode.task).goals(episode.scene)
+    return {goal_name(goal): with_goal(episode, goal) for goal in goals}
 
 
 def _paraphrase(
-    episode: Episode, options: InstructionOptions, told: Instruction, number: int
+    episode: Episode, options: InstructionOptions, usual: Instruction, number: int
 ) -> Instruction:
-    """Return the paraphrase of a number: another text than the told one and those before it."""
-    seen = {told.text}
-    kept = [told.metadata.get(name) for name in _KEPT_NOTES]
+    """Return the paraphrase of a number, from 1: another text than the usual one and those before.
+
+    Words are drawn again until so many different texts with the same reasoning have come up.
+    """
+    seen = {usual.text}
     for variant in range(1, number * _MOST_DRAWS + 1):
         with contextlib.suppress(InvalidValueError):  # a setting may refuse what was drawn
             other = instruct_with(episode, options, variant)
-            if [other.metadata.get(name) for name in _KEPT_NOTES] == kept:
+            if _notes_to_keep(other) == _notes_to_keep(usual):
                 seen.add(other.text)
-            if len(seen) > number:
+            if len(seen) > number:  # the usual text is among them
                 return other
     raise InvalidValueError(
         f"The {options.setting} setting has no paraphrase {number} of episode {episode.key}."
     )
 
 
-def _scramble(episode: Episode, told: Instruction) -> Instruction:
-    """Return the content words in random order, as many in each utterance as before."""
-    skipped = frozenset(FUNCTION_WORDS.split())
-    words = [
-        [word for text in _WORD.findall(one) if (word := text.lower()) not in skipped]
-        for one in told.turns
-    ]
-    every = [word for each in words for word in each]
-    if len(set(every)) < 2:  # noqa: PLR2004
-        raise InvalidValueError(f"The text of {episode.key} has no other order: {told.text!r}.")
-    rng = np.random.default_rng([episode.seed, zlib.crc32(told.text.encode())])
-    order = every
-    while order == every:
-        order = shuffled(rng, every)
-    rest = iter(order)
-    return _with_texts(told, tuple(" ".join(next(rest) for _ in each) for each in words))
+def _notes_to_keep(instruction: Instruction) -> list[object]:
+    """Return the notes in which a paraphrase equals the told text."""
+    return [instruction.metadata.get(name) for name in _KEPT_NOTES]
+
+
+def _silence(instruction: Instruction, text: str) -> Instruction:
+    """Return a text that says nothing about the goal; it leaves all goals of the scene."""
+    meaning = None if instruction.meaning is None else Meaning({})
+    return _with_texts(instruction, (text,), meaning)
+
+
+def _scramble(episode: Episode, instruction: Instruction) -> Instruction:
+    """Return the content words in random order, as many in each utterance as before.
+
+    *Please lift the red cube.* may become *cube red lift*. What that means is not known.
+    """
+    by_turn = [_content_words(turn) for turn in instruction.turns]
+    words = list(itertools.chain.from_iterable(by_turn))
+    if len(set(words)) < 2:  # noqa: PLR2004
+        text = instruction.text
+        raise InvalidValueError(f"The text of {episode.key} has no other order: {text!r}.")
+    rng = np.random.default_rng([episode.seed, zlib.crc32(instruction.text.encode())])
+    order = words
+    while order == words:
+        order = shuffled(rng, words)
+    return _with_texts(instruction, _cut(order, [len(turn_words) for turn_words in by_turn]))
+
+
+def _cut(words: Sequence[str], lengths: Sequence[int]) -> tuple[str, ...]:
+    """Return words as texts of some lengths: ``a b c`` with 1 and 2 becomes ``a`` and ``b c``."""
+    texts: list[str] = []
+    start = 0
+    for length in lengths:
+        end = start + length
+        texts.append(" ".join(words[start:end]))
+        start = end
+    return tuple(texts)
+
+
+def _content_words(text: str) -> list[str]:
+    """Return the words of a text in lower case, without `FUNCTION_WORDS`."""
+    function_words = FUNCTION_WORDS.split()
+    words = [word.lower() for word in _WORD.findall(text)]
+    return [word for word in words if word not in function_words]
 
 
 def _with_texts(
-    told: Instruction, texts: tuple[str, ...], meaning: Meaning | None = None
+    instruction: Instruction, texts: tuple[str, ...], meaning: Meaning | None = None
 ) -> Instruction:
-    """Return an instruction of other texts, which mention nothing; the last is the command."""
-    stages = [utterance.stage for utterance in told.utterances][-len(texts) :]
-    utterances = tuple(map(Utterance, stages, texts))
-    return replace(told, utterances=utterances, mentions=(), meaning=meaning)
+    """Return an instruction of other texts, which mention nothing; the last is the command.
+
+    Fewer texts than there are utterances stand for the last ones.
+    """
+    spoken = instruction.utterances[-len(texts) :]
+    utterances = [
+        Utterance(utterance.stage, text) for utterance, text in zip(spoken, texts, strict=True)
+    ]
+    return replace(instruction, utterances=tuple(utterances), mentions=(), meaning=meaning)

@@ -10,15 +10,9 @@ from roboirg.core.delivery import DELIVERIES
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.field_types import check_whole
-from roboirg.core.instruction_options import (
-    DEFAULT_FRAME,
-    DEFAULT_LANGUAGE,
-    InstructionOptions,
-    WordKeywords,
-    as_fields,
-)
+from roboirg.core.instruction_options import InstructionOptions, WordKeywords, as_fields
 from roboirg.core.word_pools import outside_words
-from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance, hidden_slots
+from roboirg.language.instruction import FORMS, Instruction, Mention, Utterance
 from roboirg.language.landmarks import FRAMES
 from roboirg.language.phrases import speak
 from roboirg.language.request import (
@@ -28,14 +22,11 @@ from roboirg.language.request import (
     InstructionRequest,
     InstructionSpec,
 )
-from roboirg.language.scenarios import in_language_4
 from roboirg.language.scenarios.identity import words_of
-from roboirg.language.scenarios.literals import in_literals
+from roboirg.language.scenarios.spoken import refusal, say
 from roboirg.language.scenarios.wording_store import find_wordings
-from roboirg.language.settings import EXPLICIT, all_settings, get_setting, settings_of
-from roboirg.language.settings.setting import Setting
-from roboirg.language.template_sampler import sampler_of
-from roboirg.language.templates import LANGUAGE_VERSIONS
+from roboirg.language.settings import get_setting, settings_of
+from roboirg.language.word_sampler import LANGUAGE_VERSION, sampler_of
 from roboirg.tasks import get_task
 
 _DEFAULT_METADATA: dict[str, object] = {
@@ -47,7 +38,6 @@ _DEFAULT_METADATA: dict[str, object] = {
     "stages": [],
     "distractor": None,
     "distractors": 0,
-    "recency_rival": None,
     "landmarks": [],
     "landmark_classes": [],
     "frame": None,
@@ -58,7 +48,6 @@ _DEFAULT_METADATA: dict[str, object] = {
     "candidates": {},
     "wordings": None,
     "command": "own",
-    "template_slots": [],
 }
 """The metadata that apply to some settings only."""
 
@@ -94,44 +83,41 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
 
     Each `variant` draws its words anew; 0 is the usual one.
     """
-    setting = _setting_of(episode, options)
     missing = _missing(episode, options)
     if missing is not None:
         raise InvalidValueError(f"The {missing}.")
-    reason = setting.refusal(request_of(episode, options, variant))
+    request = request_of(episode, options, variant)
+    reason = refusal(request)
     if reason is not None:
+        setting = options.setting
         raise InvalidValueError(
-            f"The {setting.name} setting cannot express episode {episode.key} "
-            f"(seed {episode.seed}): {reason}; leave {setting.name} out (--settings), or choose "
+            f"The {setting} setting cannot express episode {episode.key} "
+            f"(seed {episode.seed}): {reason}; leave {setting} out (--settings), or choose "
             "other episodes (--episodes)."
         )
-    request = request_of(episode, options, variant)  # without what the refusal noted in its log
-    return spoken_instruction(request, setting.say(request))
+    return spoken_instruction(request, say(request))
 
 
 def find_refusal(episode: Episode, options: InstructionOptions) -> str | None:
     """Return why a setting of the task cannot express an episode; None if it can."""
-    setting = _setting_of(episode, options)
-    request = request_of(episode, options)
-    return _missing(episode, options) or setting.refusal(request)
+    missing = _missing(episode, options)
+    return missing or refusal(request_of(episode, options))
 
 
-def find_refusals(
-    episode: Episode, *, frame: str = DEFAULT_FRAME, wordings: str | None = None
-) -> Mapping[str, str]:
+def find_refusals(episode: Episode, **options: Unpack[WordKeywords]) -> Mapping[str, str]:
     """Return the settings of the task that cannot express an episode, each with the reason."""
-    reasons = {
-        name: find_refusal(episode, InstructionOptions(name, frame=frame, wordings=wordings))
-        for name in settings_of(get_task(episode.task))
-    }
-    return {name: reason for name, reason in reasons.items() if reason is not None}
+    usual = replace(InstructionOptions(), **as_fields(options))
+    reasons: dict[str, str] = {}
+    for name in settings_of(get_task(episode.task)):
+        reason = find_refusal(episode, replace(usual, setting=name))
+        if reason is not None:
+            reasons[name] = reason
+    return reasons
 
 
-def expressible(
-    episode: Episode, *, frame: str = DEFAULT_FRAME, wordings: str | None = None
-) -> tuple[str, ...]:
+def expressible(episode: Episode, **options: Unpack[WordKeywords]) -> tuple[str, ...]:
     """Return the settings of the task that can express an episode."""
-    refused = find_refusals(episode, frame=frame, wordings=wordings)
+    refused = find_refusals(episode, **options)
     return tuple(name for name in settings_of(get_task(episode.task)) if name not in refused)
 
 
@@ -140,22 +126,9 @@ def request_of(
 ) -> InstructionRequest:
     """Return the request to put an episode into words."""
     check_options(options)
-    task, setting = get_task(episode.task), all_settings()[options.setting]
-    if "language" not in setting.reads:  # its words are the same in each
-        options = replace(options, language=DEFAULT_LANGUAGE)
-    sampler = sampler_of(episode, variant, options.language)
-    return InstructionRequest(episode, task, options, sampler)
-
-
-def _setting_of(episode: Episode, options: InstructionOptions) -> Setting:
-    """Return the setting that speaks the words that are asked for."""
-    setting = get_setting(options.setting, get_task(episode.task))
-    identity = outside_words(options.wordings)
-    if identity is not None and setting.name == EXPLICIT:
-        theirs = find_wordings(identity).tasks.get(episode.task)
-        if theirs is not None and theirs.literals:
-            return in_literals(theirs.literals, f"the wording file {identity}")
-    return setting if options.language == DEFAULT_LANGUAGE else in_language_4(setting)
+    task = get_task(episode.task)
+    get_setting(options.setting, task)  # which the task must have
+    return InstructionRequest(episode, task, options, sampler_of(episode, variant))
 
 
 def _missing(episode: Episode, options: InstructionOptions) -> str | None:
@@ -163,83 +136,62 @@ def _missing(episode: Episode, options: InstructionOptions) -> str | None:
     identity = outside_words(options.wordings)
     if identity is None:
         return None
-    wordings = find_wordings(identity)
-    if episode.task not in wordings.tasks:
-        return f"wording file {identity} has no words of {episode.task}"
-    if wordings.needs_language_4 and options.language == DEFAULT_LANGUAGE:
-        return (
-            f"wording file {identity} has commands or scenarios, which need language 4 (--language "
-            "4, or language: 4 in the plan)"
-        )
-    return None
+    tasks = find_wordings(identity).tasks
+    if episode.task in tasks:
+        return None
+    return (
+        f"wording file {identity} has no words of {episode.task}; name tasks that it has: "
+        f"--tasks {','.join(tasks)}"
+    )
 
 
 def check_options(options: InstructionOptions) -> None:
     """Check all options of an instruction, those that its setting does not read included."""
     if options.stages not in STAGE_SETS:
-        sets = ", ".join(str(one) for one in STAGE_SETS)
+        sets = ", ".join(map(str, STAGE_SETS))
         raise InvalidValueError(f"The stages {options.stages} must be one of {sets}.")
     check_whole("distractors", options.distractors, most=MOST_DISTRACTORS)
-    if options.language not in LANGUAGE_VERSIONS:
-        known_ones = " or ".join(map(str, LANGUAGE_VERSIONS))
-        raise InvalidValueError(f"language is {options.language!r}; it must be {known_ones}.")
-    for kind, name, known in (
-        ("form", options.form, FORMS),
-        ("distractor", options.distractor, DISTRACTORS),
-        ("frame", options.frame, FRAMES),
-        ("delivery", options.delivery, DELIVERIES),
-    ):
-        check_names(kind, [name], known)
+    check_names("form", [options.form], FORMS)
+    check_names("distractor", [options.distractor], DISTRACTORS)
+    check_names("frame", [options.frame], FRAMES)
+    check_names("delivery", [options.delivery], DELIVERIES)
 
 
 def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruction:
     """Return the instruction that has the words of a request."""
-    options = request.options
-    utterances, mentions = _spoken(spec, as_written="command" in spec.notes)
-    notes: dict[str, object] = {"wordings": options.wordings, "pool": request.pool}
-    words = words_of(
-        request.task.name, request.pool, options.language, options.setting, options.wordings
-    )
-    if words:
-        notes["words"] = words
-    found = Instruction(
-        task=request.task.name,
-        episode=request.episode.key,
-        setting=options.setting,
-        form="resolved" if request.resolved else "implicit",
-        utterances=utterances,
-        mentions=mentions,
-        metadata={
-            **_DEFAULT_METADATA,
-            **spec.notes,
-            **notes,
-            "language_version": LANGUAGE_VERSIONS[options.language],
-            "templates": list(request.sampler.log),
-        },
-        meaning=spec.meaning,
-    )
-    hidden = _hidden_slots(request, found)
-    return replace(found, metadata={**found.metadata, "hidden_slots": hidden})
-
-
-def _hidden_slots(request: InstructionRequest, instruction: Instruction) -> int:
-    """Return how many values of the goal the command leaves to its context."""
-    if instruction.meaning is not None:
-        return len(instruction.meaning.terms.keys() - instruction.meaning.settled)
-    if request.resolved:
-        return 0
-    hidden = hidden_slots(instruction, request.episode.goal)
-    return sum(value.slot in hidden for value in request.goal_values)
-
-
-def _spoken(
-    spec: InstructionSpec, *, as_written: bool
-) -> tuple[tuple[Utterance, ...], tuple[Mention, ...]]:
     utterances: list[Utterance] = []
     mentions: list[Mention] = []
     for index, (stage, phrase) in enumerate(spec.utterances):
-        capitalize = stage != "command" or not as_written
-        utterance, found = speak(index, stage, phrase, capitalize=capitalize)
-        utterances.append(utterance)
-        mentions += found
-    return tuple(utterances), tuple(mentions)
+        # Whole sentences of a wording file stay as their author wrote them.
+        is_as_written = stage == "command" and "command" in spec.notes
+        spoken = speak(index, stage, phrase, capitalize=not is_as_written)
+        utterances.append(spoken.utterance)
+        mentions += spoken.mentions
+    return Instruction(
+        task=request.task.name,
+        episode=request.episode.key,
+        setting=request.options.setting,
+        form="resolved" if request.resolved else "implicit",
+        utterances=tuple(utterances),
+        mentions=tuple(mentions),
+        metadata=_metadata(request, spec),
+        meaning=spec.meaning,
+    )
+
+
+def _metadata(request: InstructionRequest, spec: InstructionSpec) -> dict[str, object]:
+    """Return the metadata of an instruction: notes of its setting, and how its words were drawn."""
+    options = request.options
+    words = words_of(request.task.name, request.pool, options.setting, options.wordings)
+    left_open = spec.meaning.terms.keys() - spec.meaning.settled
+    return {
+        **_DEFAULT_METADATA,
+        **spec.notes,
+        "wordings": options.wordings,
+        "pool": request.pool,
+        "words": words,
+        "language_version": LANGUAGE_VERSION,
+        "draws": list(request.sampler.log),
+        # The values of the goal that the command leaves to its context.
+        "hidden_slots": len(left_open),
+    }

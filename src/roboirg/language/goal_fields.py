@@ -13,16 +13,42 @@ def goal_fields(goal: Goal) -> dict[str, str]:
     A color with a count is one field, ``cubes.0``, with a value such as ``"2 red"``.
     """
     slots = goal.as_mapping()
+    found: dict[str, str] = {}
     if "counts" in slots:
-        return {f"cubes.{at}": f"{count} {color}" for at, (color, count) in enumerate(goal.amounts)}
-    return {name: str(value) for slot in slots for name, value in fields_of(goal, slot)}
+        for position, (color, count) in enumerate(goal.amounts):
+            found[f"cubes.{position}"] = f"{count} {color}"
+        return found
+    for slot in slots:
+        for field, value in fields_of(goal, slot):
+            found[field] = str(value)
+    return found
 
 
 def fields_of(goal: Goal, slot: str) -> Iterator[tuple[str, str | int]]:
-    """Yield the value of each field for a slot, with an index if the slot has several."""
-    several = isinstance(goal[slot], tuple)
-    for at, one in enumerate(values_in(goal[slot])):
-        yield f"{slot}.{at}" if several else slot, one
+    """Yield the fields of a slot, each with its value.
+
+    A slot with a single value is its own field: ``color`` gives ``("color", "red")``. A slot with
+    several has a field for each: ``colors`` gives ``("colors.0", "red")`` and ``("colors.1",
+    "blue")``.
+    """
+    content = goal[slot]
+    if not isinstance(content, tuple):
+        yield slot, content
+        return
+    for position, value in enumerate(values_in(content)):
+        yield f"{slot}.{position}", value
+
+
+def unordered(goal: Goal) -> Goal:
+    """Return a goal with its colors and their counts in alphabetical order, which means nothing.
+
+    Goals without counts are returned as they are: the order of their colors has a meaning.
+    """
+    if "counts" not in goal.as_mapping():
+        return goal
+    # Pairs such as ("red", 2) are sorted, then taken apart again.
+    colors, counts = zip(*sorted(goal.amounts), strict=True)
+    return Goal.of(colors=colors, counts=counts)
 
 
 def goal_name(goal: Goal) -> str:

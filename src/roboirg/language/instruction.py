@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple, cast, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 from roboirg.core.episode import Goal
 from roboirg.language.landmarks import Frame
@@ -14,7 +14,7 @@ UtteranceStage = Literal["introduction", "reinforcement", "distractor", "cue", "
 Role = Literal["antecedent", "anaphor"]
 Expression = Literal[
     "it", "them", "one", "former", "latter", "first", "second", "third",
-    "that", "then", "there", "pair", "each", "other", "last", "choice",
+    "that", "then", "there", "pair", "each", "other",
 ]  # fmt: skip
 
 FORMS: tuple[Form, ...] = get_args(Form)
@@ -166,17 +166,20 @@ def command_expressions(mentions: Iterable[Any], last: int) -> tuple[str, ...]:
         mentions: of an instruction, or of its record.
         last: index of the last utterance.
     """
-    found = (one.expression for one in mentions if one.utterance == last)
-    return tuple(dict.fromkeys(one for one in found if one is not None))
+    of_command = [mention.expression for mention in mentions if mention.utterance == last]
+    return tuple(dict.fromkeys(name for name in of_command if name is not None))
 
 
 def hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
-    """Return the slots of the goal that the command leaves to its context."""
+    """Return the slots of the goal that the command does not name, so that the context has to.
+
+    Of *Red is nice. Lift it twice.*, a goal of ``color`` and ``repeats``, that is ``color``.
+    """
+    if instruction.meaning is not None and instruction.meaning.goals:
+        return frozenset()  # a whole sentence
     last = len(instruction.utterances) - 1
-    stated = {
-        mention.slot
-        for mention in instruction.mentions
-        if mention.utterance == last and mention.role == "antecedent"
-    }
-    said = cast("list[str]", instruction.metadata.get("template_slots", []))
-    return frozenset(goal.as_mapping()) - stated - set(said)
+    hidden = set(goal.as_mapping())
+    for mention in instruction.mentions:
+        if mention.utterance == last and mention.role == "antecedent":
+            hidden.discard(mention.slot)
+    return frozenset(hidden)

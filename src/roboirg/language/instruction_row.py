@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 from collections.abc import Mapping
 from typing import Any
@@ -14,6 +13,7 @@ from roboirg.tasks import get_task
 
 ExportRow = dict[str, Any]
 """Plain JSON values by column."""
+_RIVAL = ("rival", "rival_slot", "rival_position", "rival_reference")
 
 
 def row(episode: Episode, instruction: Instruction) -> ExportRow:
@@ -37,60 +37,68 @@ def row(episode: Episode, instruction: Instruction) -> ExportRow:
         "tokens": count_tokens(instruction.text),
         # As text, because each task has its own slots.
         "goal": json.dumps(episode.goal.as_mapping()),
-        "pattern": metadata["pattern"],
-        "patterns": metadata["patterns"],
-        "relation": metadata["relation"],
+        **_copied(metadata, "pattern", "patterns", "relation"),
         "references": _texts(metadata["reference"]),
-        "landmarks": metadata["landmarks"],
-        "landmark_classes": metadata["landmark_classes"],
-        "frame": metadata["frame"],
-        "stages": metadata["stages"],
-        "distractor": metadata["distractor"],
-        "distractors": metadata["distractors"],
+        **_copied(metadata, "landmarks", "landmark_classes", "frame"),
+        **_copied(metadata, "stages", "distractor", "distractors"),
         "touched": ", ".join(metadata["touched"]) or "none",
-        "rival": str(metadata["rival"] or "none"),
-        "rival_slot": metadata["rival_slot"] or "none",
-        "rival_position": metadata["rival_position"] or "none",
-        "rival_reference": metadata["rival_reference"] or "none",
-        "templates": metadata["templates"],
+        **{name: str(metadata[name] or "none") for name in _RIVAL},
+        "draws": metadata["draws"],
         # Never null: readers infer the types of columns.
         "wordings": metadata["wordings"] or "own",
         "pool": metadata["pool"],
-        "command_template": metadata["command"],
+        "whole_sentence": metadata["command"],
         "language_version": metadata["language_version"],
-        "words_version": metadata.get("words", "none"),
+        "words_version": metadata["words"],
     }
 
 
+def _copied(metadata: Mapping[str, Any], *names: str) -> ExportRow:
+    """Return some entries of the metadata."""
+    return {name: metadata[name] for name in names}
+
+
 def _turns(instruction: Instruction) -> list[ExportRow]:
-    """Return the utterances, each with its position in the prompt."""
-    lengths = [len(utterance.text) + 1 for utterance in instruction.utterances]
-    starts = itertools.accumulate(lengths, initial=0)
-    return [
-        {"stage": utterance.stage, "start": start, "text": utterance.text}
-        for utterance, start in zip(instruction.utterances, starts, strict=False)
-    ]
+    """Return a row for each utterance, with the character at which it starts in the prompt.
+
+    *Red is nice.* starts at 0, and *Lift it.* after it at 13.
+    """
+    turns: list[ExportRow] = []
+    start = 0
+    for utterance in instruction.utterances:
+        turns.append({"stage": utterance.stage, "start": start, "text": utterance.text})
+        start += len(utterance.text) + 1  # a space joins two utterances
+    return turns
 
 
 def _mentions(instruction: Instruction) -> list[ExportRow]:
-    """Return the mentions, with their positions in the prompt."""
+    """Return a row for each mention.
+
+    A mention knows its place in its utterance; the row has its place in the whole prompt.
+    """
     starts = [turn["start"] for turn in _turns(instruction)]
-    return [
-        {
-            "turn": mention.utterance,
-            "start": starts[mention.utterance] + mention.start,
-            "end": starts[mention.utterance] + mention.end,
-            "text": instruction.span(mention),
-            "role": mention.role,
-            "expression": mention.expression,
-            "slot": mention.slot,
-            "value": str(mention.value),
-        }
-        for mention in instruction.mentions
-    ]
+    mentions: list[ExportRow] = []
+    for mention in instruction.mentions:
+        turn_start = starts[mention.utterance]
+        mentions.append(
+            {
+                "turn": mention.utterance,
+                "start": turn_start + mention.start,
+                "end": turn_start + mention.end,
+                "text": instruction.span(mention),
+                "role": mention.role,
+                "expression": mention.expression,
+                "slot": mention.slot,
+                "value": str(mention.value),
+            }
+        )
+    return mentions
 
 
 def _texts(value: object) -> list[str]:
+    """Return one value or several as a list of texts, which is empty for None."""
     if value is None:
         return []
-    return [str(one) for one in (value if isinstance(value, list) else [value])]
+    if isinstance(value, list):
+        return [str(item) for item in value]
+    return [str(value)]

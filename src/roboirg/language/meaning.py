@@ -11,7 +11,7 @@ import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from roboirg.core.episode import Episode, Goal, SceneObject
-from roboirg.language.grounded import spoken_clues
+from roboirg.language.clues import event_clues, thing_clues
 from roboirg.language.instruction import Described, Meaning, Term
 from roboirg.language.landmarks import candidates_in, things_of_color
 from roboirg.language.number_words import agreeing_number
@@ -35,10 +35,10 @@ def command_goals(meaning: Meaning, episode: Episode) -> tuple[Goal, ...]:
 
 
 def candidate_goals(meaning: Meaning, episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals left to a guesser who heard which values were listed, not which is meant.
+    """Return the goals left to a guesser who knows which values were listed, not which is meant.
 
-    A field that the command settles has its value, one that is picked from a list has any value
-    of the list, and all others are open.
+    After *red or blue; take the latter*, both colors are left. A field that the command settles has
+    its value, one that is picked from a list has any value of the list, and all others are open.
     """
     possible = _values_of(meaning.settled, meaning, episode)
     for field, term in meaning.terms.items():
@@ -63,29 +63,53 @@ def _goals_with(
     possible: Mapping[str, Values], meaning: Meaning, episode: Episode
 ) -> tuple[Goal, ...]:
     """Return the scene's goals with the fields that were said, each with a possible value."""
-    found: list[Goal] = []
-    # "Put them into the bin" is said of any number of colors.
-    is_any = not meaning.terms or (not possible and "counts.0" in meaning.terms)
-    for goal in goals_of(episode):
-        if meaning.goals and goal not in meaning.goals:
-            continue
-        for values in _in_every_order(goal):
-            own = {value.field: value.value for value in values}
-            if not is_any and own.keys() != meaning.terms.keys():
-                continue  # it asks for two containers, and the words for one
-            fits = all(own[field] in values for field, values in possible.items())
-            if fits and _agrees(own, meaning.agrees):
-                found.append(goal)
-                break
-    return tuple(found)
+    return tuple(goal for goal in goals_of(episode) if _can_be_meant(goal, possible, meaning))
 
 
-def _agrees(own: Mapping[str, Value], agrees: Mapping[str, bool]) -> bool:
-    """Return whether a goal has one or several where the words speak of one or of several."""
-    for slot, is_one in agrees.items():
-        values = [value for field, value in own.items() if slot in (field, field.partition(".")[0])]
+def _can_be_meant(goal: Goal, possible: Mapping[str, Values], meaning: Meaning) -> bool:
+    """Return whether a goal fits what was said.
+
+    Args:
+        goal: of the scene.
+        possible: for some fields, the values that the words allow: ``{"color": {"red"}}``.
+        meaning: of the instruction.
+    """
+    if meaning.goals and goal not in meaning.goals:
+        return False
+    # Without words about the goal, or with "Put them into the bin", any number of colors fits.
+    has_any_fields = not meaning.terms or ("counts.0" in meaning.terms and not possible)
+    for values in _in_every_order(goal):
+        by_field = {value.field: value.value for value in values}
+        if not has_any_fields and by_field.keys() != meaning.terms.keys():
+            continue  # it asks for two containers, and the words for one
+        if _has_values(by_field, possible) and _agrees(by_field, meaning.agrees):
+            return True
+    return False
+
+
+def _has_values(by_field: Mapping[str, Value], possible: Mapping[str, Values]) -> bool:
+    """Return whether a goal has a possible value in each field."""
+    return all(by_field[field] in values for field, values in possible.items())
+
+
+def _agrees(by_field: Mapping[str, Value], agrees: Mapping[str, bool]) -> bool:
+    """Return whether a goal has one or several where the words speak of one or of several.
+
+    *Once for each take* speaks of several, ``{"repeats": False}``, so a goal of one repeat does not
+    fit.
+
+    Args:
+        by_field: the values of the goal.
+        agrees: by slot or field, whether the words are in the singular.
+    """
+    for slot, is_single in agrees.items():
+        values: list[Value] = []
+        for field, value in by_field.items():
+            if slot in (field, field.partition(".")[0]):  # "counts.0" is a field of "counts"
+                values.append(value)
         number = agreeing_number(values)  # 0 if the goal does not have the slot
-        if number and (number == 1) != is_one:
+        goal_is_single = number == 1
+        if number and goal_is_single != is_single:
             return False
     return True
 
@@ -96,15 +120,19 @@ def _in_every_order(goal: Goal) -> Iterator[GoalValues]:
         yield values_of_goal(goal)
         return
     for amounts in itertools.permutations(goal.amounts):
-        colors, counts = zip(*amounts, strict=True)
+        colors, counts = zip(*amounts, strict=True)  # of pairs such as ("red", 2)
         yield values_of_goal(Goal.of(colors=colors, counts=counts))
 
 
 def _term_values(term: Term, field: str, episode: Episode) -> Values:
-    """Return the values that a term gives a field; empty if it picks no operand."""
+    """Return the values that a term, which says how a value follows, gives a field.
+
+    The term ``double`` of 2 gives ``{4}``, ``rank`` 1 of red and blue ``{"red"}``. Empty if it
+    picks no operand.
+    """
     if term.operation == "without":
         return _values_without(term.operands, field, episode)
-    operand = _picked_operand(term)
+    operand = picked_operand(term)
     if operand is None:
         return frozenset()
     if isinstance(operand, int) and term.operation in ("double", "half", "step"):
@@ -112,13 +140,16 @@ def _term_values(term: Term, field: str, episode: Episode) -> Values:
     return _operand_values(operand, field, episode)
 
 
-def _picked_operand(term: Term) -> Operand | None:
-    """Return the only operand that a term picks; None if it picks none or several."""
-    picked = [
-        operand
-        for position, operand in enumerate(term.operands, start=1)
-        if _is_picked(position, term)
-    ]
+def picked_operand(term: Term) -> Operand | None:
+    """Return the only operand that a term picks; None if it picks none or several.
+
+    Of the operands red and blue, ``rank`` 1 picks red, ``other`` than rank 1 picks blue, and
+    ``same`` picks both, so None.
+    """
+    picked: list[Operand] = []
+    for position, operand in enumerate(term.operands, start=1):
+        if _is_picked(position, term):
+            picked.append(operand)
     return picked[0] if len(picked) == 1 else None
 
 
@@ -141,24 +172,39 @@ def _reckoned(term: Term, number: int) -> int:
 
 
 def _values_without(operands: Sequence[Operand], field: str, episode: Episode) -> Values:
-    """Return the values of a field that are left when some values, or things, are set aside."""
+    """Return the values of a field that are left when some values, or things, are set aside.
+
+    In a scene of red, blue and green cubes, *neither red nor blue* leaves ``{"green"}``.
+    """
     described = [operand for operand in operands if isinstance(operand, Described)]
     if described:
         return _values_of_last_thing(described, field, episode)
     if field == "counts.0":  # all cubes but three
-        things = candidates_in(episode.scene, get_task(episode.task).commands.pointed)
-        return frozenset(len(things) - int(str(kept)) for kept in operands)
+        number = len(_things_to_point_at(episode))
+        return frozenset(number - int(str(kept)) for kept in operands)  # what is not kept
     return _possible_values(field, episode).difference(operands)
 
 
 def _values_of_last_thing(aside: Sequence[Described], field: str, episode: Episode) -> Values:
-    """Return the values of the only thing that none of some descriptions fits; empty if unclear."""
-    set_aside = [_described_thing(description, episode) for description in aside]
-    if None in set_aside:
+    """Return the values of the only thing that is left when the described things are set aside.
+
+    Empty if a description fits nothing, or if several things or none are left.
+    """
+    remaining = list(_things_to_point_at(episode))
+    for description in aside:
+        thing = _described_thing(description, episode)
+        if thing is None:
+            return frozenset()
+        if thing in remaining:
+            remaining.remove(thing)
+    if len(remaining) != 1:
         return frozenset()
-    things = candidates_in(episode.scene, get_task(episode.task).commands.pointed)
-    left = [thing for thing in things if thing not in set_aside]
-    return _values_of_thing(left[0], field, episode) if len(left) == 1 else frozenset()
+    return _values_of_thing(remaining[0], field, episode)
+
+
+def _things_to_point_at(episode: Episode) -> Sequence[SceneObject]:
+    """Return the things of the scene among which words point."""
+    return candidates_in(episode.scene, get_task(episode.task).things.pointed)
 
 
 def _listed_values(term: Term, field: str, episode: Episode) -> Values:
@@ -170,20 +216,35 @@ def _listed_values(term: Term, field: str, episode: Episode) -> Values:
 
 
 def _operand_values(operand: Operand, field: str, episode: Episode) -> Values:
-    """Return the values of a field for which an operand stands."""
+    """Return the values of a field for which an operand stands.
+
+    A value stands for itself. A description stands for what it leads to in the scene or the video:
+    the cube *on the left* for its color.
+    """
     if not isinstance(operand, Described):
         return frozenset([operand])
+    if episode.scene.past and operand.kind == "clue":
+        return _values_of_event(operand, field, episode)
     thing = _described_thing(operand, episode)
     return frozenset() if thing is None else _values_of_thing(thing, field, episode)
+
+
+def _values_of_event(described: Described, field: str, episode: Episode) -> Values:
+    """Return the value of a field to which something in the video leads."""
+    found: set[Value] = set()
+    for event in event_clues(episode.scene):
+        if event.clue.words == described.phrase and event.slot == field:
+            found.add(event.value)
+    return frozenset(found)
 
 
 def _described_thing(described: Described, episode: Episode) -> SceneObject | None:
     """Return the only thing in the scene that fits a description; None if there is no such one."""
     task = get_task(episode.task)
     if described.kind == "place":
-        known = things_at(episode.scene, task.commands.pointed, described.frame)
+        known = things_at(episode.scene, task.things.pointed, described.frame)
         return known.get(described.phrase)
-    for found in spoken_clues(episode.scene, task):
+    for found in thing_clues(episode.scene, task):
         if found.clue.words == described.phrase:
             return found.thing
     return None
@@ -191,7 +252,7 @@ def _described_thing(described: Described, episode: Episode) -> SceneObject | No
 
 def _values_of_thing(thing: SceneObject, field: str, episode: Episode) -> Values:
     """Return the colors by which a goal can ask for a thing: of a container, those under it."""
-    kind_of_thing = get_task(episode.task).commands.pointed
+    kind_of_thing = get_task(episode.task).things.pointed
     found: set[Value] = set()
     for color in _possible_values(field, episode):
         if thing in things_of_color(episode.scene, kind_of_thing, str(color)):

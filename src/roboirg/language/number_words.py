@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from roboirg.core.goal_slots import MOMENTS
+
 CARDINALS = (
     "zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten",
 )  # fmt: skip
@@ -15,10 +17,19 @@ ADVERBS = {1: "once", 2: "twice"}
 
 
 def agreeing_number(values: Sequence[str | int]) -> int:
-    """Return the number with which words agree: the only value, or how many there are."""
-    if len(values) == 1 and isinstance(values[0], int):
-        return values[0]
-    return len(values)
+    """Return the number with which words agree: the only number, or else how many values there are.
+
+    ``[3]`` gives 3, ``["red"]`` 1 and ``["red", "blue"]`` 2. Moments choose between two wordings as
+    well: the first one gives 1, the second one 2.
+    """
+    if len(values) != 1:
+        return len(values)
+    (value,) = values
+    if isinstance(value, int):
+        return value
+    if value in MOMENTS:
+        return MOMENTS.index(value) + 1
+    return 1
 
 
 def plural(noun: str) -> str:

@@ -1,17 +1,12 @@
-"""Fill templates with phrases, and keep the exact spans of mentions.
-
-A template is a sentence with fields and alternatives: ``{cube}`` takes a phrase, and
-``[was|were]`` takes its first form in the singular and its second in the plural.
-"""
+"""Words with the mentions in them, whose exact spans are kept."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from roboirg.language.instruction import (
-    REFERENCE,
     Expression,
     Mention,
     Role,
@@ -19,11 +14,12 @@ from roboirg.language.instruction import (
     UtteranceStage,
 )
 
-_MARK = re.compile(r"\{(?P<field>[a-z_.0-9]+)\}|\[(?P<one>[^\[\]|]*)\|(?P<many>[^\[\]|]*)\]")
+_FIELD = re.compile(r"\{(?P<name>[a-z_.0-9]+)\}")
 
 _PARTICLE = re.compile(
     r"(?<=\b(?:pick|lift|take|hold) )up $|(?<=\b(?:put|set|lay) )down $", re.IGNORECASE
 )
+"""*up* or *down* after its verb, at the end of words: *Please pick up*."""
 _PRONOUNS = ("it", "them")
 
 
@@ -51,47 +47,28 @@ def plain(text: str) -> Phrase:
     return (TaggedText(text),)
 
 
-class Mentionable(Protocol):
-    """What a mention stands for: a value of a slot."""
-
-    @property
-    def slot(self) -> str:
-        """The name of the slot."""
-
-    @property
-    def value(self) -> str | int:
-        """The value."""
+def antecedent(text: str, slot: str, value: str | int) -> Phrase:
+    """Return words that introduce a value of a slot."""
+    return (TaggedText(text, Tag("antecedent", None, slot, value)),)
 
 
-class MentionedValue(NamedTuple):
-    """A value that only leads to the goal, such as a number to count from, or several of a slot."""
-
-    value: str | int
-    slot: str = REFERENCE
+def anaphor(text: str, expression: Expression, slot: str, value: str | int) -> Phrase:
+    """Return words that point back at a value of a slot."""
+    return (TaggedText(text, Tag("anaphor", expression, slot, value)),)
 
 
-def antecedent(text: str, referent: Mentionable) -> Phrase:
-    """Return words that introduce a value."""
-    return (TaggedText(text, Tag("antecedent", None, referent.slot, referent.value)),)
+def fill(template: str, fields: Mapping[str, Phrase]) -> Phrase:
+    """Fill the fields of a sentence with phrases.
 
-
-def anaphor(text: str, expression: Expression, referent: Mentionable) -> Phrase:
-    """Return words that point back at a value."""
-    return (TaggedText(text, Tag("anaphor", expression, referent.slot, referent.value)),)
-
-
-def fill(template: str, fields: Mapping[str, Phrase], *, plural: bool = False) -> Phrase:
-    """Fill the fields of a template, and choose singular or plural alternatives."""
+    ``"Lift the {color} cube."`` with *red* for ``color`` becomes the pieces *Lift the*, *red* and
+    *cube.*; *red* keeps its tag.
+    """
     pieces: list[TaggedText] = []
     end = 0
-    for mark in _MARK.finditer(template):
-        pieces.append(TaggedText(template[end : mark.start()]))
-        name = mark["field"]
-        if name is not None:
-            pieces.extend(fields[name])
-        else:
-            pieces.append(TaggedText(mark["many"] if plural else mark["one"]))
-        end = mark.end()
+    for field in _FIELD.finditer(template):
+        pieces.append(TaggedText(template[end : field.start()]))
+        pieces.extend(fields[field["name"]])
+        end = field.end()
     pieces.append(TaggedText(template[end:]))
     return tuple(piece for piece in pieces if piece.text)
 
@@ -99,34 +76,42 @@ def fill(template: str, fields: Mapping[str, Phrase], *, plural: bool = False) -
 def swap_particles(phrase: Phrase) -> Phrase:
     """Move a pronoun between a verb and its particle: ``pick up it`` becomes ``pick it up``."""
     pieces = list(phrase)
-    for at in range(len(pieces) - 1, 0, -1):
-        before, pronoun = pieces[at - 1 : at + 1]
-        found = _PARTICLE.search(before.text)
-        if found and before.tag is None and pronoun.tag and pronoun.text in _PRONOUNS:
-            verb = TaggedText(before.text[: found.start()])
-            pieces[at - 1 : at + 1] = [verb, pronoun, TaggedText(f" {found[0].strip()}")]
+    # From the end, so that a change moves no piece that is still to be looked at.
+    for position in range(len(pieces) - 1, 0, -1):
+        before = pieces[position - 1]
+        pronoun = pieces[position]
+        if before.tag is not None or pronoun.tag is None or pronoun.text not in _PRONOUNS:
+            continue
+        particle = _PARTICLE.search(before.text)
+        if particle is not None:
+            verb = TaggedText(before.text[: particle.start()])
+            after = TaggedText(f" {particle[0].strip()}")
+            pieces[position - 1 : position + 1] = [verb, pronoun, after]
     return tuple(pieces)
 
 
 def listed(phrases: Sequence[Phrase], joint: str = "and") -> Phrase:
-    """Join phrases into a list: ``a``, ``a and b``, ``a, b and c``; *nor* joins all of them."""
+    """Join phrases into a list: *a*, *a and b*, *a, b and c*.
+
+    `joint` is the word before the last phrase; *nor* stands before each: *a nor b nor c*.
+    """
     pieces: list[TaggedText] = []
+    last = len(phrases) - 1
     for position, phrase in enumerate(phrases):
-        if position:
-            last = position == len(phrases) - 1
-            pieces.append(TaggedText(f" {joint} " if last or joint == "nor" else ", "))
+        separator = ", "
+        if position == last or joint == "nor":
+            separator = f" {joint} "
+        if position > 0:
+            pieces.append(TaggedText(separator))
         pieces.extend(phrase)
     return tuple(pieces)
 
 
-def sentences(phrases: Iterable[Phrase]) -> Phrase:
-    """Join complete sentences with spaces."""
-    pieces: list[TaggedText] = []
-    for phrase in phrases:
-        if pieces:
-            pieces.append(TaggedText(" "))
-        pieces.extend(phrase)
-    return tuple(pieces)
+class Spoken(NamedTuple):
+    """An utterance, and the mentions in it."""
+
+    utterance: Utterance
+    mentions: tuple[Mention, ...]
 
 
 def words_of(phrase: Phrase) -> str:
@@ -134,10 +119,12 @@ def words_of(phrase: Phrase) -> str:
     return "".join(piece.text for piece in phrase)
 
 
-def speak(
-    index: int, stage: UtteranceStage, phrase: Phrase, *, capitalize: bool = True
-) -> tuple[Utterance, tuple[Mention, ...]]:
-    """Turn a phrase into the utterance of number `index`, and its tags into mentions."""
+def speak(index: int, stage: UtteranceStage, phrase: Phrase, *, capitalize: bool = True) -> Spoken:
+    """Turn a phrase into an utterance, and each of its tags into a mention with its place there.
+
+    `index` is the number of the utterance in the instruction. Of *Lift it*, in which *it* has a
+    tag, the mention starts at character 5 and ends at 7.
+    """
     mentions: list[Mention] = []
     start = 0
     for piece in phrase:
@@ -146,9 +133,11 @@ def speak(
             mentions.append(Mention(index, start, end, *piece.tag))
         start = end
     text = words_of(phrase)
-    return Utterance(stage, _capitalized(text) if capitalize else text), tuple(mentions)
+    if capitalize:
+        text = _capitalized(text)
+    return Spoken(Utterance(stage, text), tuple(mentions))
 
 
 def _capitalized(text: str) -> str:
     """Capitalize every sentence, without adding or removing characters."""
-    return re.sub(r"(^|[.!?] )([a-z])", lambda found: found[1] + found[2].upper(), text)
+    return re.sub(r"(?:^|[.!?] )[a-z]", lambda begin: begin[0].upper(), text)

@@ -1,10 +1,11 @@
-"""Places as people say them: language 4's words for where a thing stands.
+"""Places as people say them: words for where a thing stands.
 
 A place has two wordings. *All the way on the right* follows a noun and singles out one of several
 things; *on the far right* says where something is or happens, and needs a truth of its own: the
 thing stands clearly there, and no other one does. Left and right are those of a frame, as in
 `landmarks`, and its margins hold: if one thing moves by less, no phrase goes over to another thing
-(by half of it, if others are named as near to the one that moves).
+(by half of it, if others are named as near to the one that moves). Where people mean one of two
+measures, such as depth and distance, words are said only if they are true by both.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from enum import IntEnum
 from functools import lru_cache
 from typing import NamedTuple
 
-from roboirg.core.episode import ObjectKind, Scene, SceneObject
+from roboirg.core.episode import ROBOT_BASE, ObjectKind, Scene, SceneObject
 from roboirg.core.motions import Point
 from roboirg.core.object_sizes import BESIDE
 from roboirg.language.landmarks import (
@@ -25,8 +26,10 @@ from roboirg.language.landmarks import (
     PAIRED,
     Frame,
     Ranking,
+    agreed,
     alone_in_color,
     candidates_in,
+    corner_rankings,
     directions,
     fixtures_in,
     nearness,
@@ -48,22 +51,18 @@ class PlaceClass(IntEnum):
     """The only one on that side: *to the left of the button*."""
     BETWEEN = 4
     """*between the button and the target*"""
-    COLOR = 5
-    """*nearest to the red cube*, *next to the red cube*"""
-    RANK = 6
+    RANK = 5
     """*second from the left*"""
-    MIDDLE = 7
+    MIDDLE = 6
     """*in the middle*"""
-    CORNER = 8
-    """The only one in that quarter: *at the back left*, *in the front right corner*."""
-    NEIGHBOR = 9
-    """*nearest to the one all the way on the right*"""
+    CORNER = 7
+    """The only one in and around that quarter: *at the back left*, *in the front right corner*."""
+    NEAR_CORNER = 8
+    """*nearest to the back left corner*, for one that is not said to be there."""
+    COLOR = 9
+    """*nearest to the red cube*, *next to the red cube*; *it* may then mean that one."""
     UNUSUAL = 10
-    """What no one says: landmarks of language 3, *second nearest to the cube closest to you*."""
-
-
-USUAL = PlaceClass.CORNER
-"""The last class that people say without need; others only where there is none of these."""
+    """What no one says, *third closest to you*, and `landmarks`; where there is nothing else."""
 
 
 class SpokenPlace(NamedTuple):
@@ -83,7 +82,7 @@ class SpokenPlace(NamedTuple):
     attributive: str | None
     spot: str | None = None
 
-    def said(self, form: str | None) -> str:
+    def said(self, form: str | None = None) -> str:
         """Return the words of the form ``spot``, or those after a noun; empty if there are none."""
         words = self.spot if form == "spot" else self.attributive
         return words or ""
@@ -91,51 +90,58 @@ class SpokenPlace(NamedTuple):
 
 # Cached: all forms of an episode ask for the same.
 @lru_cache(maxsize=64)
-def spoken_places(scene: Scene, thing: ObjectKind, frame: Frame) -> tuple[SpokenPlace, ...]:
+def spoken_places(scene: Scene, kind: ObjectKind, frame: Frame) -> tuple[SpokenPlace, ...]:
     """Return all places of the things of a kind, from the best class to the last.
 
     Things are where the scene has them, at the start; what moves later is named by where it
     started. Cubes that arrive later are no things yet.
     """
-    things = candidates_in(scene, thing)
+    things = candidates_in(scene, kind)
     places: list[SpokenPlace] = []
-    if things and thing not in PAIRED:
-        places += _usual_places(scene, things, frame)
-    for selector in selectors(scene, thing, frame):
-        places += _said(PlaceClass.UNUSUAL, selector.select(), selector.landmark.phrase)
+    if things and kind not in PAIRED:
+        places += _places_of(scene, things, frame)
+    places += _landmarks(scene, kind, frame)
     if len(things) == 1:
         places = [place._replace(attributive=None) for place in places if place.spot]
     return tuple(sorted(places, key=lambda place: place.kind))
 
 
-def _usual_places(scene: Scene, things: Things, frame: Frame) -> list[SpokenPlace]:
-    """Return the places that people say, and the neighbors of what has one of the simplest."""
-    places = list(_in_directions(things, frame))
+def _landmarks(scene: Scene, kind: ObjectKind, frame: Frame) -> Iterator[SpokenPlace]:
+    """Yield what landmarks single out, as unusual places; of a pair, the sides are spots, too."""
+    is_paired = kind in PAIRED
+    for selector in selectors(scene, kind, frame):
+        landmark = selector.landmark
+        if landmark.is_in_depth:
+            continue  # it may be wrong by distance
+        spot = landmark.phrase if is_paired else None
+        yield from _said(PlaceClass.UNUSUAL, selector.select(), landmark.phrase, spot)
+
+
+def _places_of(scene: Scene, things: Things, frame: Frame) -> Iterator[SpokenPlace]:
+    """Yield the places of things, in any order."""
+    yield from _in_directions(things, frame)
     if frame == "robot":
-        places += _corners(things)
-        places += _on_sides(things, scene)
-    anchors = list(_anchors(things, scene))
-    for place in places:
-        if place.attributive and place.kind in (PlaceClass.EXTREME, PlaceClass.CORNER):
-            name = f"the one {place.attributive}"
-            anchors.append(_Anchor(PlaceClass.NEIGHBOR, name, place.thing))
-    for anchor in anchors:
-        places += _near_anchor(anchor, things)
-    places += _between(things, scene)
-    places += _in_middle(things)
-    return places
+        yield from _corners(things)
+        yield from _on_sides(things, scene)
+    yield from _near_others(things, scene)
+    yield from _between(things, scene)
+    yield from _in_middle(things)
 
 
 @lru_cache(maxsize=64)
 def things_at(
-    scene: Scene, thing: ObjectKind, frame: Frame
+    scene: Scene, kind: ObjectKind, frame: Frame
 ) -> Mapping[str | None, SceneObject | None]:
-    """Return what each phrase for a place singles out, in either language; None if unclear."""
+    """Return the thing that each phrase for a place singles out; None if that is unclear.
+
+    ``{"on the left": <a cube>, "in the middle": <another>}``
+    """
     found: dict[str | None, SceneObject | None] = {}
-    for selector in selectors(scene, thing, frame):
+    for selector in selectors(scene, kind, frame):
         found[selector.landmark.phrase] = selector.select()
-    for place in spoken_places(scene, thing, frame):
-        found |= {place.attributive: place.thing, place.spot: place.thing}
+    for place in spoken_places(scene, kind, frame):
+        found[place.attributive] = place.thing
+        found[place.spot] = place.thing
     return found
 
 
@@ -148,21 +154,33 @@ def _said(
 
 
 def _only(things: Things, ranking: Ranking, start: float) -> SceneObject | None:
-    """Return the only thing whose quantity is at least `start`.
+    """Return the only thing whose quantity is at least `start`; None if there are none or several.
 
-    None unless those of all others are less by the margin.
+    None also if another thing comes closer to `start` than the margin. With distances past the
+    center as the quantity and 0.06 as `start`: the only thing that is clearly on the left.
     """
-    region = ranking._replace(quantity=lambda thing: min(ranking.quantity(thing), start))
-    thing = region.select(things, 0)
-    return thing if thing and ranking.quantity(thing) >= start else None
+    # Things beyond the start count as equal, so that two of them are no clear first one.
+    capped = ranking._replace(quantity=lambda thing: min(ranking.quantity(thing), start))
+    thing = capped.select(things, 0)
+    if thing is None or ranking.quantity(thing) < start:
+        return None
+    return thing
 
 
 _CENTER = SceneObject("center", "site", Point(-0.05, 0.0, 0.0))
-"""Of the work area."""
+"""The center of the work area."""
 _CLEARLY = 2
 """Margins from the center from which a thing is clearly in a direction."""
 _AROUND = 0.09
 """Meters from the center up to which a thing is in the middle."""
+_IN_QUARTER = 0.06
+"""Meters in both directions from the center from which a thing is at the back left, and so on."""
+_IN_CORNER = 0.1
+"""The same from which it is in the back left corner."""
+_FAR = 3
+"""Margins from the center from which a thing is on the far side."""
+_FAR_ALONE = 5
+"""The same for the only thing there is."""
 _DETOUR = 0.03
 """Meters that the way from one thing to another is longer over a third one between them."""
 
@@ -175,15 +193,28 @@ def _center_of(things: Things) -> SceneObject:
     return replace(_CENTER, position=Point((min(depths) + max(depths)) / 2, 0.0, 0.0))
 
 
+def _past(center: SceneObject, ranking: Ranking) -> Ranking:
+    """Return the order of things by how far they are past a center."""
+    start = ranking.quantity(center)
+    return ranking._replace(quantity=lambda thing: ranking.quantity(thing) - start)
+
+
+def _is_past_work_center(thing: SceneObject | None, *rankings: Ranking) -> bool:
+    """Return whether a thing is past the center of the work area in all of some directions."""
+    if thing is None:
+        return False
+    return all(ranking.quantity(thing) >= ranking.quantity(_CENTER) for ranking in rankings)
+
+
 class _Words(NamedTuple):
-    """Words of a direction; None where no one says any.
+    """Words of a direction, here to the left; None where no one says any.
 
     Attributes:
-        most: for the first in that direction.
-        far: where that one is ahead of all others.
-        alone: for the only one clearly in that direction.
-        spot: where that one is.
-        row: after *second*.
+        most: for the first in that direction, *all the way on the left*.
+        far: where that one is ahead of all others, *on the far left*.
+        alone: for the only one clearly in that direction, *on the left*.
+        spot: where that one is, *on the left*.
+        row: after *second*, *from the left*.
     """
 
     most: str
@@ -193,18 +224,21 @@ class _Words(NamedTuple):
     row: str | None = None
 
 
+_FRONT = "all the way in the front"
+_BACK = "all the way in the back"
+
+
 def _sided(side: str) -> _Words:
     """Return the words for left or right."""
     there = f"on the {side}"
     return _Words(f"all the way {there}", f"on the far {side}", there, there, f"from the {side}")
 
 
-_FRONT, _BACK = "all the way in the front", "all the way in the back"
 _WORDS: Mapping[Frame, tuple[_Words, ...]] = {
     "robot": (
         _sided("left"),
         _sided("right"),
-        _Words("closest to you", _FRONT, "in the front", "close to you", "closest to you"),
+        _Words("closest to you", _FRONT, "in the front", "in the front", "closest to you"),
         _Words(_BACK, _BACK, "in the back", "in the back"),
     ),
     "camera": (
@@ -218,56 +252,101 @@ _WORDS: Mapping[Frame, tuple[_Words, ...]] = {
 
 
 def _in_directions(things: Things, frame: Frame) -> Iterator[SpokenPlace]:
-    """Yield the first in each direction, the only one there, and those in a row."""
-    center = _center_of(things)
-    for words, direction in zip(_WORDS[frame], directions(frame), strict=True):
-        ranking = direction.ranking
-        clearly = _CLEARLY * ranking.margin
-        start = ranking.quantity(center) + clearly
-        ahead = ranking._replace(margin=clearly).select(things, 0)
-        is_far = ahead is not None and ranking.quantity(ahead) - start >= ranking.margin
-        far = words.far if is_far else None
-        yield from _said(PlaceClass.EXTREME, ranking.select(things, 0), words.most, far)
-        alone = _only(things, ranking, start)
+    """Yield the places in each direction: left, right, near and far."""
+    left, right, near, far = _WORDS[frame]
+    to_left, to_right, in_front, behind = directions(frame)
+    yield from _in_direction(things, left, to_left.ranking)
+    yield from _in_direction(things, right, to_right.ranking)
+    closeness = nearness(ROBOT_BASE)
+    yield from _in_depth(things, near, in_front.ranking, closeness)
+    yield from _in_depth(things, far, behind.ranking, closeness.opposite)
+
+
+def _in_depth(
+    things: Things, words: _Words, by_depth: Ranking, by_distance: Ranking
+) -> Iterator[SpokenPlace]:
+    """Yield the places that are right in depth and by distance from the robot.
+
+    What stands aside is farther away than it is deep, and people may mean either.
+    """
+    right_by_distance = set(_in_direction(things, words, by_distance))
+    for place in _in_direction(things, words, by_depth):
+        if place in right_by_distance:
+            yield place
+
+
+def _in_direction(things: Things, words: _Words, ranking: Ranking) -> Iterator[SpokenPlace]:
+    """Yield the places in one direction, here the left.
+
+    They are the first one, *all the way on the left*; one that is far ahead, *on the far left*; the
+    only one there, *on the left*; and those after the first, *second from the left*.
+    """
+    yield from _said(PlaceClass.EXTREME, ranking.select(things, 0), words.most)
+
+    # The first one is "on the far left" if it is well ahead of all others, and far from the center.
+    clear = ranking._replace(margin=_CLEARLY * ranking.margin)
+    past_center = _past(_center_of(things), ranking)
+    ahead = clear.select(things, 0)
+    margins = _FAR if len(things) > 1 else _FAR_ALONE
+    if ahead is not None and past_center.quantity(ahead) >= ranking.margin * margins:
+        yield from _said(PlaceClass.EXTREME, ahead, None, words.far)
+
+    # The only one past the center is simply "on the left".
+    alone = _only(things, past_center, clear.margin)
+    if _is_past_work_center(alone, ranking):
         yield from _said(PlaceClass.EXTREME, alone, words.alone, words.spot)
-        for rank, ordinal in ORDINALS.items():
-            # The last one in a row is the first from the other end. No one says "third closest".
-            is_said = rank == 1 or words.row != words.most
-            if words.row and is_said and rank < len(things) - 1:
-                thing = ranking.select(things, rank)
-                yield from _said(PlaceClass.RANK, thing, f"{ordinal} {words.row}")
+
+    if words.row is not None:
+        yield from _in_row(things, words, ranking)
 
 
-class _Anchor(NamedTuple):
-    """What is near something: a fixture, the only cube of a color, a thing with a place."""
+def _in_row(things: Things, words: _Words, ranking: Ranking) -> Iterator[SpokenPlace]:
+    """Yield those after the first in a direction: *second from the left*.
 
-    kind: PlaceClass
-    name: str
-    thing: SceneObject
+    The last one gets no such words, since it is the first from the other end.
+    """
+    for rank, ordinal in ORDINALS.items():
+        if rank >= len(things) - 1:
+            return  # the last one in a row is the first from the other end
+        kind = PlaceClass.RANK
+        if rank > 1 and words.row == words.most:
+            kind = PlaceClass.UNUSUAL  # no one says "third closest"
+        yield from _said(kind, ranking.select(things, rank), f"{ordinal} {words.row}")
 
 
-def _anchors(things: Things, scene: Scene) -> Iterator[_Anchor]:
+def _near_others(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
+    """Yield what is near a fixture or the only cube of a color, or farthest from a fixture."""
     for fixture in fixtures_in(scene):
-        yield _Anchor(PlaceClass.FIXTURE, f"the {fixture.kind}", fixture)
-    for thing in alone_in_color(things):
-        yield _Anchor(PlaceClass.COLOR, f"the {thing.color} cube", thing)
+        name = f"the {fixture.kind}"
+        yield from _near(fixture, name, things, PlaceClass.FIXTURE)
+        farness = nearness(fixture.position).opposite
+        yield from _said(PlaceClass.FIXTURE, farness.select(things, 0), f"farthest from {name}")
+    for cube in alone_in_color(things):
+        others = [thing for thing in things if thing is not cube]
+        if len(others) > 1:  # else only one thing could be meant
+            yield from _near(cube, f"the {cube.color} cube", others, PlaceClass.COLOR)
 
 
-def _near_anchor(anchor: _Anchor, things: Things) -> Iterator[SpokenPlace]:
-    """Yield what is nearest to an anchor, right next to it, or farthest from it."""
-    kind, name = anchor.kind, anchor.name
-    others = [thing for thing in things if thing is not anchor.thing]
-    if kind > PlaceClass.FIXTURE and len(others) <= 1:
-        return  # only one thing could be meant
-    near = nearness(anchor.thing.position)
-    yield from _said(kind, near.select(others, 0), f"nearest to {name}")
-    reach = anchor.thing.half_width + things[0].half_width + BESIDE
-    beside = _only(others, near, -reach)
+def _near(
+    anchor: SceneObject, name: str, things: Things, kind: PlaceClass
+) -> Iterator[SpokenPlace]:
+    """Yield what is nearest to an anchor, a fixture or a cube, and what is right next to it.
+
+    Args:
+        anchor: near which things are looked for.
+        name: words for it, *the button*.
+        things: that may be near it.
+        kind: class of the places.
+    """
+    by_nearness = nearness(anchor.position)
+    yield from _said(kind, by_nearness.select(things, 0), f"nearest to {name}")
+
+    reach = anchor.half_width + things[0].half_width + BESIDE
+    neighbor = _only(things, by_nearness, -reach)  # the quantity is the distance with a minus sign
+    spot = None
     if kind == PlaceClass.FIXTURE:
-        yield from _said(kind, beside, f"next to {name}", f"right by {name}")
-        yield from _said(kind, near.opposite.select(others, 0), f"farthest from {name}")
-    if kind == PlaceClass.COLOR:
-        yield from _said(kind, beside, f"next to {name}")
+        spot = f"right by {name}"
+    yield from _said(kind, neighbor, f"next to {name}", spot)
 
 
 def _between(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
@@ -287,58 +366,116 @@ def _way_between(first: SceneObject, second: SceneObject) -> Ranking:
 
 
 def _in_middle(things: Things) -> Iterator[SpokenPlace]:
-    """Yield the only thing around the center; of an odd row, only if it is its middle, too."""
-    words = "in the middle"
-    near = nearness(_center_of(things).position)
-    around = _only(things, near, -_AROUND)
-    if len(things) % 2 == 0:
-        yield from _said(PlaceClass.MIDDLE, around, words, words)
+    """Yield the thing that is nearest to the center, if it can be called *in the middle*.
+
+    It has to be the nearest to the center of the work area and to that of the things, since people
+    may mean either. Of an even number of things, it must be the only one around the center; of an
+    odd number, it must be the middle one from left to right.
+    """
+    in_area = nearness(_CENTER.position)
+    among_things = nearness(_center_of(things).position)
+    nearest = agreed([in_area.select(things, 0), among_things.select(things, 0)])
+    if nearest is None:
         return
-    row = directions("robot")[0].ranking
-    middle = row.select(things, len(things) // 2)
-    if middle is around:
-        yield from _said(PlaceClass.MIDDLE, middle, words, words)
-    elif middle is near.select(things, 0):
-        yield from _said(PlaceClass.MIDDLE, middle, words)
+    words = "in the middle"
+    is_around = nearest is _only(things, among_things, -_AROUND)
+    spot = words if is_around else None
+    is_meant = is_around
+    if len(things) % 2 == 1:
+        from_left = directions("robot")[0].ranking
+        is_meant = nearest is from_left.select(things, len(things) // 2)
+    if is_meant:
+        yield SpokenPlace(PlaceClass.MIDDLE, nearest, words, spot)
+
+
+class _Corner(NamedTuple):
+    """A corner in front of the robot.
+
+    Attributes:
+        depth: ``near`` or ``far``.
+        side: ``left`` or ``right``.
+        name: as people say, *back left*.
+        along: the order of things toward its depth.
+        across: the order of things toward its side.
+    """
+
+    depth: str
+    side: str
+    name: str
+    along: Ranking
+    across: Ranking
+
+    def nearest(self, things: Things) -> SceneObject | None:
+        """Return the thing that is clearly the nearest to the corner; None if there is none."""
+        found: list[SceneObject | None] = []
+        for ranking in corner_rankings(self.depth, self.side):
+            clear = ranking._replace(margin=_CLEARLY * MARGIN)
+            found.append(clear.select(things, 0))
+        return agreed(found)
+
+    def quarter(self, center: SceneObject) -> Ranking:
+        """Return the order of things by how far they are in the corner's quarter of the table."""
+        return _both(_past(center, self.along), _past(center, self.across))
 
 
 def _corners(things: Things) -> Iterator[SpokenPlace]:
-    """Yield the only thing in each quarter around the center, and in its corner."""
+    """Yield the thing nearest to each corner, and where it is if no other one is near there."""
     left, right, near, far = (direction.ranking for direction in directions("robot"))
-    center = _center_of(things)
-    for depth, along in (("front", near), ("back", far)):
-        for side, across in (("left", left), ("right", right)):
-            quarter = _both_past(center, along, across)
-            there, corner = f"at the {depth} {side}", f"in the {depth} {side} corner"
-            yield from _said(PlaceClass.CORNER, _only(things, quarter, MARGIN), there, there)
-            # Of the area where things stand: one alone is in none.
-            spot = corner if len(things) > 1 else None
-            thing = _only(things, quarter, _CLEARLY * MARGIN)
-            yield from _said(PlaceClass.CORNER, thing, corner, spot)
+    corners = (
+        _Corner("near", "left", "front left", near, left),
+        _Corner("near", "right", "front right", near, right),
+        _Corner("far", "left", "back left", far, left),
+        _Corner("far", "right", "back right", far, right),
+    )
+    for corner in corners:
+        yield from _at_corner(things, corner)
 
 
-def _both_past(start: SceneObject, along: Ranking, across: Ranking) -> Ranking:
-    """Return the order of things by how far they are past another one in both directions."""
+def _at_corner(things: Things, corner: _Corner) -> Iterator[SpokenPlace]:
+    """Yield the words for the thing nearest to a corner, if one is clearly the nearest.
 
-    def depth(thing: SceneObject) -> float:
-        return min(
-            along.quantity(thing) - along.quantity(start),
-            across.quantity(thing) - across.quantity(start),
-        )
+    Alone in that quarter of the table, it is *at the back left*, and close enough to the corner
+    also *in the back left corner*. Else it is *nearest to the back left corner*.
+    """
+    nearest = corner.nearest(things)
+    if nearest is None:
+        return
+    quarter = corner.quarter(_center_of(things))
+    is_alone = nearest is _only(things, quarter, _IN_QUARTER)
+    if not is_alone or not _is_past_work_center(nearest, corner.along, corner.across):
+        yield SpokenPlace(PlaceClass.NEAR_CORNER, nearest, f"nearest to the {corner.name} corner")
+        return
+    there = f"at the {corner.name}"
+    yield SpokenPlace(PlaceClass.CORNER, nearest, there, there)
+    if quarter.quantity(nearest) >= _IN_CORNER:
+        words = f"in the {corner.name} corner"
+        # One thing alone on the table stands in no corner.
+        spot = words if len(things) > 1 else None
+        yield SpokenPlace(PlaceClass.CORNER, nearest, words, spot)
 
-    return Ranking(depth)
+
+def _both(along: Ranking, across: Ranking) -> Ranking:
+    """Return the order of things by the lesser of two quantities: how far they are past both."""
+
+    def lesser(thing: SceneObject) -> float:
+        return min(along.quantity(thing), across.quantity(thing))
+
+    # What is hardly outside of a quarter may still pass for being in it.
+    return Ranking(lesser, _CLEARLY * MARGIN)
 
 
 def _on_sides(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
     """Yield the only thing left or right of a fixture, unless it is rather behind or before it."""
     for fixture in fixtures_in(scene):
         for direction in sideways("robot"):
-            thing = _only(things, direction.ranking, direction.ranking.quantity(fixture))
+            order = direction.ranking
+            thing = _only(things, order, order.quantity(fixture))
             if thing and _is_sideways(thing, fixture):
                 words = f"to the {direction.side} of the {fixture.kind}"
-                yield from _said(PlaceClass.SIDE_OF_FIXTURE, thing, words)
+                yield SpokenPlace(PlaceClass.SIDE_OF_FIXTURE, thing, words)
 
 
 def _is_sideways(thing: SceneObject, fixture: SceneObject) -> bool:
+    """Return whether a thing is at least as much aside of a fixture as behind or before it."""
     sideward = abs(thing.position.y - fixture.position.y)
     return sideward >= abs(thing.position.x - fixture.position.x)

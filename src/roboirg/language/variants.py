@@ -1,35 +1,17 @@
-"""All variants of the benchmark, and all instructions of an episode."""
+"""All instructions of an episode."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 from roboirg.core.episode import Episode
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import find_refusal, instruct_with
 from roboirg.language.instruction import FORMS, Instruction
 from roboirg.language.settings import all_settings, settings_of
-from roboirg.tasks import all_tasks, get_task
-
-
-class Variant(NamedTuple):
-    """A task in one of the settings that leave something implicit."""
-
-    task: str
-    setting: str
-
-
-def all_variants() -> tuple[Variant, ...]:
-    """Return every variant of the benchmark, in the order of tasks and settings."""
-    return tuple(
-        Variant(task.name, setting)
-        for task in all_tasks().values()
-        for setting in settings_of(task)
-        if all_settings()[setting].implicit and all_settings()[setting].plain is None
-    )
+from roboirg.tasks import get_task
 
 
 def expressible_options(
@@ -37,13 +19,15 @@ def expressible_options(
 ) -> Iterator[InstructionOptions]:
     """Yield every setting, form and combination of options that can express an episode."""
     for name in settings_of(get_task(episode.task)):
-        wanted = [
-            replace(InstructionOptions(name, wordings=wordings), **changes)
-            for changes in all_settings()[name].variants
-        ]
-        possible = [options for options in wanted if find_refusal(episode, options) is None]
-        for form, options in itertools.product(FORMS, possible):
-            yield replace(options, form=form)
+        usual = InstructionOptions(name, wordings=wordings)
+        possible: list[InstructionOptions] = []
+        for changes in all_settings()[name].variants:
+            options = replace(usual, **changes)
+            if find_refusal(episode, options) is None:
+                possible.append(options)
+        for form in FORMS:
+            for options in possible:
+                yield replace(options, form=form)
 
 
 def instructions(

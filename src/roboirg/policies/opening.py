@@ -20,16 +20,18 @@ VIDEO_STEPS = 4
 
 
 def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
-    """Make a policy, begin a synthetic episode, and return what is known of it then.
+    """Make a policy, begin a synthetic episode with it, and return what it then declares.
 
-    If its ``reset`` raises, which the synthetic words may be to blame for, it has a `problem`.
+    A policy may set its version until its ``reset`` ends. If that raises, it is no error, as the
+    synthetic words may be to blame: the version is then unknown, and `problem` says why.
 
     Raises:
         InvalidValueError: it cannot be made, or its version is no version; and as `make_policy`.
         MissingDependencyError: a library that it needs is not installed.
     """
-    has_class = ref.kind in (CLASS, LIVE)
-    ref = look_up(ref) if has_class else ref
+    declares_in_class = ref.kind in (CLASS, LIVE)
+    if declares_in_class:
+        ref = look_up(ref)
     try:
         policy = make_policy(ref, seed)
         needs = PolicyNeeds.of(policy)
@@ -39,8 +41,8 @@ def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
         raise InvalidValueError(
             f"Policy {ref.spec!r} cannot be made: {one_line(error)}."
         ) from error
-    # Of other kinds, what declares something is what was made, once.
-    ref = ref if has_class else declared_by(ref, policy)
+    if not declares_in_class:
+        ref = declared_by(ref, policy)
     try:
         episode = SyntheticEpisodes(needs).episode(FIRST_WORDS, VIDEO_STEPS)
         policy.reset(episode.instruction, episode.demonstration)

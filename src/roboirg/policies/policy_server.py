@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from roboirg.core.errors import InvalidValueError, check_names
@@ -69,16 +69,7 @@ def open_server(
 
     if policy.is_foreign:
         policy = opened(policy, seed)
-    if lacking := _lacking(policy.needs, protocols[protocol]):
-        able = [
-            one.name
-            for one in protocols.values()
-            if one.service and not _lacking(policy.needs, one)
-        ]
-        raise InvalidValueError(
-            f"Policy {spec!r} declares {' and '.join(lacking)}, which {protocol} does not carry; "
-            f"protocols that do: {', '.join(able) or 'none'}."
-        )
+    _check_carried(policy, protocols[protocol], protocols.values())
 
     make = functools.partial(make_policy, policy, seed)
     listening = WebsocketServer(service(make), _metadata(policy, protocol), options)
@@ -87,14 +78,15 @@ def open_server(
 
 
 def _metadata(policy: PolicyRef, protocol: str) -> dict[str, Any]:
-    """Return what a server reports of a policy and of this process."""
+    """Return what a server reports to its clients: of the policy, and of this process."""
     process = inference_facts(None)
-    declared = (
-        getattr(find_class(policy.body), "metadata", {}) if policy.kind in (CLASS, BUILT_IN) else {}
-    )
-    has_metadata = isinstance(declared, Mapping)  # a property is of an object
+    declared: object = {}
+    if policy.kind in (CLASS, BUILT_IN):
+        declared = getattr(find_class(policy.body), "metadata", {})
+    if not isinstance(declared, Mapping):  # a property, which is of an object
+        declared = {}
     return {
-        **as_json(declared if has_metadata else {}, "the policy's metadata"),
+        **as_json(declared, "the policy's metadata"),
         "policy": policy.spec,
         "version": policy.version,
         "protocol": protocol,
@@ -103,16 +95,36 @@ def _metadata(policy: PolicyRef, protocol: str) -> dict[str, Any]:
     }
 
 
-def _lacking(needs: PolicyNeeds | None, protocol: Protocol) -> list[str]:
-    """Return what a policy declares and a protocol does not carry.
+def _check_carried(policy: PolicyRef, protocol: Protocol, others: Iterable[Protocol]) -> None:
+    """Raise if a protocol does not carry what a policy needs; the error names others that do."""
+    needs = policy.needs or PolicyNeeds()
+    lacking = _lacking(needs, protocol)
+    if not lacking:
+        return
+    able = []
+    for other in others:
+        if other.service is not None and not _lacking(needs, other):
+            able.append(other.name)
+    raise InvalidValueError(
+        f"Policy {policy.spec!r} declares {' and '.join(lacking)}, which {protocol.name} does not "
+        f"carry; protocols that do: {', '.join(able) or 'none'}."
+    )
 
-    Its client neither declares that itself nor has an option for it.
+
+def _lacking(needs: PolicyNeeds, protocol: Protocol) -> list[str]:
+    """Return the needs of a policy that a protocol does not carry, such as ``["depth"]``.
+
+    A protocol carries a need if its client declares more than the usual itself, or has an option
+    of that name.
     """
     usual = PolicyNeeds()
-    shown = PolicyNeeds.of(protocol.client(f"{protocol.name}://{LOOPBACK}:1"))
-    return [
-        name
-        for name in ("depth", "calibration", "observe_every", "actions")
-        if getattr(needs or usual, name) != getattr(usual, name) == getattr(shown, name)
-        and name not in protocol.client.options_type.model_fields
-    ]
+    # A client is asked for its needs; nothing listens at this address, and none connects.
+    of_client = PolicyNeeds.of(protocol.client(f"{protocol.name}://{LOOPBACK}:1"))
+    options = protocol.client.options_type.model_fields
+    lacking: list[str] = []
+    for name in ("depth", "calibration", "observe_every", "actions"):
+        usual_value = getattr(usual, name)
+        is_carried = name in options or getattr(of_client, name) != usual_value
+        if not is_carried and getattr(needs, name) != usual_value:
+            lacking.append(name)
+    return lacking

@@ -1,170 +1,344 @@
-"""Commands: which sentences give them, and the words for the things to handle."""
+"""Commands: a sentence as acts, each with its things, places to go and repetitions."""
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from roboirg.reader.descriptions import Description, describe
-from roboirg.reader.quantities import ADVERBS, CountExpression, Quantity, quantities
-from roboirg.reader.tokens import Sentence, colors_in, word_set
-from roboirg.reader.vocabulary import PUTTING, TAKING, VERBS
+from roboirg.reader.phrases import Chunks, Rewrites, Token, Value, compiled
+from roboirg.reader.series import read_targets, read_times
+from roboirg.reader.things import Description, read_things
+from roboirg.reader.tokens import Sentence, word_set
+from roboirg.reader.vocabulary import LOWERING, VERB_OF
 
-BEFORE_VERB = word_set(
-    ", ; : and then to finally now after that next afterwards but first repeatedly"
+_VERB = f"(?:{'|'.join(sorted(VERB_OF, key=len, reverse=True))})"
+_PARTS = {
+    "VERB": _VERB,
+    "PRESS": r"(?:press(?:ed|ing)?|push(?:ed|ing)?|hit(?:ting)?|tap(?:ped|ping)?)",
+    "TAKEN": r"(?:lift(?:ed|ing)?|uncover(?:ed|ing)?|remov(?:ed|ing)|rais(?:ed|ing)|reveal(?:ed"
+    r"|ing)?"
+    r"|pick(?:ed|ing)?(?: up)?|tak(?:en|ing))",
+    "YOU": r"(?:you|robot)",
+    "BUTTONS": r"(?:(?:both|all) (?:of )?)?(?:the |a |your "
+    r")?(?:(?:two|first|second|left|right|other)"
+    r"(?: hand)? )?buttons?",
+    "SO": r"(?:so|now|and|then|but|well|alright|all right|excuse me|(?:hey|hi|hello)(?: "
+    r"there)?|(?:my )?(?:dear )?(?:friend|robot)|first|firstly"
+    r"|second(?= ,)|secondly|first of all|next(?! to)|finally|lastly|also|to start|to begin|to "
+    r"start with|to begin with|good"
+    r"|in this task|yes|right)",
+    "ASK": r"(?:i (?:want|need|ask|would like|wish)(?: for| that)? you(?: to)?"
+    r"|(?:can|could|would|will) you(?: be so kind (?:as to|and))?|you (?:should|must|will|can|have "
+    r"to"
+    r"|need to|are to|are going to|got to|have got to)|(?:your|the) "
+    r"(?:task|job|goal|mission|objective)"
+    r" is(?: to)?|go ahead and|give it a try and|make sure (?:to|you|that you)|be sure to"
+    r"|remember to|try to|do not forget to|help me(?: to)?|let us|let's|we (?:need|want|have) to"
+    r"|start by|begin by|finish by|end by|start with|continue by|proceed to|you are supposed to"
+    r"|it is time to|you)",
+    "SHOULD": r"(?:should|must|needs to|need to|has to|have to|is to|are to)",
+    "DONE": r"(?:when|once|after|as soon as) (?:(?:you are|you have|that is|it is|all is|this is"
+    r"|everything is)(?: all)? )?(?:done|finished|complete|completed)(?: (?:with "
+    r")?(?:that|this|so))?",
+    "AFTERWARDS": r"(?:after (?:that|this|which|doing so|doing that)|afterwards?|(?<!the )(?<!its "
+    r")next(?! to)|finally|lastly"
+    r"|subsequently|(?:in|at) the (?:very )?end|to finish(?: up)?|to end|to complete the task"
+    r"|as a last step|followed by|thereafter|later)",
+    "ACTION": r"(?:(?:the |this |that |these |your )?(?:same |whole |entire |exact "
+    r")*(?:it|same|this|that|so|thing"
+    r"|action|actions|process|steps?(?: "
+    r"(?:NUMBER|and|to|,))*|motion|procedure|sequence|movement|cycle|operation|swing"
+    r"|pick and place(?: action)?|pick up and place(?: action)?)(?: again)?)",
+}
+_TALK = Rewrites(
+    r"^(?:(?:and|then|,|please) )*(?:(?:first )?(?:watch|look at)|(?:after|having|when you "
+    r"have|once you "
+    r"have) (?:watching|watched|seen|seeing)) (?:the|this) video(?: first)?(?: ,)?(?: and)?=>",
+    r"rolls? of (?:adhesive )?(?=tape)=>",
+    r"tape rolls?=>tape",
+    r"SHOULD be (?:placed|put|dropped|set)=>put",
+    r"SHOULD be (?:moved|carried|brought|transferred)=>move",
+    r"SHOULD be (?:lifted|picked up|raised|removed|uncovered)=>take",
+    r"SHOULD be (?:pressed|pushed)=>press",
+    r"SHOULD (?=go)=>",
+    r"fill (?:up )?the bin with (.*?)(?= ,|$| and press| then)=>put \1 in the bin",
+    r"[;,] (?:and |then )*(?:second|secondly|third|thirdly) ,=>,",
+    r"^(?:(?:SO|ASK) (?:, )*)+(?=\S)=>",
+    r"(?:,|:) ?(?:if you (?:can|do not mind|please|would)|thank you(?: very much| so much)?|for me"
+    r"|my friend|robot)=>",
+    r"(?:for me|if you can|thank you(?: very much| so much)?|will you|would you|can you)$=>",
+    r"for me=>",
+    r"^show me (?:that you can|how you(?: can)?)=>",
+    r"(?:up )?until (?:it|the cube|this|the COLOR cube) (?:has been|is|was|have been) \w+"
+    r"(?: (?:there|up|on the target|to the target))? (?=NUMBER times|once|twice)=>",
+    r"(?:show|find) (?:me|us)=>uncover",
+    r"(?:,|and|then) after (?=(?:you )?VERB)=>, ",
+    r"((?:,|and|then|;|afterwards|that) )+(?:ASK|also|now) (?=VERB)=>, ",
+    r"(?<!that )(?<!which )(?<!cube )(?<!after )(?<!before )(?<!once )(?<!when )(?<!if )(?<!where )"
+    r"you (?:(?:can|must|should|will|have to|need to) )?(?=VERB)=>",
+    r"(?:,|and)* ?nothing else=>",
+    r"in (?:that|this) order=>",
+    r"(?:and |, )*(?:AFTERWARDS|DONE)=>then",
+    r"((?:it|them|thing) )?(?:back )?(?:up and (?:back )?down)=>\1",
+    r"back and forth=>",
+    r"pick and place=>take and put",
+    r"(?:VERB) ACTION (?=NUMBER|once|twice|again|another|a second|x)=>repeat it ",
+    r"let (?:go of )?(it|them) (?:go|fall|drop)|let go of (?=it)=>put \1 down",
+    r"again (?:and again)=>again , again",
+    parts=_PARTS,
 )
-_REQUESTS = frozenset(
-    pair
-    for modal in ("can", "could", "will", "would", "must", "should")
-    for pair in ((modal, "you"), ("you", modal))
+_PRESSING = Rewrites(
+    r"(?:when|once|after|as soon as) (?:you )?(?:have |had )?PRESS (BUTTON)=>press \1 ,",
+    r"(?:when|once|after|as soon as) (BUTTON) (?:has been|have been|is|are|was|were) PRESS"
+    r"=>press \1 ,",
+    r"before (?:you )?PRESS (BUTTON)=>, press \1",
+    r"(?:with|by) (?:(?:a|the) press of|PRESS) (BUTTON)=>, press \1",
+    r"(?<!time )(BUTTON) to (?:(?:make it )?stop|finish|end|complete)(?: (?:it|the cube|the moving "
+    r"cube"
+    r"|the task))?(?: (?:there|on target#\d+))?=>\1",
+    r"(BUTTON) press=>press \1",
+    r"(?:with|using) (BUTTON)=>, press \1",
+    r"but (?:first )?press (BUTTON)(?: first)?=>, press \1",
+    parts={**_PARTS, "BUTTON": r"button#\d+"},
 )
-"""Pairs of words before a verb that make a sentence a command."""
-_INTO = word_set("into inside in")
-_BARE_PRONOUNS = word_set("it them that")
-_PARTICLES = word_set("up down back")
-_SINGULAR = word_set("it cube one")
-_JOINTS = word_set(", ; and then finally afterwards next")
-_JOINED = word_set("container box one former latter first second third other")
+"""When the button is pressed says nothing about the goal."""
+_ORDER = Rewrites(
+    r"(?:do )?(?:exactly )?the same (?:thing )?(?:for|with|to)=>take",
+    r"(^|[,;] |then )(?:, )?before (?:you )?TAKEN ([^,;]*) , (?:VERB (?:up )?)?(.*)"
+    r"=>\1 take \3 , take \2",
+    r"(^|[,;] |then )(?:, )?after (?:you have |you )?TAKEN ([^,;]*) , (.*)=>\1 take \2 , \3",
+    r"^(.*?)(?: ,)? but (?:only )?after (?:you have |you )?TAKEN (.*)=>take \2 , \1",
+    r"^(.*?)(?: ,)? but (?:first VERB (?:up )?(the .*?)|(?:VERB (?:up )?)?(the .*?) first)$"
+    r"=>take \2\3 , \1",
+    r"VERB (?:up )?(the [^,;]*?) (?:only )?after (?:you have |you )?(?:TAKEN )?(the .*)"
+    r"=>take \2 , take \1",
+    r"VERB (?:up )?(the [^,;]*?) before (?:you have |you )?(?:TAKEN )?(the .*)=>take \1 , take \2",
+    parts=_PARTS,
+)
+"""Of two picks, the one that comes first goes first."""
+_COVERS = compiled("containers?|uncover(?:ing)?")
+_BUTTON = compiled("BUTTONS", _PARTS)
+_GOAL = compiled(
+    r"(?:(?:right |directly |back )?(?:on top of|to the top of|on to|on|to|over|in|in "
+    r"to|at|above|atop|toward"
+    r"|towards|all the way to|back on|back to) )(?P<goal>target#\d+|way#\d+|thing#\d+|(?:the "
+    r")?(?:same )?"
+    r"(?:bin|table|box|targets|other target))"
+)
+_DOWN = compiled(
+    r"(?:back |down |again )*(?:on|to) (?:the )?(?:table|its place|where it was)"
+    r"|(?:down|back)(?: again)?"
+)
+_AGAIN = compiled(r"(?:repeat it )?again")
+_IT = compiled(
+    r"(?:both of )?(?:it|them|this one|that one|those|these|the same (?:one|thing)|this|that)"
+)
+_JOINTS = word_set(", ; : . and then")
+_OPENERS = word_set("first then next finally")
+"""Words before the verb of a step."""
+_PARTICLES = word_set("up away out off down also now too")
+"""Words that change nothing once everything else is read."""
 
 
-class Item(NamedTuple):
-    """A number of things of one color; the number is None if the command gives none."""
-
-    number: CountExpression | None
-    thing: Description
-
-
-class Command(NamedTuple):
-    """The parts of a command.
+class ActPart(NamedTuple):
+    """What is said of an act.
 
     Attributes:
-        text: all its words.
-        handled: the words for each thing to handle, in order; each thing once.
-        added: the words for things of other colors that only a verb of putting names.
-        entered: the words for each thing that something is put into.
+        kind: ``thing``, ``goal``, ``times`` …, as chunks have it.
+        value: what the words mean.
     """
 
-    text: str
-    handled: tuple[Sentence, ...]
-    added: tuple[Sentence, ...] = ()
-    entered: tuple[Sentence, ...] = ()
+    kind: str
+    value: Value
+
+
+@dataclass
+class Act:
+    """One act of a command.
+
+    Attributes:
+        verb: the act, a value of `vocabulary.VERB_OF`; empty without a verb.
+        parts: what is said of it, in order.
+    """
+
+    verb: str
+    parts: list[ActPart] = field(default_factory=list)
 
     @property
-    def things(self) -> tuple[Description, ...]:
-        """The descriptions of the things to handle."""
-        return tuple(describe(words) for words in self.handled)
+    def takes_no_more(self) -> bool:
+        """Whether another thing is a new act: *put it down, then the red one*."""
+        if self.verb == "press":
+            return True
+        return self.verb == "put" and self.has("it", "thing") and self.has("down")
+
+    def values(self, kind: str) -> list[Value]:
+        """Return the values of all parts of a kind."""
+        return [part.value for part in self.parts if part.kind == kind]
+
+    def has(self, *kinds: str) -> bool:
+        """Return whether a part is of one of some kinds."""
+        return any(part.kind in kinds for part in self.parts)
+
+
+@dataclass
+class Reading:
+    """A sentence as acts.
+
+    Attributes:
+        acts: in the order of speaking.
+        unread: words that no rule reads.
+        asks: whether it begins with a verb, or a step of it: *Watch out, first lift it*.
+    """
+
+    acts: list[Act]
+    unread: tuple[str, ...]
+    asks: bool
 
     @property
-    def things_in_order(self) -> tuple[Description, ...]:
-        """The same, with a description for each of the things that one verb handles in turn."""
-        found: list[Description] = []
-        for words in (part for clause in self.handled for part in _parts(clause)):
-            thing, colors = describe(words), tuple(dict.fromkeys(colors_in(words)))
-            several = thing.kind == "color" and len(colors) > 1
-            found += [thing._replace(colors=(one,)) for one in colors] if several else [thing]
-        return tuple(found)
+    def is_command(self) -> bool:
+        """Whether it is a command that is read to the end, or part of one.
+
+        It has to press the button, or say more of an act than *it* and *first*.
+        """
+        if self.unread:
+            return False
+        for act in self.acts:
+            if act.verb == "press":
+                return True
+            if any(part.kind not in ("it", "first") for part in act.parts):
+                return True
+        return False
 
     @property
-    def boxes(self) -> tuple[Description, ...]:
-        """The descriptions of the things that something is put into."""
-        return tuple(describe(words) for words in self.entered)
-
-    @property
-    def items(self) -> tuple[Item, ...]:
-        """The descriptions of the things to handle, with their numbers."""
-        return tuple(item for words in (*self.handled, *self.added) for item in _items(words))
-
-
-def is_command(words: Sentence) -> bool:
-    """Return whether a sentence contains a known verb in the place of a command's verb."""
-    return any(_is_verb(words, at) for at in range(len(words)))
+    def is_like_command(self) -> bool:
+        """Whether a clause asks to handle a thing, read to the end or not."""
+        if not self.acts or not self.asks:
+            return False
+        first = self.acts[0]
+        return first.verb in ("take", "move", "put", "press") and first.has("thing", "button")
 
 
 @functools.lru_cache(maxsize=4096)
-def read_command(words: Sentence) -> Command:
-    """Read the words of all commanding sentences as one command."""
-    clauses = _clauses(words)
-    taken = [clause for clause in clauses if clause[0] in TAKING and not _shares(clause)]
-    put = [clause for clause in clauses if clause[0] in PUTTING]
-    return Command(
-        " ".join(words),
-        # "Put the cube on the target" handles a cube too, "put it back" the one in the hand.
-        _first_mentions(taken or put),
-        _other_colors(put, taken) if taken else (),
-        tuple(found for clause in clauses if (found := _entered(clause))),
-    )
+def read_command(words: Sentence) -> Reading:
+    """Return a sentence as acts, and the words in it that no rule reads.
+
+    *would you lift the red cube twice* becomes one act: the verb ``take``, a thing and a number of
+    times. First polite and winding words are rewritten, to *lift the red cube twice*; then each
+    phrase becomes a chunk, ``lift thing#1 times#0``; then the chunks after a verb become parts of
+    its act.
+    """
+    text = _TALK.apply(" ".join(words))
+    if _COVERS.search(text) is not None:
+        text = _ORDER.apply(text)
+    chunks = Chunks(text)
+
+    # The order counts: each phrase takes its words away from the later ones, and some are made of
+    # earlier chunks, "on target#1" of a target.
+    read_targets(chunks)
+    chunks.replace("button", _BUTTON, lambda found: found[0])
+    chunks.text = _PRESSING.apply(chunks.text)
+    read_times(chunks)
+    read_things(chunks)
+    chunks.replace("goal", _GOAL, lambda found: _goal(found["goal"], chunks))
+    chunks.replace("down", _DOWN, lambda found: found[0])
+    chunks.replace("again", _AGAIN, lambda found: found[0])
+    chunks.replace("it", _IT, lambda found: found[0])
+    return _acts(chunks)
 
 
-def _first_mentions(clauses: Sequence[Sentence]) -> tuple[Sentence, ...]:
-    """Return the words after each verb, unless they continue with the thing in the hand."""
-    return tuple(clause[1:] for clause in clauses if clause is clauses[0] or not _continues(clause))
+def _goal(words: str, chunks: Chunks) -> Value:
+    """Return where something goes: a target, a way over targets, a box, or a noun such as ``bin``.
+
+    `words` are those after *on* or *to*: ``target#1``, ``the same bin``. None if they are a thing
+    that is no box.
+    """
+    if "#" not in words:
+        return words.rpartition(" ")[2]  # of "the same bin", the noun
+    value = chunks.value(words)
+    if isinstance(value, Description) and (value.noun not in ("box", "one") or value.is_open):
+        return None
+    return value
 
 
-def _other_colors(put: Sequence[Sentence], taken: Sequence[Sentence]) -> tuple[Sentence, ...]:
-    """Return the words for things that are put somewhere, of colors that are not taken."""
-    known = {color for clause in taken for color in colors_in(clause)}
-    return tuple(clause[1:] for clause in put if set(colors_in(clause)) - known)
+def _acts(chunks: Chunks) -> Reading:
+    """Return the acts of a sentence whose phrases are chunks.
+
+    ``lift thing#1 then press button#0`` is two acts: ``take`` with a thing, ``press`` with a
+    button.
+    """
+    builder = _ActBuilder()
+    tokens = list(chunks.tokens())
+    for token in tokens:
+        if token.value is None:  # a word outside of all chunks
+            builder.add_word(token.kind)
+        else:
+            builder.add_chunk(token)
+    return Reading(builder.acts, tuple(builder.unread), _has_imperative(tokens))
 
 
-def _entered(clause: Sentence) -> Sentence:
-    """Return ``it`` of ``put the tape into it``; empty if nothing is put into anything."""
-    if clause[0] not in TAKING | PUTTING:
-        return ()
-    at = next((at for at, word in enumerate(clause) if word in _INTO), len(clause))
-    return clause[at + 1 :]
+def _has_imperative(tokens: Sequence[Token]) -> bool:
+    """Return whether a sentence begins with a verb, or has one after *first* or *then*.
+
+    A comma is not enough: *okay, get ready* asks nothing of the robot's things.
+    """
+    may_begin = True
+    for token in tokens:
+        if may_begin and token.kind in VERB_OF:
+            return True
+        may_begin = token.kind in _OPENERS
+    return False
 
 
-def _continues(clause: Sentence) -> bool:
-    """Return whether a clause goes on with the thing in the hand: ``carry it over``."""
-    objects = [word for word in clause[1:3] if word not in _PARTICLES]
-    return not objects or objects[0] in _BARE_PRONOUNS
+class _ActBuilder:
+    """Makes acts of verbs and of what is said after each."""
 
+    def __init__(self) -> None:
+        self.acts: list[Act] = []
+        self.unread: list[str] = []
+        self._is_joined = False  # whether a comma, *and* or *then* stands just before
 
-def _shares(clause: Sentence) -> bool:
-    """Return whether a verb has its object after the next verb: ``pick and place the cube``."""
-    return len(clause) > 1 and clause[-1] == "and" and set(clause[1:-1]) <= _PARTICLES
+    def add_word(self, word: str) -> None:
+        """Add a word outside of all chunks: a verb begins an act, and joining words are skipped.
 
+        Every other word counts as not read.
+        """
+        if word in VERB_OF:
+            act = Act(VERB_OF[word])
+            if word in LOWERING:  # "release it" says where, too
+                act.parts.append(ActPart("down", word))
+            self.acts.append(act)
+        elif word == "first" and self.acts:
+            self.acts[-1].parts.append(ActPart(word, word))
+        elif word not in _JOINTS and word not in _PARTICLES:
+            self.unread.append(word)
+        self._is_joined = word in _JOINTS
 
-def _clauses(words: Sentence) -> list[Sentence]:
-    starts = [at for at in range(len(words)) if _is_verb(words, at)]
-    ends = [*starts[1:], len(words)]
-    return [words[start:end] for start, end in zip(starts, ends, strict=False)]
+    def add_chunk(self, chunk: Token) -> None:
+        """Add a chunk, such as a thing or a number of times, to the act that it is said of."""
+        kind = chunk.kind
+        act = self._act_for(kind)
+        if kind == "place" and act.verb and not act.parts:  # "Take on the left"
+            thing = Description("one", is_definite=True, place=chunk.value)
+            act.parts.append(ActPart("thing", thing))
+        elif kind == "place":
+            self.unread += chunk.text.split()  # a place without a thing that stands there
+        elif kind == "more" and not self._is_joined and act.verb != "repeat":
+            # "Lift it twice more" may mean twice in all, or twice after once.
+            act.parts.append(ActPart("extra", chunk.value))
+        else:
+            act.parts.append(ActPart(kind, chunk.value))
+        self._is_joined = False
 
+    def _act_for(self, kind: str) -> Act:
+        """Return the act of which something is said: the last one, or a new one without a verb.
 
-def _is_verb(words: Sentence, at: int) -> bool:
-    if words[at] not in VERBS:
-        return False
-    if at == 0 or words[at - 1] in BEFORE_VERB or words[max(0, at - 2) : at] in _REQUESTS:
-        return True
-    return words[at - 1] in ("you", "do") and words[max(0, at - 2) : at - 1] in ((), (",",))
-
-
-def _parts(words: Sentence) -> Iterator[Sentence]:
-    """Yield the parts of ``the container at the left, and then the one at the right``."""
-    start = 0
-    for at in range(1, len(words) - 1):
-        joined = words[at - 1] in _JOINTS or words[max(0, at - 2) : at] == ("after", "that")
-        if joined and words[at] == "the" and words[at + 1] in _JOINED:
-            yield words[start:at]
-            start = at
-    yield words[start:]
-
-
-def _items(words: Sentence) -> tuple[Item, ...]:
-    """Split ``two red cubes and one that is blue``: each quantity begins a new item."""
-    text = " ".join(words)
-    found = [quantity for quantity in quantities(text) if _counts_things(quantity, text)]
-    if not found:
-        alone = "them" not in words and not _SINGULAR.isdisjoint(words)
-        return (Item(CountExpression(quantity=1) if alone else None, describe(words)),)
-    ends = [*(quantity.start for quantity in found[1:]), len(text)]
-    # A derived quantity has its color inside: "one fewer red cube than that".
-    return tuple(
-        Item(quantity.expression, describe(tuple(text[quantity.start : end].split())))
-        for quantity, end in zip(found, ends, strict=True)
-    )
-
-
-def _counts_things(quantity: Quantity, text: str) -> bool:
-    return not quantity.plain or text[quantity.start : quantity.end] not in ADVERBS
+        *Put it down, then the red one*: the red one is to be taken.
+        """
+        if not self.acts:
+            self.acts.append(Act(""))
+        last = self.acts[-1]
+        if kind == "thing" and last.takes_no_more:
+            self.acts.append(Act("take" if last.verb == "put" else ""))
+        return self.acts[-1]

@@ -1,126 +1,457 @@
-"""Constraints: turn a command into tests of goals, one for each slot that goals of a task have."""
+"""Constraints: which goals of a scene the acts of a command leave."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from roboirg.core.episode import Goal
-from roboirg.reader.command import Command
-from roboirg.reader.ordinals import read_position
-from roboirg.reader.quantities import read_times
-from roboirg.reader.reference_resolution import Amounts, ReferenceResolver, common_options
-from roboirg.reader.several_amounts import read_several_amounts
-from roboirg.reader.temporal_relations import TemporalRelation, read_temporal_relation
+from roboirg.core.episode import Goal, Scene, SlotValue
+from roboirg.reader.command import Act
+from roboirg.reader.referents import Referents
+from roboirg.reader.series import Target, TargetWay, Visit
+from roboirg.reader.things import ALL, Description
 
-GoalTest = Callable[[Goal], bool]
+Values = set[str] | set[int] | None
+"""The values that a slot can have; None for any."""
+
+_HANDLING = ("take", "uncover", "move", "put", "repeat", "")
+"""Verbs of acts that can be repeated; empty where none is said."""
+_SWING = ["right", "left"]
+"""The sides in the order in which a cube swings over them."""
+_NUMBERS = ("times", "more", "extra", "again")
+"""Parts of an act that say how often."""
+_GOING = ("goal", "down", "way", "target")
+"""Parts of an act that say where something goes."""
 
 
-class Constraint(NamedTuple):
-    """A test of goals, and the complaint for the case that no goal of the task passes it."""
-
-    fits: GoalTest
-    complaint: str
+class UnfitWordsError(Exception):
+    """A command contradicts itself, or says what no slot of the goal takes."""
 
 
-def goal_constraints(
-    candidates: Sequence[Goal], command: Command, resolver: ReferenceResolver
-) -> list[Constraint]:
-    """Return what a goal must pass to fit the command."""
-    slots = candidates[0].as_mapping() if candidates else ()
-    constraints: list[Constraint] = []
+def fitting_goals(
+    acts: Sequence[Act], goals: Sequence[Goal], scene: Scene, *, is_alone: bool
+) -> tuple[Goal, ...]:
+    """Return the goals that fit a command.
+
+    Args:
+        acts: of the command.
+        goals: of the scene.
+        scene: what it is about.
+        is_alone: whether nothing else is said about numbers, so that none means once.
+
+    Raises:
+        UnfitWordsError: it contradicts itself, or says what no slot takes.
+    """
+    command = _Command(acts, scene)
+    slots = dict(goals[0].slots) if goals else {}
+    command.check(slots)
+    allowed = _allowed_values(command, goals, is_alone=is_alone)
+    fitting = [goal for goal in goals if _fits(goal, allowed)]
     if "counts" in slots:
-        constraints.append(Constraint(_amounts(command, resolver), _no_goal("amounts")))
+        amounts = command.amounts()
+        if amounts:
+            fitting = [goal for goal in fitting if dict(goal.amounts) in amounts]
     elif "colors" in slots:
-        constraints.append(Constraint(_things_in_order(command, resolver), _no_goal("things")))
-    if "color" in slots:
-        things = command.boxes if resolver.chooses_box else command.things
-        constraints.append(_text("color", common_options(map(resolver.colors_of, things))))
-    constraints += _numbers(slots, candidates, command, resolver)
-    if "relation" in slots:
-        when = _moment(command.text)
-        moments = resolver.moments_at(read_position(command.text)) if when is None else None
-        moments = moments or resolver.moments(when)
-        constraints.append(_text("relation", moments))
-    return constraints
+        sequence = command.sequence()
+        fitting = [goal for goal in fitting if _fits_in_order(goal, sequence)]
+    return tuple(fitting)
 
 
-def _moment(text: str) -> TemporalRelation | None:
-    """Return the description of a moment; *there* points at the place of an introduced one."""
-    pointed = TemporalRelation("introduced") if "there" in text.split() else None
-    return read_temporal_relation(text) or pointed
+def _allowed_values(
+    command: _Command, goals: Sequence[Goal], *, is_alone: bool
+) -> dict[str, Values]:
+    """Return what a command allows each slot that holds a single value: ``{"color": {"red"}}``.
 
-
-def _numbers(
-    slots: Collection[str],
-    candidates: Sequence[Goal],
-    command: Command,
-    resolver: ReferenceResolver,
-) -> Iterator[Constraint]:
-    """Yield the constraints of the slots that hold one number."""
+    Slots that the goals of the scene do not have are left out.
+    """
+    slots = dict(goals[0].slots) if goals else {}
+    allowed: dict[str, Values] = {}
+    if "visit" in slots:
+        allowed["visit"] = command.visits(max(goal.number("visit") for goal in goals))
     if "repeats" in slots:
-        yield _number("repeats", resolver.repeats(read_times(command.text)), candidates)
-    for series in ("visit", "placement"):
-        if series in slots:
-            options = resolver.positions(read_position(command.text))
-            yield _number(series, options, candidates)
+        allowed["repeats"] = command.repeats(is_alone=is_alone)
+        _check_range(allowed["repeats"], goals)
+    if "relation" in slots:
+        allowed["relation"] = command.relations()
+    if "placement" in slots:
+        allowed["placement"] = command.placements(max(goal.number("placement") for goal in goals))
+    if "color" in slots:
+        allowed["color"] = command.colors()
+    return allowed
 
 
-def _number(slot: str, options: Collection[int] | None, candidates: Sequence[Goal]) -> Constraint:
-    possible = sorted({goal.number(slot) for goal in candidates})
-    return Constraint(
-        lambda goal: options is None or goal.number(slot) in options,
-        f"the number is out of range: {slot} can be {possible[0]} to {possible[-1]}",
-    )
+def _fits(goal: Goal, allowed: Mapping[str, Values]) -> bool:
+    """Return whether a goal has an allowed value in each slot."""
+    return all(values is None or goal[slot] in values for slot, values in allowed.items())
 
 
-def _text(slot: str, options: Collection[str] | None) -> Constraint:
-    return Constraint(lambda goal: options is None or goal.text(slot) in options, _no_goal(slot))
+def _fits_in_order(goal: Goal, sequence: Sequence[Values]) -> bool:
+    """Return whether a goal's colors are those of a sequence, one by one: ``[{"red"}, None]``.
 
-
-def _no_goal(part: str) -> str:
-    return f"no goal of the task has the {part} that the command names"
-
-
-def _things_in_order(command: Command, resolver: ReferenceResolver) -> GoalTest:
-    """Return a test for as many colors as things, each among those that its words allow."""
-    wanted = [resolver.colors_of(thing) for thing in command.things_in_order]
-
-    def fits(goal: Goal) -> bool:
-        colors = goal.texts("colors")
-        if wanted and len(wanted) != len(colors):
-            return False
-        pairs = zip(colors, wanted, strict=False)
-        return all(options is None or color in options for color, options in pairs)
-
-    return fits
-
-
-def _amounts(command: Command, resolver: ReferenceResolver) -> GoalTest:
-    """Return a test for colors with numbers that match the items one to one, in any order."""
-    several = read_several_amounts(command.text)
-    if several is None:
-        items = [resolver.amounts(item) for item in command.items]
-    else:
-        items = resolver.several_amounts(several)
-
-    def fits(goal: Goal) -> bool:
-        amounts = goal.amounts
-        if not items:
-            return several is None or several.leaves_open([number for _, number in amounts])
-        return len(items) == len(amounts) and any(
-            _match(amounts, order) for order in itertools.permutations(items)
-        )
-
-    return fits
-
-
-def _match(amounts: Sequence[tuple[str, int]], items: Sequence[Amounts]) -> bool:
-    for (color, number), options in zip(amounts, items, strict=True):
-        if color not in options:
-            return False
-        numbers = options[color]
-        if numbers is not None and number not in numbers:
+    None stands for any color. Any goal fits an empty sequence.
+    """
+    if not sequence:
+        return True
+    colors = goal.texts("colors")
+    if len(colors) != len(sequence):
+        return False
+    for color, possible in zip(colors, sequence, strict=True):
+        if possible is not None and color not in possible:
             return False
     return True
+
+
+def _kind_of(goal: object) -> str:
+    """Return the kind of an object to which something goes."""
+    if isinstance(goal, str):
+        return goal.removesuffix("s")
+    if isinstance(goal, Description):
+        return "box"
+    return "target"
+
+
+def _check_range(values: Values, goals: Sequence[Goal]) -> None:
+    """Refuse numbers of times if no goal of the scene has any of them; None is any number."""
+    numbers = {goal.number("repeats") for goal in goals}
+    if values is not None and not values & numbers:
+        raise UnfitWordsError(
+            f"the number is out of range: repeats can be {min(numbers)} to {max(numbers)}"
+        )
+
+
+def _from_start(rank: int, last: int) -> int:
+    """Return a rank counted from the start: of ``-1`` the last one."""
+    if rank > 0:
+        return rank
+    return last + 1 + rank
+
+
+class _NamedThing(NamedTuple):
+    """A thing that a command names, and what is to be done with it."""
+
+    act: Act
+    thing: Description
+
+
+class _Amount(NamedTuple):
+    """A number of cubes of a color."""
+
+    color: str
+    number: int
+
+
+class _Command:
+    """The acts of a command, in a scene."""
+
+    def __init__(self, acts: Sequence[Act], scene: Scene) -> None:
+        self._acts = acts
+        self._scene = scene
+        self._referents = Referents(scene)
+        self._named = tuple(self._named_things())
+
+    def check(self, slots: Mapping[str, SlotValue]) -> None:
+        """Refuse a command that says what no slot of the task's goals takes, such as a placement.
+
+        `slots` are those of a goal, with its values.
+        """
+        for act in self._acts:
+            self._check_act(act, slots)
+        for target in self._targets():
+            if target.rank is not None and "placement" not in slots:
+                raise UnfitWordsError("does not understand which target is meant")
+            if target.relation is not None and "relation" not in slots:
+                raise UnfitWordsError("does not understand which target is meant")
+        if "color" not in slots and "colors" not in slots:
+            self._check_uncolored("repeats" in slots)
+        sides = self._sides()
+        targets = self._scene.of_kind("target")
+        # A cube swings over two targets, always over the right one first.
+        if sides and (len(targets) != len(_SWING) or sides != _SWING):
+            raise UnfitWordsError("does not understand the way between the targets")
+
+    def _check_act(self, act: Act, slots: Mapping[str, SlotValue]) -> None:
+        """Refuse an act that cannot be done, or is repeated where goals have no number of times."""
+        if act.verb == "put" and not act.has(*_GOING):
+            raise UnfitWordsError("does not understand where to put it")
+        kinds_there = {item.kind for item in self._scene.objects} | {"table"}
+        for goal in act.values("goal"):
+            kind = _kind_of(goal)
+            if kind not in kinds_there:
+                raise UnfitWordsError(f"there is no {kind} in the scene")
+        if act.verb in ("press", "stop"):
+            is_once = all(number == 1 for number in act.values("times"))
+            if not is_once or act.has("more", "extra"):
+                raise UnfitWordsError("does not understand how often to press")
+        if act.has("visit", "passed") and "visit" not in slots:
+            raise UnfitWordsError("does not understand when to act")
+        if act.verb in _HANDLING and act.has(*_NUMBERS) and "repeats" not in slots:
+            raise UnfitWordsError("does not understand how often to act")
+
+    def _check_uncolored(self, is_shown: bool) -> None:
+        """Refuse descriptions that choose among things where there is only one to handle.
+
+        Only *cube* or *one* without color or place will do. With `is_shown`, several cubes are
+        there and the video shows which one is meant, so that it must be *the cube* or the one in
+        the video.
+        """
+        for named in self._named:
+            thing = named.thing
+            is_other = is_shown and not (thing.is_definite or thing.is_shown)
+            if thing.noun not in ("cube", "one") or not thing.is_open or is_other:
+                raise UnfitWordsError(f'does not understand which "{thing.noun}" is meant')
+
+    def visits(self, last: int) -> Values:
+        """Return at which visits of the cube to the target to act; None for any.
+
+        *Stop it at the second visit* gives ``{2}``. `last` is the number of the last visit.
+        """
+        passed: list[int] = []
+        for act in self._acts:
+            passed += act.values("passed")
+        found: set[int] = set()
+        for act in self._acts:
+            for visit in act.values("visit"):
+                found.add(self._visit(visit, passed, last))
+        if passed and not found:  # "let it pass twice" does not say at which visit to act
+            raise UnfitWordsError("does not understand when to act")
+        return self._only(found, "visit")
+
+    def _visit(self, visit: Visit, passed: Sequence[int], last: int) -> int:
+        """Return the number of a visit.
+
+        `passed` has how many visits pass before, if that is said: *let it pass twice, and stop it
+        at the next visit* means the third.
+        """
+        if not passed:
+            if visit.rank is None:
+                raise UnfitWordsError("does not understand which visit is the next one")
+            return _from_start(visit.rank, last)
+        following = passed[0] + 1
+        if visit.rank not in (None, following):
+            raise UnfitWordsError("does not understand which visit is meant")
+        return _from_start(following, last)
+
+    def repeats(self, *, is_alone: bool) -> Values:
+        """Return the numbers of times that a command can mean; None for any.
+
+        *Lift the cube twice* gives ``{2}``, *lift the cube twice, then once more* ``{3}`` and *lift
+        the cube again and again* ``{3}``. Without a number it means once, ``{1}``, if `is_alone`:
+        nothing else is said of numbers.
+        """
+        totals: set[int] = set()  # numbers that are said, "twice"; they must agree
+        more = 0  # what is added to them, "once more"
+        is_first = True
+        has_pressed = False
+        for act in self._acts:
+            if act.verb in ("press", "stop"):
+                has_pressed = True
+                continue  # the button is pressed once, whatever is repeated
+            if act.verb == "repeat" and has_pressed and act.has(*_NUMBERS):
+                raise UnfitWordsError("does not understand what to repeat")
+            if act.verb == "repeat" and act.values("times") == [1] and not is_first:
+                more += 1  # "Repeat once"
+                continue
+
+            totals.update(act.values("times"))
+            if is_first and act.verb == "take" and self._scene.past:
+                totals.update(act.values("extra"))  # the video shows the first time
+            elif act.has("extra"):
+                raise UnfitWordsError("does not understand how often to act in all")
+            else:
+                more += len(act.values("again"))
+            more += sum(act.values("more"))
+            if act.verb in _HANDLING:
+                is_first = False
+
+        self._only(totals, "number of times")  # refuses two that differ
+        if totals:
+            return {sum(totals) + more}
+        if not more and not is_alone:
+            return None
+        return {1 + more}
+
+    def relations(self) -> Values:
+        """Return the possible relations to the press of the button."""
+        relations = [target.relation for target in self._targets() if target.relation is not None]
+        return self._only(relations, "target")
+
+    def placements(self, last: int) -> Values:
+        """Return the possible placements; `last` is the last one."""
+        ranks = [target.rank for target in self._targets() if target.rank is not None]
+        return self._only([_from_start(rank, last) for rank in ranks], "target")
+
+    def colors(self) -> Values:
+        """Return the colors that the chosen thing can have by all its descriptions; None for any.
+
+        *The red cube* gives ``{"red"}``; *the cube on the left*, the colors of what may be meant
+        there.
+        """
+        kind = self._referents.chosen  # among things of this kind the goals choose
+        possible: set[str] | None = None
+        for thing in self._things_to_choose(kind):
+            if thing.noun not in (kind, "one") or thing.number not in (None, 1):
+                raise UnfitWordsError(f'does not understand "{thing.noun}" and its number')
+            found = self._present(thing)
+            if possible is not None:
+                found = found & possible
+            possible = found
+        if possible is not None and not possible:
+            raise UnfitWordsError("does not understand which color is meant")
+        return possible
+
+    def _things_to_choose(self, kind: str) -> list[Description]:
+        """Return the descriptions of what is chosen by its color: a box is where something goes."""
+        if kind != "box":
+            return [named.thing for named in self._named if not named.thing.is_open]
+        boxes: list[Description] = []
+        for act in self._acts:
+            boxes += [goal for goal in act.values("goal") if isinstance(goal, Description)]
+        return boxes
+
+    def sequence(self) -> list[Values]:
+        """Return the colors that each thing to lift can have, in the order of lifting.
+
+        *Lift the red one, then the one on the left* gives ``[{"red"}, {"blue"}]`` if blue is on the
+        left.
+        """
+        found: list[Values] = []
+        for act, thing in self._named:
+            if thing.is_open:
+                continue
+            if thing.noun not in ("container", "cube", "one") or thing.number not in (None, 1):
+                raise UnfitWordsError(f'does not understand "{thing.noun}" and its number')
+            colors = self._present(thing)
+            # "Lift the red cube, then put the red cube down" is about one thing.
+            is_again = thing.is_definite and bool(found) and found[-1] == colors
+            if act.verb == "put" and not is_again:
+                raise UnfitWordsError("does not understand what to put down")
+            if not is_again:
+                found.append(colors)
+        if len(found) > 1:
+            self._check_first()
+        return found
+
+    def _check_first(self) -> None:
+        """Refuse *first* behind a later thing: *lift the red one, the blue one first*."""
+        things = 0
+        for act in self._acts:
+            for part in act.parts:
+                if part.kind == "thing":
+                    things += 1
+                if part.kind == "first" and things > 1:
+                    raise UnfitWordsError("does not understand what comes first")
+
+    def amounts(self) -> list[dict[str, int]]:
+        """Return the possible amounts of cubes by color; none if nothing is said of them.
+
+        *A red cube and the one on the left* may be two red ones, or a red and a blue one.
+        """
+        mentions = self._amount_mentions()
+        if not mentions:
+            return []
+        found: list[dict[str, int]] = []
+        for meant_amounts in itertools.product(*mentions):  # one for each mention
+            total: Counter[str] = Counter()
+            for amount in meant_amounts:
+                total[amount.color] += amount.number
+            found.append(dict(total))
+        return found
+
+    def _amount_mentions(self) -> list[list[_Amount]]:
+        """Return for each mention of cubes the amounts that it can mean.
+
+        *two red cubes* gives ``[(red, 2)]``; *two of each color*, one such list for each color.
+        """
+        mentions: list[list[_Amount]] = []
+        for named in self._named:
+            possible = self._possible_amounts(named.thing)
+            # "Take a red cube, then put the red cube into the bin" is about one cube.
+            is_again = named.thing.is_definite and possible in mentions
+            if not is_again:
+                mentions.append(possible)
+        for act in self._acts:
+            for number in act.values("each"):
+                for color in sorted(self._referents.colors):
+                    mentions.append([_Amount(color, number)])
+        return mentions
+
+    def _possible_amounts(self, thing: Description) -> list[_Amount]:
+        """Return the amounts that a description can mean, one for each color that it may have.
+
+        *two red cubes* gives ``[(red, 2)]``, *two cubes* ``[(blue, 2), (red, 2)]``.
+        """
+        if thing.noun not in ("cube", "one"):
+            raise UnfitWordsError(f'there is no "{thing.noun}" to put into the bin')
+        if thing.is_open:
+            if thing.number in (None, ALL):
+                raise UnfitWordsError("does not understand how many cubes are meant")
+            colors = self._referents.colors
+        else:
+            colors = self._present(thing)
+        return [_Amount(color, self._count(thing, color)) for color in sorted(colors)]
+
+    def _count(self, thing: Description, color: str) -> int:
+        """Return how many cubes of a color a description means."""
+        if thing.number is None:
+            raise UnfitWordsError("does not understand how many cubes are meant")
+        if thing.number == ALL:
+            return self._referents.count_of(color)
+        return thing.number
+
+    def _named_things(self) -> Iterator[_NamedThing]:
+        """Yield each thing that is named, with its act; not those that only point back at one.
+
+        *It* before any thing is refused: what comes before the command is not read.
+        """
+        has_named = False
+        for act in self._acts:
+            for kind, value in act.parts:
+                if kind == "it" and act.verb not in ("repeat", "stop", "press") and not has_named:
+                    raise UnfitWordsError(f'does not read what "{value}" points back at')
+                if kind != "thing" or act.verb == "press":
+                    continue
+                can_point_back = value.is_open and value.is_definite and value.number in (None, 1)
+                if not can_point_back or not has_named:
+                    yield _NamedThing(act, value)
+                has_named = True
+
+    def _targets(self) -> Iterator[Target]:
+        """Yield the targets that are named."""
+        for act in self._acts:
+            for value in (*act.values("goal"), *act.values("target")):
+                if isinstance(value, Target):
+                    yield value
+
+    def _sides(self) -> list[str]:
+        """Return the sides of the targets as a cube passes them: ``["right", "left"]``."""
+        found: list[str] = []
+        for act in self._acts:
+            for part in act.parts:
+                if isinstance(part.value, TargetWay):
+                    found += part.value.sides
+                elif isinstance(part.value, Target) and part.value.side:
+                    found.append(part.value.side)
+        return found
+
+    def _present(self, thing: Description) -> set[str]:
+        """Return the colors that a description can mean, of what is there."""
+        found = self._referents.colors_of(thing)
+        if found:
+            return found
+        named = thing.under or thing
+        if named.color and named.place is None:
+            raise UnfitWordsError(f"there is nothing {named.color} in the scene")
+        raise UnfitWordsError("there is nothing to handle at the place that the text names")
+
+    def _only(self, values: Iterable[str | int], name: str) -> Values:
+        """Return the only value that is named, as a set; None without any. Several are refused.
+
+        `name` is what the values are of, for the complaint.
+        """
+        found = set(values)
+        if len(found) > 1:
+            named = " and ".join(sorted(map(str, found)))
+            raise UnfitWordsError(f'does not know which {name} is meant, "{named}"')
+        return found or None  # type: ignore[return-value]

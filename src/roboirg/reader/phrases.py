@@ -1,65 +1,133 @@
-"""Phrases: regular expressions for the ways to say one thing, each with an example."""
+"""Tables of regular expressions, and a sentence whose phrases are replaced by what they mean."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
 
-Span = tuple[int, int, str | None]
-"""First character, one past the last, and what the words between stand for; None if unclear."""
+from roboirg.reader.tokens import COLOR, NUMBER, ORDINAL
+
+Value = Any
+"""What a phrase means: a place, a thing, a number, ..."""
+
+_MARK = re.compile(r"\(\?P<\w+>|\(\?[:=!<]+|\\.")
+"""What stands in a pattern and is no word: the beginning of a group, ``\\d``."""
+_WORD = re.compile(r"[a-z][a-z']+")
+
+KNOWN_WORDS: set[str] = set()
+"""Every word of a table."""
+
+_PARTS: Mapping[str, str] = {
+    "NUMBER": NUMBER,
+    "ORDINAL": ORDINAL,
+    "RANK": rf"(?:{ORDINAL}|last|final|next)",
+    "COLOR": COLOR,
+    "SIDE": r"(?:left|right)",
+    "YOU": r"(?:you|yourself|(?:the )?robot|the arm|your base|the (?:robot's )?base)",
+    "VIDEO": r"(?:(?:the |that )?video)",
+    "PICTURE": r"(?: (?:of|in) the (?:picture|camera's view|camera view|camera))",
+}
+"""What stands in a pattern for words in capital letters; tables add their own."""
 
 
-class Phrases:
-    """Ways to say one thing, which are searched in the words of a sentence, joined by spaces.
+def compiled(pattern: str, parts: Mapping[str, str] = _PARTS) -> re.Pattern[str]:
+    """Return a pattern of whole words, in which words in capital letters stand for parts.
 
-    Args:
-        ways: a pattern for each way, by an example: words in which it matches, and none before it.
-        before: a pattern that precedes each of them.
-        after: a pattern that follows each of them.
-
-    Attributes:
-        by_example: the whole pattern of each way, by its example.
-        search: as of a pattern, and so are `match` and `finditer`.
+    ``"the COLOR cube"`` becomes ``the (?:red|green|…) cube``. Its small words become known ones.
     """
-
-    def __init__(self, ways: Mapping[str, str], *, before: str = "", after: str = "") -> None:
-        self.by_example = {
-            example: re.compile(f"{before}(?:{way}){after}") for example, way in ways.items()
-        }
-        pattern = re.compile(f"{before}(?:{'|'.join(ways.values())}){after}")
-        self.search = pattern.search
-        self.match = pattern.match
-        self.finditer = pattern.finditer
+    known = {**_PARTS, **parts}
+    # The longest name first, or the beginning of one would pass for another.
+    names = re.compile("|".join(sorted(known, key=len, reverse=True)))
+    while names.search(pattern):  # parts are made of other parts
+        pattern = names.sub(lambda found: known[found[0]], pattern)
+    KNOWN_WORDS.update(_WORD.findall(_MARK.sub(" ", pattern)))
+    return re.compile(rf"(?<!\S)(?:{pattern})(?:(?!\S)|(?<= ))")
 
 
 class Rewrites:
-    """Rules that put other words for some words of a text, one after another.
+    """Rules that replace words by words, each ``pattern=>words``, in their order."""
 
-    Args:
-        rules: for each the words of which a text must have one, ``::``, a pattern of words joined
-            by spaces, ``=>``, and what replaces it.
-        parts: patterns for names in capital letters that the rules use.
+    def __init__(self, *rules: str, parts: Mapping[str, str] = _PARTS) -> None:
+        self._rules: list[tuple[re.Pattern[str], str]] = []
+        for rule in rules:
+            pattern, _, words = rule.partition("=>")
+            self._rules.append((compiled(pattern, parts), words))
+
+    def apply(self, text: str) -> str:
+        """Return a text with all rules applied."""
+        for pattern, words in self._rules:
+            text = " ".join(pattern.sub(words, text).split())
+        return text
+
+
+class Token(NamedTuple):
+    """A chunk, or a word outside of all chunks.
+
+    Attributes:
+        kind: of the chunk; or the word.
+        value: what the chunk means; None for a word.
+        text: the words for which the chunk stands; or the word.
     """
 
-    def __init__(self, *rules: str, parts: Mapping[str, str]) -> None:
-        named = re.compile("|".join(parts))
-        self._rules: list[tuple[frozenset[str], re.Pattern[str], str]] = []
-        for rule in rules:
-            words, _, rest = rule.partition(":: ")
-            pattern, _, replacement = rest.partition("=>")
-            full = named.sub(lambda name: parts[name[0]], pattern.removesuffix(" "))
-            self._rules.append((frozenset(words.split()), re.compile(full), replacement))
-        self._triggers = frozenset().union(*(words for words, _, _ in self._rules))
+    kind: str
+    value: Value
+    text: str
 
-    def leaves(self, present: Collection[str]) -> bool:
-        """Return whether a text with these words stays as it is."""
-        return self._triggers.isdisjoint(present)
 
-    def apply(self, text: str, present: Collection[str]) -> str:
-        """Return a text with all replacements; `present` are its words."""
-        for triggers, pattern, replacement in self._rules:
-            if not triggers.isdisjoint(present):
-                changed = " ".join(pattern.sub(f"{replacement} ", text).split())
-                if changed != text:
-                    text, present = changed, frozenset(changed.split())
-        return text
+class Chunks:
+    """A sentence in which phrases are replaced, step by step, by chunks: words such as ``thing#3``.
+
+    Attributes:
+        text: what is left of it, with spaces between the words.
+    """
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self._values: list[Value] = []
+        self._words: list[str] = []
+
+    def replace(
+        self, kind: str, pattern: re.Pattern[str], read: Callable[[re.Match[str]], Value]
+    ) -> bool:
+        """Replace each match of a pattern by a chunk: *the red cube* by ``thing#3``.
+
+        Args:
+            kind: of the chunk, ``thing``.
+            pattern: of the words.
+            read: returns what the words mean; None leaves them as they are.
+
+        Returns:
+            Whether something was replaced.
+        """
+
+        def chunk(found: re.Match[str]) -> str:
+            words = found[0]
+            value = read(found)
+            if value is None:
+                return words
+            number = len(self._values)
+            self._values.append(value)
+            self._words.append(words)
+            space = " " if words.endswith(" ") else ""  # which the match has taken
+            return f"{kind}#{number}{space}"
+
+        before = self.text
+        self.text = pattern.sub(chunk, self.text)
+        return self.text != before
+
+    def value(self, word: str) -> Value:
+        """Return the value of a chunk."""
+        return self._values[int(word.partition("#")[2])]
+
+    def tokens(self) -> Iterator[Token]:
+        """Yield each chunk and each other word, in order.
+
+        Words of a chunk within a chunk are left out.
+        """
+        for word in self.text.split():
+            kind, mark, number = word.partition("#")
+            if mark:
+                yield Token(kind, self.value(word), self._words[int(number)])
+            else:
+                yield Token(word, None, word)

@@ -1,401 +1,268 @@
-"""Places: read the words for a place, and find what stands there.
+"""Places: what stands at a place on the table.
 
-A place orders all things of one kind along a direction, or by their distance from something, and
-means the first, second, ... of that order.
+A place orders things along a direction, or by their distance from something, and means the first,
+second, ... of that order. Where words can mean several measures or things, all of them are found.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from typing import Literal, NamedTuple
 
-from roboirg.core.episode import Scene, SceneObject
-from roboirg.core.motions import Away
-from roboirg.reader.tokens import Sentence, color_of, number_of, ordinal_of
+from roboirg.core.episode import ROBOT_BASE, Scene, SceneObject
+from roboirg.core.motions import Away, Point
 
 Side = Literal["left", "right"]
-_SIDES: dict[str, Side] = {"left": "left", "right": "right"}
-_OUTERMOST: dict[str, Side] = {"leftmost": "left", "rightmost": "right"}
-_NEAR = frozenset({"near", "close", "closest", "nearest", "front"})
-_FAR = frozenset({"far", "farthest", "furthest", "away", "back"})
-_NEAREST = frozenset({"closest", "nearest"})
-_FARTHEST = frozenset({"farthest", "furthest"})
-_ROBOT = frozenset({"you", "robot", "yourself"})
-_FIXTURES = frozenset({"button", "target", "bin"})
-_OWNERS = frozenset({"your", "camera's"})
-_FILLERS = frozenset({"the", "to", "from", "a", "on", "at"}) | _OWNERS
-_CORNER_FILLERS = frozenset({"of", "the", "table", "that", "is"})
-_THINGS = frozenset({"cube", "container", "box", "tape"})
-_COLORED = _THINGS - {"container"}
-_PAIRED = _COLORED - {"cube"}
-_BOTH = frozenset({"boxes", "tapes"})
-_TO_A_SIDE = frozenset({"on", "to", "at"})
-_SIDE_FILLERS = frozenset({"the", "far"}) | _OWNERS
+Things = Sequence[SceneObject]
+Measure = Callable[[SceneObject], float]
+"""The order of things, small values first."""
 
-_MAX_DEPTH = 4
-"""Levels of places that other places describe; deeper ones are not read."""
-
-_TABLE_FRONT, _TABLE_BACK = -0.7402, 0.4689
-_TABLE_RIGHT, _TABLE_LEFT = -1.2149, 1.2030
-"""Edges of the table's top, x and y in the world frame."""
+_TABLE = {"front": -0.7402, "back": 0.4689, "left": 1.2030, "right": -1.2149}
+"""Edges of the table's top, x of the first two and y of the others in the world frame."""
+_WORK_AREA = {"front": -0.3, "back": 0.2, "left": 0.25, "right": -0.25}
+"""The same of the area where things stand."""
+_CENTER_X = -0.05
+"""Of the center of the work area."""
+_ASIDE = 0.03
+"""Meters from the center from which on more than the first thing may be *on the left*."""
+_TANGENT_ASIDE = 6 / 128
+"""The same as a tangent: six pixels."""
 _CAMERA = (0.3, 0.0, 0.4)
 _VIEW = (-0.3, 0.0, -0.6)
 """The front camera's eye and where it looks from there."""
 _CUBE_HEIGHT = 0.02
-TIE = 0.01
+_TIE = 0.01
 """Meters; the same words may mean things that differ by less."""
 _TANGENT_TIE = 2 / 128
 """Two pixels, as a tangent: the picture is 256 pixels wide and 90 degrees."""
+_WIDE_TIE = 0.03
+"""Meters, for *next to*, *between* and *in the middle*."""
 
 
-@dataclass(frozen=True, slots=True)
-class DirectionalPlace:
-    """A place along a direction of the table, or towards a corner if it has a side and a depth.
-
-    Attributes:
-        side: side of the robot, or None.
-        depth: +1 away from the robot, -1 towards it, 0 neither.
-        rank: 1 for the thing farthest in this direction.
-    """
-
-    side: Side | None
-    depth: int
-    rank: int = 1
-
-
-@dataclass(frozen=True, slots=True)
-class RelativePlace:
-    """A place by its distance from an anchor.
+class Place(NamedTuple):
+    """A place, as words name it.
 
     Attributes:
-        anchor: kind of a fixture, a color, or a place.
-        kind: kind of the anchor.
-        nearest: whether small distances come first.
-        rank: 1 for the first.
-    """
-
-    anchor: str | Place
-    kind: str
-    nearest: bool
-    rank: int = 1
-
-
-@dataclass(frozen=True, slots=True)
-class MemberPlace:
-    """A place among the few things at another one.
-
-    Attributes:
-        member: the place within the group.
-        group: where its things stand.
+        kind: ``side``, ``depth`` and ``corner`` are directions; ``distance`` and ``between`` are
+            about anchors; ``aside`` is to a side of an anchor; ``middle``.
+        side: left or right of the robot, or of the picture.
+        depth: +1 away from the robot, -1 towards it; of ``distance``, +1 for the farthest.
+        rank: 1 for the first thing in this order.
+        is_loose: whether *on the left* may mean any of several things there.
+        is_mirrored: whether left and right are those of the front camera's picture.
+        anchors: kinds of fixtures, or descriptions of things, for which `find_anchors` looks.
+        group: where the few things stand among which it is; None for all.
         size: number of things in the group.
     """
 
-    member: Place
-    group: Place
-    size: int
+    kind: Literal["side", "depth", "corner", "distance", "between", "aside", "middle"]
+    side: Side | None = None
+    depth: int = 0
+    rank: int = 1
+    is_loose: bool = False
+    is_mirrored: bool = False
+    anchors: tuple[object, ...] = ()
+    group: Place | None = None
+    size: int = 0
 
 
-Place = DirectionalPlace | RelativePlace | MemberPlace
+FindAnchors = Callable[[object], Things]
+"""Returns all things that an anchor may mean."""
 
 
-Measure = Callable[[SceneObject], float]
-"""The order of things, small values first."""
+class _Nearness(NamedTuple):
+    """Things in an order.
 
+    Attributes:
+        things: in no order yet.
+        measure: the first thing has the smallest.
+        tie: things that differ by no more may stand for each other.
+    """
 
-class NamedPlace(NamedTuple):
-    """A place, and whether the words before it say that a cube is there, not a container."""
+    things: Things
+    measure: Measure
+    tie: float
 
-    place: Place
-    of_cube: bool = False
+    def of_rank(self, rank: int) -> Things:
+        """Return the things of a rank, from 1, with those that tie with them."""
+        if rank > len(self.things):
+            return ()
+        wanted = sorted(map(self.measure, self.things))[rank - 1]
+        return [thing for thing in self.things if abs(self.measure(thing) - wanted) <= self.tie]
 
-
-class ReadPlace(NamedTuple):
-    """A place, and the index after its last word."""
-
-    place: Place
-    end: int
-
-
-class PlaceMention(NamedTuple):
-    """A place, and from which word to which it goes."""
-
-    place: Place
-    start: int
-    end: int
-
-
-def place_mentions(words: Sentence) -> Iterator[PlaceMention]:
-    """Yield every place that a sentence names, in order."""
-    at = 0
-    while at < len(words):
-        read = _read(words, at)
-        if read is None:
-            at += 1
-        else:
-            yield PlaceMention(read.place, at, read.end)
-            at = read.end
-
-
-def read_places(words: Sentence) -> tuple[NamedPlace, ...]:
-    """Return every place that a sentence names, in order."""
-    return tuple(
-        NamedPlace(mention.place, _is_of_cube(words[: mention.start]))
-        for mention in place_mentions(words)
-    )
-
-
-def _is_of_cube(before: Sentence) -> bool:
-    nouns = (word.removesuffix("s") for word in reversed(before))
-    return next((noun for noun in nouns if noun in _THINGS), None) == "cube"
-
-
-def _read(words: Sentence, at: int, depth: int = 0) -> ReadPlace | None:
-    """Return the place whose words begin at this word; None if none does."""
-    read = _read_one(words, at, depth)
-    return None if read is None else _read_group(words, *read, depth) or read
-
-
-def _read_group(words: Sentence, member: Place, at: int, depth: int) -> ReadPlace | None:
-    """Read ``among the two at the far left``, after the place of one of them."""
-    number = _skip(words, at + 1)
-    size = number_of(_word(words, number))
-    if _word(words, at) != "among" or size is None or depth >= _MAX_DEPTH:
-        return None
-    start = _skip(words, number + 1)
-    if _word(words, start).removesuffix("s") in _THINGS:
-        start = _skip(words, start + 1)
-    group = _read(words, start, depth + 1)
-    if group is None:
-        return None
-    return ReadPlace(MemberPlace(member, group.place, size), group.end)
-
-
-def _read_one(words: Sentence, at: int, depth: int) -> ReadPlace | None:
-    """Read a place that is not one among others."""
-    word = _word(words, at)
-    rank = ordinal_of(word)
-    if rank is not None:
-        return _read_from(words, at + 1, rank) or _read_relative(words, at + 1, rank, depth)
-    if word in _OUTERMOST:
-        return ReadPlace(DirectionalPlace(_OUTERMOST[word], 0), at + 1)
-    return (
-        _read_side(words, at)
-        or _read_corner(words, at)
-        or _read_extreme(words, at)
-        or _read_relative(words, at, 1, depth)
-    )
-
-
-def _read_side(words: Sentence, at: int) -> ReadPlace | None:
-    """Read ``left box``, ``box on your left and the one on your right``, ``boxes on the left``."""
-    word, following = _word(words, at), _word(words, at + 1)
-    if word in _SIDES and following in _PAIRED:
-        return ReadPlace(DirectionalPlace(_SIDES[word], 0), at + 2)
-    second = (word == "and" and not _BOTH.isdisjoint(words[:at])) or (
-        word == "one" and not _PAIRED.isdisjoint(words[:at])
-    )
-    if not (word in _PAIRED | _BOTH or second) or following not in _TO_A_SIDE:
-        return None
-    after = at + 2
-    while _word(words, after) in _SIDE_FILLERS:
-        after += 1
-    side = _SIDES.get(_word(words, after))
-    if side is None or _word(words, after + 1) in ("corner", *_PAIRED):
-        return None
-    return ReadPlace(DirectionalPlace(side, 0), after + 1)
-
-
-def _read_extreme(words: Sentence, at: int) -> ReadPlace | None:
-    """Read ``far left``, ``furthest to the right``."""
-    if _word(words, at) not in _FAR:
-        return None
-    after = _skip(words, at + 1)
-    side = _SIDES.get(_word(words, after))
-    return None if side is None else ReadPlace(DirectionalPlace(side, 0), after + 1)
-
-
-def _read_corner(words: Sentence, at: int) -> ReadPlace | None:
-    """Read ``near left corner``, ``closest to the left corner that is far from you``."""
-    start = at
-    if _word(words, at) in _NEAREST:
-        start = _skip(words, at + 1)
-    word = _word(words, start)
-    if word in _SIDES and _word(words, start + 1) == "corner":
-        after = start + 2
-        while _word(words, after) in _CORNER_FILLERS:
-            after += 1
-        depth = _depth(_word(words, after))
-        robot = _skip(words, after + 1)
-        if depth and _word(words, robot) in _ROBOT:
-            return ReadPlace(DirectionalPlace(_SIDES[word], depth), robot + 1)
-    side, depth = _SIDES.get(_word(words, start + 1)), _depth(word)
-    if side is not None and depth and _word(words, start + 2) == "corner":
-        return ReadPlace(DirectionalPlace(side, depth), start + 3)
-    return None
-
-
-def _read_from(words: Sentence, at: int, rank: int) -> ReadPlace | None:
-    """Read ``from the left``, after an ordinal."""
-    if _word(words, at) != "from":
-        return None
-    after = _skip(words, at)
-    word = _word(words, after)
-    if word in _SIDES:
-        return ReadPlace(DirectionalPlace(_SIDES[word], 0, rank), after + 1)
-    if word in ("front", "back"):
-        return ReadPlace(DirectionalPlace(None, -1 if word == "front" else 1, rank), after + 1)
-    return None
-
-
-def _read_relative(words: Sentence, at: int, rank: int, depth: int) -> ReadPlace | None:
-    """Read ``closest to you``, ``farthest from the button``, ``nearest to the red cube``."""
-    word = _word(words, at)
-    if word not in _NEAREST and word not in _FARTHEST:
-        return None
-    nearest = word in _NEAREST
-    after = _skip(words, at + 1)
-    noun, following = _word(words, after), _word(words, after + 1)
-    if noun in _ROBOT:
-        return ReadPlace(DirectionalPlace(None, -1 if nearest else 1, rank), after + 1)
-    if noun in _FIXTURES:
-        return _read_fixture(words, after, nearest=nearest, rank=rank)
-    if color_of(noun) and following in _COLORED:
-        return ReadPlace(RelativePlace(noun, following, nearest, rank), after + 2)
-    if noun in _THINGS and depth < _MAX_DEPTH:
-        inner = _read(words, _skip(words, after + 1), depth + 1)
-        if inner is not None:
-            return ReadPlace(RelativePlace(inner.place, noun, nearest, rank), inner.end)
-    return None
-
-
-def _read_fixture(words: Sentence, at: int, *, nearest: bool, rank: int) -> ReadPlace | None:
-    """Read ``button``, ``target on your left``."""
-    noun, side = words[at], _SIDES.get(_word(words, at + 3))
-    if side is not None and words[at + 1 : at + 3] in (("on", "your"), ("on", "the")):
-        return ReadPlace(RelativePlace(DirectionalPlace(side, 0), noun, nearest, rank), at + 4)
-    return ReadPlace(RelativePlace(noun, noun, nearest, rank), at + 1)
-
-
-def _word(words: Sentence, at: int) -> str:
-    return words[at] if at < len(words) else ""
-
-
-def _skip(words: Sentence, at: int) -> int:
-    while _word(words, at) in _FILLERS:
-        at += 1
-    return at
-
-
-def _depth(word: str) -> int:
-    return -1 if word in _NEAR else 1 if word in _FAR else 0
+    def on_side(self) -> Things:
+        """Return the things that are clearly on a side: past the center by some centimeters."""
+        # The center counts as a thing, so that it is measured like one.
+        center = SceneObject("center", "site", Point(_center_x(self.things), 0.0, _CUBE_HEIGHT))
+        aside = _ASIDE
+        if self.tie == _TANGENT_TIE:
+            aside = _TANGENT_ASIDE
+        start = self.measure(center) - aside
+        return [thing for thing in self.things if self.measure(thing) <= start]
 
 
 def find_objects(
-    place: Place, scene: Scene, kind: str, *, mirrored: bool
+    place: Place, candidates: Things, find_anchors: FindAnchors
 ) -> tuple[SceneObject, ...]:
-    """Return what stands at a place among the things of one kind; several for near ties.
+    """Return the things that a place may mean: for *second from the left*, the second one.
 
-    Cubes that appear later are not compared; containers appear together. If `mirrored`, left and
-    right are those of the front camera's picture.
+    Several are returned where words can mean several orders, or where things tie.
+
+    Args:
+        place: as words name it.
+        candidates: the things.
+        find_anchors: returns the things that *the button* or *the red cube* in it may mean.
     """
-    return _find(place, present(scene, kind), scene, mirrored=mirrored)
-
-
-def _find(
-    place: Place, candidates: list[SceneObject], scene: Scene, *, mirrored: bool
-) -> tuple[SceneObject, ...]:
     found: list[SceneObject] = []
-    if isinstance(place, MemberPlace):
-        for group in _groups(place, candidates, scene, mirrored=mirrored):
-            found += _find(place.member, group, scene, mirrored=mirrored)
-    else:
-        for others, measure, tie in _orders(place, candidates, scene, mirrored=mirrored):
-            found += ranked(others, place.rank, measure, tie)
+    if place.group is not None:
+        alone = place._replace(group=None)
+        for few_things in _groups(place.group, place.size, candidates, find_anchors):
+            found += find_objects(alone, few_things, find_anchors)
+        return tuple(dict.fromkeys(found))
+    for order in _orders(place, candidates, find_anchors):
+        found += order.of_rank(place.rank)
+        if place.is_loose and place.kind != "distance":
+            found += order.on_side()
     return tuple(dict.fromkeys(found))
 
 
-def _groups(
-    place: MemberPlace, candidates: list[SceneObject], scene: Scene, *, mirrored: bool
-) -> Iterator[list[SceneObject]]:
-    """Yield the things that may be meant by a group; several for near ties at its border."""
-    if isinstance(place.group, MemberPlace) or place.group.rank != 1:
-        return
-    for others, measure, tie in _orders(place.group, candidates, scene, mirrored=mirrored):
-        border = ranked(others, place.size, measure, tie)
-        if not border:
-            continue
-        outside = [item for item in others if measure(item) > max(map(measure, border))]
-        inside = len(others) - len(border) - len(outside)
-        for dropped in itertools.combinations(border, len(border) + inside - place.size):
-            yield [item for item in others if item not in (*outside, *dropped)]
-
-
-def _orders(
-    place: DirectionalPlace | RelativePlace,
-    candidates: list[SceneObject],
-    scene: Scene,
-    *,
-    mirrored: bool,
-) -> Iterator[tuple[list[SceneObject], Measure, float]]:
-    """Yield what to compare, by what measure, and the margin of a tie; once for each anchor."""
-    if isinstance(place, DirectionalPlace):
-        yield (candidates, *_measure(place, mirrored=mirrored))
-        return
-    for anchor in _anchors(place, scene, mirrored=mirrored):
-        away = _distance_to(*anchor.position[:2], 1.0 if place.nearest else -1.0)
-        yield [item for item in candidates if item is not anchor], away, TIE
-
-
-def present(scene: Scene, kind: str) -> list[SceneObject]:
+def things_of(scene: Scene, kind: str) -> Things:
     """Return the things of a kind, open or hidden, without cubes that appear later."""
-    late: set[str] = set()
-    if kind == "cube":
-        late = {motion.subject for motion in scene.motions_of(Away) if motion.start == 0}
-    kinds = ("cube", "hidden_cube") if kind == "cube" else (kind,)
-    return [item for item in scene.objects if item.kind in kinds and item.name not in late]
+    if kind != "cube":
+        return scene.of_kind(kind)
+    late = {motion.subject for motion in scene.motions_of(Away) if motion.start == 0}
+    cubes = [*scene.of_kind("cube"), *scene.of_kind("hidden_cube")]
+    return [cube for cube in cubes if cube.name not in late]
 
 
-def ranked(
-    items: list[SceneObject], rank: int, measure: Measure, tie: float
-) -> tuple[SceneObject, ...]:
-    """Return the items of a rank, small measures first, with those that tie with them."""
-    if rank > len(items):
-        return ()
-    wanted = sorted(map(measure, items))[rank - 1]
-    return tuple(item for item in items if abs(measure(item) - wanted) <= tie)
+def _groups(
+    place: Place, size: int, candidates: Things, find_anchors: FindAnchors
+) -> Iterator[Things]:
+    """Yield the things that a group may mean: for *the two in the back*, the two farthest.
+
+    Two groups where the last one in it and the next one tie.
+    """
+    for order in _orders(place, candidates, find_anchors):
+        ordered = sorted(order.things, key=order.measure)
+        if place.rank != 1 or not 0 < size < len(ordered):
+            continue  # "the second on the left" is no group, and neither are all things
+        *inner, last = ordered[:size]
+        following = ordered[size]
+        yield [*inner, last]
+        if order.measure(following) - order.measure(last) <= order.tie:
+            yield [*inner, following]
 
 
-def _measure(place: DirectionalPlace, *, mirrored: bool) -> tuple[Measure, float]:
-    """Return the measure of a direction, the smallest first, and the margin of a tie."""
-    if place.side is None:
-        return lambda item: -place.depth * item.position.x, TIE
-    left_of_robot = (place.side == "left") != mirrored
-    if place.depth:
-        x = _TABLE_FRONT if place.depth < 0 else _TABLE_BACK
-        return _distance_to(x, _TABLE_LEFT if left_of_robot else _TABLE_RIGHT, 1.0), TIE
-    if not mirrored:
-        return lambda item: -item.position.y if left_of_robot else item.position.y, TIE
-    return lambda item: _tangent(item) * (-1.0 if left_of_robot else 1.0), _TANGENT_TIE
+def _orders(place: Place, candidates: Things, find_anchors: FindAnchors) -> Iterator[_Nearness]:
+    """Yield the orders that a place can mean: from the left, by the distance from the bin.
+
+    For *second from the left*, the thing is then the second one in the order.
+    """
+    if place.kind in ("side", "depth", "corner", "middle"):
+        yield from _direction_orders(place, candidates)
+        return
+    first, *others = [find_anchors(anchor) for anchor in place.anchors]
+    for anchor in first:
+        if place.kind == "between":
+            for other in others[0]:
+                yield _order_between(anchor, other, candidates)
+        elif place.kind == "aside":
+            yield _order_aside(place, anchor, candidates)
+        else:
+            yield _order_by_distance(place, anchor, candidates)
 
 
-def _distance_to(x: float, y: float, sign: float) -> Measure:
-    return lambda item: sign * math.dist(item.position[:2], (x, y))
+def _order_between(anchor: SceneObject, other: SceneObject, candidates: Things) -> _Nearness:
+    """Return the order by the way from one thing to another over a third, shortest first."""
+    others = [thing for thing in candidates if thing not in (anchor, other)]
+    return _Nearness(others, _detour(anchor, other), _WIDE_TIE)
 
 
-def _tangent(item: SceneObject) -> float:
+def _order_aside(place: Place, anchor: SceneObject, candidates: Things) -> _Nearness:
+    """Return the things on a side of an anchor, all alike: any of them may be meant."""
+    across = _sideways(place)
+    aside: list[SceneObject] = []
+    for thing in candidates:
+        if thing is not anchor and across(thing) < across(anchor):
+            aside.append(thing)
+    return _Nearness(aside, lambda _thing: 0.0, 0.0)
+
+
+def _order_by_distance(place: Place, anchor: SceneObject, candidates: Things) -> _Nearness:
+    """Return the order by the distance from an anchor, the nearest first, or the farthest."""
+    others = [thing for thing in candidates if thing is not anchor]
+    tie = _WIDE_TIE if place.is_loose else _TIE
+    sign = -1.0 if place.depth > 0 else 1.0
+    return _Nearness(others, _distance(anchor.position[:2], sign), tie)
+
+
+def _direction_orders(place: Place, candidates: Things) -> Iterator[_Nearness]:
+    """Yield the orders along a direction, or from the middle."""
+    if place.kind == "side":
+        tie = _TANGENT_TIE if place.is_mirrored else _TIE
+        yield _Nearness(candidates, _sideways(place), tie)
+    elif place.kind == "depth":
+        # People may mean depth or distance; what stands aside is farther away than it is deep.
+        yield _Nearness(candidates, lambda thing: -place.depth * thing.position.x, _TIE)
+        yield _Nearness(candidates, _distance(ROBOT_BASE[:2], -place.depth), _TIE)
+    elif place.kind == "corner":
+        yield from _corner_orders(place, candidates)
+    else:
+        yield from _middle_orders(candidates)
+
+
+def _corner_orders(place: Place, candidates: Things) -> Iterator[_Nearness]:
+    """Yield the orders by the distance from a corner of the table, and of the work area."""
+    end = "back" if place.depth > 0 else "front"
+    is_left = (place.side == "left") != place.is_mirrored
+    side = "left" if is_left else "right"
+    for area in (_TABLE, _WORK_AREA):
+        yield _Nearness(candidates, _distance((area[end], area[side])), _TIE)
+
+
+def _middle_orders(candidates: Things) -> Iterator[_Nearness]:
+    """Yield the orders in which the thing *in the middle* is first.
+
+    They are by the distance from the center, and, of an odd number of things, from the middle one.
+    """
+    yield _Nearness(candidates, _distance((_center_x(candidates), 0.0)), _WIDE_TIE)
+    if len(candidates) % 2 == 1:
+        row = sorted(thing.position.y for thing in candidates)
+        middle = row[len(row) // 2]
+        yield _Nearness(candidates, lambda thing: abs(thing.position.y - middle), _TIE)
+
+
+def _center_x(things: Things) -> float:
+    """Return the x of the center: of the work area, or halfway between the things."""
+    if len(things) < 2:  # noqa: PLR2004
+        return _CENTER_X
+    depths = [thing.position.x for thing in things]
+    return (min(depths) + max(depths)) / 2
+
+
+def _sideways(place: Place) -> Measure:
+    """Return the measure of a side."""
+    sign = -1.0 if place.side == "left" else 1.0
+    if place.is_mirrored:
+        return lambda thing: sign * _tangent(thing)
+    return lambda thing: sign * thing.position.y
+
+
+def _distance(place: Sequence[float], sign: float = 1.0) -> Measure:
+    """Return the measure of the distance from x and y; with the sign -1, the farthest is first."""
+    return lambda thing: sign * math.dist(thing.position[:2], place)
+
+
+def _detour(first: SceneObject, second: SceneObject) -> Measure:
+    """Return how long the way between two things is over another one."""
+    to_first = _distance(first.position[:2])
+    to_second = _distance(second.position[:2])
+    return lambda thing: to_first(thing) + to_second(thing)
+
+
+def _tangent(thing: SceneObject) -> float:
     """Return the tangent of the horizontal angle from the front camera's axis to something."""
-    offset = [part - eye for part, eye in zip(item.position[:2], _CAMERA[:2], strict=True)]
-    ahead = offset[0] * _VIEW[0] + offset[1] * _VIEW[1] + (_CUBE_HEIGHT - _CAMERA[2]) * _VIEW[2]
-    return item.position.y * math.hypot(*_VIEW) / ahead
-
-
-def _anchors(place: RelativePlace, scene: Scene, *, mirrored: bool) -> tuple[SceneObject, ...]:
-    if not isinstance(place.anchor, str):
-        return find_objects(place.anchor, scene, place.kind, mirrored=mirrored)
-    like = present(scene, place.kind)
-    if color_of(place.anchor):
-        like = [item for item in like if item.color == place.anchor]
-    return tuple(like) if len(like) == 1 else ()
+    to_x, to_y = thing.position.x - _CAMERA[0], thing.position.y - _CAMERA[1]
+    ahead = to_x * _VIEW[0] + to_y * _VIEW[1] + (_CUBE_HEIGHT - _CAMERA[2]) * _VIEW[2]
+    return -thing.position.y * math.hypot(*_VIEW) / ahead

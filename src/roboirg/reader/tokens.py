@@ -11,9 +11,16 @@ _WORD = re.compile(
     r"[0-9]+(?:st|nd|rd|th)\b|[0-9]+[.][0-9]+|[^\W\d_]+(?:'[^\W\d_]+)?|[0-9]+|[,;:]|[^\W_]"
 )
 _SENTENCE_END = re.compile(r"(?:[.](?![0-9])|[!?\n])+")
+_LIST_MARK = re.compile(r"(?:^|(?<=[.;:,\n]))\s*(?:step )?(?:[0-9][.):]|[-*•])\s+", re.MULTILINE)
+"""*1.*, *2)*, *Step 3:* and the like, in front of the sentences of a plan."""
 _MINUS = re.compile(r"(?<!\w)[-−](?=[0-9])")
 _SPELLINGS = (
     ("’", "'"),
+    ("->", " to "),
+    ("→", " to "),
+    (" + ", " and "),
+    (" & ", " and "),
+    ("(s)", "s"),
     ("cannot", "can not"),
     ("can't", "can not"),
     ("won't", "will not"),
@@ -27,11 +34,9 @@ _SPELLINGS = (
     ("that's ", "that is "),
     ("what's ", "what is "),
     ("where's ", "where is "),
-    ("->", " to "),
-    (" + ", " and "),
-    ("(s)", "s"),
     ("colour", "color"),
     ("neighbour", "neighbor"),
+    ("centre", "center"),
     ("grey", "gray"),
 )
 
@@ -40,6 +45,8 @@ _NUMBERS = {
     "eight": 8, "nine": 9, "ten": 10, "eleven": 11, "twelve": 12, "thirteen": 13, "fourteen": 14,
     "fifteen": 15, "sixteen": 16, "seventeen": 17, "eighteen": 18, "nineteen": 19, "twenty": 20,
 }  # fmt: skip
+ADVERBS = {"once": 1, "twice": 2, "thrice": 3}
+"""Numbers of repetitions in one word."""
 _ORDINALS = {
     "first": 1, "second": 2, "third": 3, "fourth": 4, "fifth": 5,
     "sixth": 6, "seventh": 7, "eighth": 8, "ninth": 9, "tenth": 10,
@@ -47,7 +54,9 @@ _ORDINALS = {
     "6th": 6, "7th": 7, "8th": 8, "9th": 9, "10th": 10,
 }  # fmt: skip
 _COLOR_NAMES = ("red", "green", "blue", "yellow", "gray", "purple")
-_COLORS = {word: name for name in _COLOR_NAMES for word in (name, f"{name}s")}
+_COLORS = dict(zip(_COLOR_NAMES, _COLOR_NAMES, strict=True))
+for _name in _COLOR_NAMES:
+    _COLORS[f"{_name}s"] = _name
 
 
 def word_set(words: str) -> frozenset[str]:
@@ -56,13 +65,24 @@ def word_set(words: str) -> frozenset[str]:
 
 
 SYNONYMS = {
-    "block": "cube", "blocks": "cubes", "circle": "target", "circles": "targets",
-    "trash": "bin", "cup": "container", "cups": "containers", "lid": "container",
-    "movie": "video", "demo": "video", "clip": "video", "repick": "pick", "till": "until",
+    "block": "cube", "blocks": "cubes", "brick": "cube", "bricks": "cubes",
+    "circle": "target", "circles": "targets", "disc": "target", "discs": "targets",
+    "disk": "target", "disks": "targets", "pad": "target", "plate": "target",
+    "trash": "bin", "bucket": "bin", "basket": "bin",
+    "cup": "container", "cups": "containers", "lid": "container", "lids": "containers",
+    "bowl": "container", "bowls": "containers",
+    "movie": "video", "demo": "video", "clip": "video", "demonstration": "video",
+    "recording": "video", "image": "picture", "photo": "picture", "repick": "pick",
+    "till": "until", "furthest": "farthest", "center": "middle", "centermost": "middle",
+    "central": "middle", "onto": "on", "upon": "on", "inside": "in", "into": "in",
+    "immediately": "right",
 }  # fmt: skip
 """Words that are read as others; `vocabulary.register_words` adds those of other packages."""
 
-FILLERS = word_set("please okay kindly carefully gently slowly quickly softly neatly calmly")
+FILLERS = word_set(
+    "please okay ok kindly carefully gently slowly quickly softly neatly calmly just simply only "
+    "exactly precisely uh um er thanks safely firmly carefully successfully"
+)
 """Words that change nothing in any position; `split_sentences` drops them."""
 
 _LARGEST_NUMBER = 10**9
@@ -80,26 +100,24 @@ ORDINAL = rf"(?:{_alternatives(_ORDINALS)})"
 """A regular expression for an ordinal number."""
 COLOR = rf"(?:{_alternatives(_COLOR_NAMES)})"
 """A regular expression for a color."""
-THING = r"(?:cube|box|tape)"
-"""A regular expression for a thing that has a color."""
-THINGS = r"(?:cubes|boxes|tapes)"
-"""The plural of `THING`."""
 
 
 def split_sentences(text: str) -> tuple[Sentence, ...]:
     """Return the sentences of a text as words and commas, without fillers and empty sentences.
 
-    American and British spelling, and short forms of *not*, give the same words.
+    ``"Please lift it. It's grey!"`` gives ``(("lift", "it"), ("it", "is", "gray"))``: British
+    spelling and short forms give the same words as others, and known synonyms become one word.
     """
-    text = text.lower()
+    text = _LIST_MARK.sub("\n", text.lower())
     for variant, usual in _SPELLINGS:
         text = text.replace(variant, usual)
     text = _MINUS.sub("minus ", text)
-    parts = (_WORD.findall(part) for part in _SENTENCE_END.split(text))
-    kept = (
-        tuple(SYNONYMS.get(word, word) for word in part if word not in FILLERS) for part in parts
-    )
-    return tuple(part for part in kept if part)
+    sentences: list[Sentence] = []
+    for part in _SENTENCE_END.split(text):
+        words = [SYNONYMS.get(word, word) for word in _WORD.findall(part) if word not in FILLERS]
+        if words:
+            sentences.append(tuple(words))
+    return tuple(sentences)
 
 
 def number_of(word: str) -> int | None:
@@ -117,8 +135,3 @@ def ordinal_of(word: str) -> int | None:
 def color_of(word: str) -> str | None:
     """Return the color that a word names, as an adjective or a noun."""
     return _COLORS.get(word)
-
-
-def colors_in(words: Sentence) -> tuple[str, ...]:
-    """Return all colors that a sentence names, in order."""
-    return tuple(_COLORS[word] for word in words if word in _COLORS)

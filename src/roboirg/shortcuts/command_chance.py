@@ -1,35 +1,32 @@
 """What an instruction leaves open: all of it, its command alone, and a blind guess.
 
-Language 4 declares its meaning. The words of language 3 are read by the interpreter.
+All of it is asked of the declared meaning. Words without one, such as scrambled ones, leave no
+goal.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 from fractions import Fraction
-from typing import cast
 
-from roboirg.core.episode import Episode, Goal, SlotValue, values_in
-from roboirg.core.instruction_options import DEFAULT_LANGUAGE
+from roboirg.core.episode import Episode, Goal
 from roboirg.language import meaning
 from roboirg.language.instruction import Instruction
-from roboirg.language.templates import LANGUAGE_VERSIONS
-from roboirg.reader import interpret
-from roboirg.tasks import get_task, goals_of
+from roboirg.tasks import get_task
 
 
 def understood_goals(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
     """Return the goals that fit all of an instruction; none if it has no meaning."""
-    if instruction.meaning is not None:
-        return meaning.meant_goals(instruction.meaning, episode)
-    return _read(instruction, instruction.text, episode)
+    if instruction.meaning is None:
+        return ()
+    return meaning.meant_goals(instruction.meaning, episode)
 
 
 def goals_of_command(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
     """Return the goals that fit its last utterance alone; none if it has no meaning."""
-    if instruction.meaning is not None:
-        return meaning.command_goals(instruction.meaning, episode)
-    return _read(instruction, instruction.command, episode)
+    if instruction.meaning is None:
+        return ()
+    return meaning.command_goals(instruction.meaning, episode)
 
 
 def blind_goals(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
@@ -38,34 +35,9 @@ def blind_goals(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
     Where the context names the candidates, as with a rival, it is a guess among them: to pick one
     of two takes no understanding of which one is meant. None are returned without a meaning.
     """
-    if instruction.meaning is not None:
-        return meaning.candidate_goals(instruction.meaning, episode)
-    fitting = goals_of_command(instruction, episode)
-    candidates = cast("Mapping[str, list[str | int]]", instruction.metadata["candidates"])
-    if not candidates:
-        return fitting
-    shapes = [_shape(goal, candidates) for goal in fitting]
-    return tuple(
-        goal
-        for goal in goals_of(episode)
-        if _shape(goal, candidates) in shapes
-        and all(set(values_in(goal[slot])) <= set(values) for slot, values in candidates.items())
-    )
-
-
-def _read(instruction: Instruction, text: str, episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals that the interpreter reads; none in a language that declares its meaning."""
-    if instruction.metadata["language_version"] != LANGUAGE_VERSIONS[DEFAULT_LANGUAGE]:
+    if instruction.meaning is None:
         return ()
-    return interpret(text, episode.scene, episode.task).goals
-
-
-def _shape(goal: Goal, candidates: Collection[str]) -> list[tuple[str, SlotValue]]:
-    """Return a goal with the number of values in place of those of the candidates."""
-    return [
-        (slot, len(set(values_in(value))) if slot in candidates else value)
-        for slot, value in goal.slots
-    ]
+    return meaning.candidate_goals(instruction.meaning, episode)
 
 
 def right_share(goals: Sequence[Goal], episode: Episode) -> Fraction | None:

@@ -37,23 +37,35 @@ GoalVocabulary = Mapping[str, SlotVocabulary]
 
 @functools.cache
 def goal_vocabulary(task: str) -> GoalVocabulary:
-    """Return the slots of a task's goals, with all values that occur in any scene of train."""
-    found: dict[str, list[SlotValue]] = {}
+    """Return the slots of a task's goals, with all values that occur in any scene of train.
+
+    PickXtimes -> ``color`` with blue, green and red, ``repeats`` with 1 to 5.
+    """
+    contents: dict[str, set[SlotValue]] = {}
     for episode in split_episodes([task], [SPLIT]):
         for goal in get_task(task).goals(episode.scene):
-            for slot, value in goal.slots:
-                found.setdefault(slot, []).append(value)
-    return {slot: _vocabulary(set(values)) for slot, values in found.items()}
+            for slot, content in goal.slots:
+                contents.setdefault(slot, set()).add(content)
+    return {slot: _vocabulary(found) for slot, found in contents.items()}
 
 
 def _vocabulary(contents: set[SlotValue]) -> SlotVocabulary:
-    values = {value for content in contents for value in values_in(content)}
-    return SlotVocabulary(
-        # Numbers in their order; a slot holds either numbers or words.
-        values=tuple(sorted(values, key=lambda value: (isinstance(value, str), value))),
-        longest=max(len(values_in(content)) for content in contents),
-        several=any(isinstance(content, tuple) for content in contents),
-    )
+    """Return what a slot may hold, given all that it was seen to hold.
+
+    ``("red",)`` and ``("blue", "red")`` -> the values blue and red, at most two at a time.
+    """
+    values: set[Value] = set()
+    longest = 0
+    has_sequence = False
+    for content in contents:
+        found = values_in(content)
+        values.update(found)
+        longest = max(longest, len(found))
+        if isinstance(content, tuple):
+            has_sequence = True
+    # A slot holds numbers or words, no mixture; numbers are sorted by their size.
+    in_order = sorted(values, key=lambda value: (isinstance(value, str), value))
+    return SlotVocabulary(tuple(in_order), longest, several=has_sequence)
 
 
 def orders(goal: Goal) -> Iterator[Mapping[str, SlotValue]]:
@@ -65,9 +77,7 @@ def orders(goal: Goal) -> Iterator[Mapping[str, SlotValue]]:
     if not {"colors", "counts"} <= set(slots):
         yield slots
         return
-    for order in itertools.permutations(goal.amounts):
-        yield {
-            **slots,
-            "colors": tuple(color for color, _ in order),
-            "counts": tuple(count for _, count in order),
-        }
+    for amounts in itertools.permutations(goal.amounts):
+        colors = tuple(color for color, _ in amounts)
+        counts = tuple(count for _, count in amounts)
+        yield {**slots, "colors": colors, "counts": counts}

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
-from roboirg.reader.quantities import ADVERBS
 from roboirg.reader.tokens import (
+    ADVERBS,
     Sentence,
     color_of,
     number_of,
@@ -24,20 +24,14 @@ ORDINAL_TYPES = ("visit", "placement")
 
 POINTING = word_set("the that this those these which other each every any no")
 """Before a cardinal they make it a pronoun: *the one there*, *those two*."""
-NEIGHBOR = "neighbor"
-"""Stands for *before or after*, which names neither."""
 PRONOUNS = word_set("them these those")
 COMPARISONS = word_set("fewer less more earlier later")
 """One or two words after a number they make it a difference: *one time fewer*."""
 STEPS = word_set("before after")
 """The same for ordinals: *two visits before that*."""
-EXCLUSIONS = word_set(
-    "other another different distinct alternative separate new not neither except unlike neighbor"
-)
+EXCLUSIONS = word_set("other another different new not neither nor except unlike")
 """Before a word they say that its value is not the one meant."""
-ALL_PARTS = (("exactly", "those"), ("of", "each"))
-"""Words of a command for all things that the context introduces."""
-REFERENCES = word_set("than as half twice double before after neighbor following preceding")
+REFERENCES = word_set("than as half twice double before after following preceding")
 """Before a number they say that the one meant is another, which follows from it."""
 POINTERS = {
     "former": 0, "first": 0, "earlier": 0, "latter": 1, "second": 1, "last": 1, "later": 1,
@@ -47,20 +41,13 @@ OPPOSITES = word_set("other not no")
 """In the sentence of a pointer they say that it is about the value that is not meant."""
 ONE = word_set("one ones")
 """After an ordinal: *the second one* is no number, and no element of a series."""
-SAYING = word_set("mentioned named")
-"""Next to *first*, *last*, *earlier* and *later* they say that these are no ordinals or places."""
-
-_SAME = (
-    ("before or after", NEIGHBOR),
-    ("the one i mentioned earlier", "it"),
-    ("the one i mentioned", "it"),
-    ("the other number", "the number left"),
-)
-"""Words whose parts would mislead a rule, each with words that say the same."""
 _AFTER_RANK = ONE | {"of"}
+_RANKED = word_set("of color place one")
+"""After *the* and an ordinal they say that it is the rank of something introduced."""
 _REACH = 5
 """Words before a value that may exclude it: *not the one right before*."""
 _NUMBER_REACH = 3
+"""Words before a number that may say that it is counted from: *two more than three*."""
 
 
 class NamedValue(NamedTuple):
@@ -78,14 +65,23 @@ class NamedValue(NamedTuple):
 def named_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[NamedValue, ...]:
     """Return every mention of a slot's values in an instruction, in order.
 
-    Its last sentence is taken for the command.
+    *There is a red cube. Take the blue one.* -> red, not stated, and blue, stated. The last
+    sentence is taken for the command.
     """
     sentences = _sentences(text)
-    return tuple(
-        NamedValue(value, number == len(sentences) and _is_plain(words, place, value))
-        for number, words in enumerate(sentences, start=1)
-        for place, value in _values(words, slot, vocabulary)
-    )
+    found: list[NamedValue] = []
+    for number, words in enumerate(sentences, start=1):
+        is_command = number == len(sentences)
+        for mention in _mentions(words, slot, vocabulary):
+            is_stated = is_command and _is_plain(words, mention)
+            found.append(NamedValue(mention.value, is_stated))
+    return tuple(found)
+
+
+def stated_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[Value, ...]:
+    """Return the values of a slot that a command states plainly, in order."""
+    named = named_values(text, slot, vocabulary)
+    return tuple(mention.value for mention in named if mention.stated)
 
 
 def marked_text(text: str, slot: str, vocabulary: SlotVocabulary) -> str:
@@ -97,8 +93,9 @@ def marked_text(text: str, slot: str, vocabulary: SlotVocabulary) -> str:
     ranks: dict[Value, int] = {}
     for sentence in _sentences(text):
         words = list(sentence)
-        for place, value in _values(sentence, slot, vocabulary):
-            words[place] = f"rank{ranks.setdefault(value, len(ranks))}"
+        for mention in _mentions(sentence, slot, vocabulary):
+            rank = ranks.setdefault(mention.value, len(ranks))
+            words[mention.place] = f"rank{rank}"
         found += words
     return " ".join(found)
 
@@ -106,9 +103,6 @@ def marked_text(text: str, slot: str, vocabulary: SlotVocabulary) -> str:
 # Cached: every slot and every rule reads the same text.
 @functools.lru_cache(maxsize=1024)
 def _sentences(text: str) -> tuple[Sentence, ...]:
-    text = text.lower()
-    for words, same in _SAME:
-        text = text.replace(words, same)
     return split_sentences(text)
 
 
@@ -121,110 +115,149 @@ def command_words(text: str) -> Sentence:
 def pointed_value(text: str) -> int | None:
     """Return which of two values the words before the command point at, 0 or 1; None if neither.
 
+    *I mean the latter.* -> 1, *It is not the second one.* -> 0.
+
     The last pointer decides; under *other*, *not* or *no* it is the opposite. That is no grammar:
     *not the former but the latter* has a *not*, too.
     """
-    for words in reversed(_sentences(text)[:-1]):
+    before_command = _sentences(text)[:-1]
+    for words in reversed(before_command):
         pointed = [POINTERS[word] for word in words if word in POINTERS]
-        is_rank = not {"former", "latter"}.isdisjoint(words) or any(
-            before in ("first", "second") and word in ONE
-            for before, word in itertools.pairwise(words)
-        )
-        if pointed and (is_rank or not SAYING.isdisjoint(words)):
-            return pointed[-1] if OPPOSITES.isdisjoint(words) else 1 - pointed[-1]
+        # "First" and "last" alone point at nothing.
+        if pointed and _has_pointer(words):
+            is_opposite = not OPPOSITES.isdisjoint(words)
+            return 1 - pointed[-1] if is_opposite else pointed[-1]
     return None
+
+
+def _has_pointer(words: Sentence) -> bool:
+    """Return whether a sentence has *former*, *latter*, *first one* or *second one*."""
+    if "former" in words or "latter" in words:
+        return True
+    for word, following in itertools.pairwise(words):
+        if word in ("first", "second") and following in ONE:
+            return True
+    return False
 
 
 def part_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
     """Return how many things a command seems to ask for, by its ranks, values and nouns.
 
-    `thing` is the noun for what the task handles.
+    *Take the red cube and the blue cube* -> 2, but at most as many as a goal can have. `thing` is
+    the noun for what the task handles.
     """
-    words = command_words(text)
-    stated = [
-        sum(one.stated for one in named_values(text, slot, one_slot))
-        for slot, one_slot in vocabulary.items()
-        if one_slot.several
-    ]
-    if any(pair in ALL_PARTS for pair in itertools.pairwise(words)):
-        stated.append(_introduced(text, vocabulary))
-    ranks = len(command_ranks(text))
-    longest = max((one.longest for one in vocabulary.values()), default=1)
-    nouns = sum(word in (thing, f"{thing}s", f"{thing}es") for word in words)
-    return max(1, min(longest, max((*stated, ranks, nouns))))
+    counts = [1, len(command_ranks(text))]
+    for slot, slot_vocabulary in vocabulary.items():
+        if slot_vocabulary.several:
+            counts.append(len(stated_values(text, slot, slot_vocabulary)))
+    nouns = (thing, f"{thing}s", f"{thing}es")
+    counts.append(sum(word in nouns for word in command_words(text)))
 
-
-def _introduced(text: str, vocabulary: GoalVocabulary) -> int:
-    """Return how many values the first sentence names that names some of a slot with several."""
-    several = {slot: one for slot, one in vocabulary.items() if one.several}
-    for words in _sentences(text):
-        found = [len(list(_values(words, slot, one))) for slot, one in several.items()]
-        if any(found):
-            return max(found)
-    return 1
+    longest = max((slot.longest for slot in vocabulary.values()), default=1)
+    return min(longest, max(counts))
 
 
 def command_ranks(text: str) -> tuple[int, ...]:
-    """Return the places of introduced things that the command takes: 0 for *the former*."""
+    """Return the places of introduced things that the command takes.
+
+    *Take the former* -> 0; *take the second one and the third one* -> 1 and 2.
+    """
     words = command_words(text)
     found: list[int] = []
-    for before, word, after in zip(("", *words), words, (*words[1:], ""), strict=False):
+    for place, word in enumerate(words):
         rank = ordinal_of(word)
         if word in ("former", "latter"):
             found.append(POINTERS[word])
-        elif rank is not None and before == "the" and after in ("of", "color", "place", "one"):
+        elif rank is not None and _is_place_in_list(words, place):
             found.append(rank - 1)
     return tuple(found)
 
 
-def _values(words: Sentence, slot: str, vocabulary: SlotVocabulary) -> Iterator[tuple[int, Value]]:
-    """Yield position and value of every word that names one."""
-    if not all(isinstance(value, int) for value in vocabulary.values):
-        for place, word in enumerate(words):
-            value = color_of(word) or word
-            # "Before or after" names neither.
-            if value in vocabulary.values and "or" not in words[max(0, place - 1) : place + 2]:
-                yield place, value
+def _is_place_in_list(words: Sentence, place: int) -> bool:
+    """Return whether an ordinal is that of an introduced thing: *the second one*."""
+    following = words[place + 1 : place + 2]
+    return _before(words, place) == "the" and not _RANKED.isdisjoint(following)
+
+
+def _before(words: Sentence, place: int) -> str:
+    """Return the word before a place; empty at the beginning."""
+    return words[place - 1] if place > 0 else ""
+
+
+class _Mention(NamedTuple):
+    """The position of a word that names a value, and the value."""
+
+    place: int
+    value: Value
+
+
+def _mentions(words: Sentence, slot: str, vocabulary: SlotVocabulary) -> Iterator[_Mention]:
+    """Yield the mentions of a slot's values in a sentence; all values of a slot have one type."""
+    if all(isinstance(value, int) for value in vocabulary.values):
+        yield from _numbers(words, slot)
         return
-    ordinals = SLOT_TYPE_NAMES.get(slot) in ORDINAL_TYPES
     for place, word in enumerate(words):
-        number = _number(words, place, ordinals=ordinals, counts=slot == "counts")
-        if number is not None:
-            yield place, number
-        elif (
-            ordinals
-            and ordinal_of(word) is not None
-            and _AFTER_RANK.isdisjoint(words[place + 1 : place + 2])
-        ):
-            yield place, int(ordinal_of(word) or 0)
+        value = color_of(word) or word
+        around = words[max(0, place - 1) : place + 2]
+        # "Before or after" names neither.
+        if value in vocabulary.values and "or" not in around:
+            yield _Mention(place, value)
 
 
-def _number(words: Sentence, place: int, *, ordinals: bool, counts: bool) -> int | None:
-    """Return the number that a cardinal or adverb names, if it counts things.
+def _numbers(words: Sentence, slot: str) -> Iterator[_Mention]:
+    """Yield the numbers that count things, and for visits and placements the ordinals, too.
 
-    Where cubes are counted, *one of them* is one cube; elsewhere it points at a thing.
+    *Three times* -> 3, *twice* -> 2, *two more times* -> none: it is a difference. *The second
+    visit* -> 2 where visits are counted, *the second one* -> none.
     """
-    word, following = words[place], words[place + 1 : place + 3]
-    if word in ADVERBS:
-        multiplies = bool(following) and (
-            following[0] in ("as", "that", "the") or number_of(following[0]) is not None
-        )
-        return None if multiplies else ADVERBS[word]
-    differences = COMPARISONS | STEPS if ordinals else COMPARISONS
-    before = words[place - 1] if place else ""
-    is_pronoun = (
-        (before in POINTING and following[:1] != ("times",))  # "we tried this three times"
-        or ordinal_of(before) is not None
-        or (not counts and following[:1] == ("of",) and not PRONOUNS.isdisjoint(following))
-    )
-    if is_pronoun or not differences.isdisjoint(following):
-        return None
-    return number_of(word)
+    has_ordinals = SLOT_TYPE_NAMES.get(slot) in ORDINAL_TYPES
+    for place, word in enumerate(words):
+        following = words[place + 1 : place + 2]
+        number: int | None = None
+        if word in ADVERBS:
+            if not _is_factor(following):
+                number = ADVERBS[word]
+        elif number_of(word) is not None:
+            if _counts_things(words, place, slot):
+                number = number_of(word)
+        elif has_ordinals and _AFTER_RANK.isdisjoint(following):
+            number = ordinal_of(word)
+        if number is not None:
+            yield _Mention(place, number)
 
 
-def _is_plain(words: Sequence[str], place: int, value: Value) -> bool:
-    """Return whether a command says a value without excluding it or counting from it."""
-    if isinstance(value, str):
-        return EXCLUSIONS.isdisjoint(words[max(0, place - _REACH) : place])
-    counted_from = "each" in words[:place]  # "half as many of each as two red and four blue"
-    return not counted_from and REFERENCES.isdisjoint(words[max(0, place - _NUMBER_REACH) : place])
+def _is_factor(following: Sequence[str]) -> bool:
+    """Return whether an adverb multiplies what follows it: *twice as many*, *twice three*."""
+    return any(word in ("as", "that", "the") or number_of(word) is not None for word in following)
+
+
+def _counts_things(words: Sentence, place: int, slot: str) -> bool:
+    """Return whether a cardinal says how many, and is no pronoun and no difference.
+
+    *Three cubes* and *these three times* count; *the one there*, *those two* and *one time fewer*
+    do not. Where cubes are counted, *one of them* is one cube; elsewhere it points at a thing.
+    """
+    before = _before(words, place)
+    following = words[place + 1 : place + 3]
+    is_of_times = following[:1] == ("times",)  # "we tried this three times"
+    if ordinal_of(before) is not None or (before in POINTING and not is_of_times):
+        return False
+    is_part = following[:1] == ("of",) and not PRONOUNS.isdisjoint(following)
+    if is_part and slot != "counts":
+        return False
+    is_ordinal = SLOT_TYPE_NAMES.get(slot) in ORDINAL_TYPES
+    differences = COMPARISONS | STEPS if is_ordinal else COMPARISONS
+    return differences.isdisjoint(following)
+
+
+def _is_plain(words: Sentence, mention: _Mention) -> bool:
+    """Return whether a command says a value without excluding it or counting from it.
+
+    *Not the red one* excludes red; *two more than three* counts from three.
+    """
+    before = words[: mention.place]
+    if isinstance(mention.value, str):
+        return EXCLUSIONS.isdisjoint(before[-_REACH:])
+    if "each" in before:  # "half as many of each as two red and four blue"
+        return False
+    return REFERENCES.isdisjoint(before[-_NUMBER_REACH:])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene, SceneObject
@@ -24,23 +24,38 @@ def scene_facts(scene: Scene) -> SceneFacts:
 
 
 def _standing(scene: Scene) -> Iterator[tuple[str, float]]:
-    """Yield how many things of each kind and color there are, where, and what is nearest."""
-    things = Counter(_look(one) for one in scene.objects)
-    for look, count in things.items():
+    """Yield how many things of each kind and color there are, where, and what is nearest.
+
+    A scene with one red cube has ``red cube × 1``, ``x of red cube`` and so on. Only objects that
+    look like no other have a place of their own.
+    """
+    counts = Counter(map(_look, scene.objects))
+    for look, count in counts.items():
         yield f"{look} × {count}", 1.0
-    alone = {look: one for one in scene.objects if things[look := _look(one)] == 1}
-    for look, one in alone.items():
-        yield f"x of {look}", one.position.x
-        yield f"y of {look}", one.position.y
-        if others := [other for other in alone if other != look and alone[other].color]:
-            spots = {other: alone[other].position[:2] for other in others}
-            nearest = min(spots, key=lambda other: math.dist(one.position[:2], spots[other]))
-            yield f"nearest to {look}: {nearest}", 1.0
+    unique = [item for item in scene.objects if counts[_look(item)] == 1]
+    for item in unique:
+        look = _look(item)
+        yield f"x of {look}", item.position.x
+        yield f"y of {look}", item.position.y
+        nearest = _nearest(item, unique)
+        if nearest is not None:
+            yield f"nearest to {look}: {_look(nearest)}", 1.0
+
+
+def _nearest(item: SceneObject, others: Iterable[SceneObject]) -> SceneObject | None:
+    """Return the nearest other object that has a color; None if there is none."""
+    colored = [other for other in others if other.color and other is not item]
+
+    def distance(other: SceneObject) -> float:
+        return math.dist(item.position[:2], other.position[:2])
+
+    return min(colored, key=distance, default=None)
 
 
 def _moving(scene: Scene) -> Iterator[tuple[str, float]]:
     """Yield what moves by itself: how many movements of a kind, of which colors, how fast."""
-    for kind, count in Counter(type(one).__name__ for one in scene.motions).items():
+    kinds = Counter(type(motion).__name__ for motion in scene.motions)
+    for kind, count in kinds.items():
         yield f"{kind} × {count}", 1.0
     for motion in scene.motions:
         if isinstance(motion, Shuttle):
@@ -51,26 +66,34 @@ def _moving(scene: Scene) -> Iterator[tuple[str, float]]:
 
 
 def _shown(scene: Scene) -> Iterator[tuple[str, float]]:
-    """Yield the acts of the video, alone, with their rank, and how many there are of each."""
-    for rank, fact in enumerate(scene.past):
-        yield f"act {rank}: {_act(scene, fact)}", 1.0
-    for act, count in Counter(_act(scene, fact) for fact in scene.past).items():
+    """Yield the acts of the video: at which rank each comes, that it comes, and how often.
+
+    A video with two presses has ``act 0: …``, ``act 1: …``, ``shown: …``, ``shown: … × 2`` and
+    ``acts × 2``.
+    """
+    acts = [_act(scene, fact) for fact in scene.past]
+    for rank, act in enumerate(acts):
+        yield f"act {rank}: {act}", 1.0
+    for act, count in Counter(acts).items():
         yield f"shown: {act}", 1.0
         yield f"shown: {act} × {count}", 1.0
-    yield f"acts × {len(scene.past)}", 1.0
+    yield f"acts × {len(acts)}", 1.0
 
 
 def _act(scene: Scene, fact: Fact) -> str:
-    return " ".join((fact.kind, *(_seen_as(scene, one) for one in (fact.subject, fact.place))))
+    """Return an act as it can be seen: ``placed red cube target``."""
+    return f"{fact.kind} {_seen_as(scene, fact.subject)} {_seen_as(scene, fact.place)}"
 
 
 def _seen_as(scene: Scene, name: str | None) -> str:
     """Return the look of the object of a name, with the color of the cube that it covers."""
-    if name is None or all(one.name != name for one in scene.objects):
+    if name is None or all(item.name != name for item in scene.objects):
         return ""
+    look = _look(scene[name])
     hidden = scene.hidden_in(name)
-    return _look(scene[name]) if hidden is None else f"{_look(scene[name])} over {hidden.color}"
+    return look if hidden is None else f"{look} over {hidden.color}"
 
 
-def _look(one: SceneObject) -> str:
-    return one.kind if one.color is None else f"{one.color} {one.kind}"
+def _look(item: SceneObject) -> str:
+    """Return the kind of an object with its color, if it has one: ``red cube``."""
+    return item.kind if item.color is None else f"{item.color} {item.kind}"

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
-from functools import partial
 from typing import NamedTuple, cast
 
 from roboirg.core.episode import Goal, values_in
 from roboirg.core.errors import InvalidValueError
+from roboirg.language.instruction import Described, Meaning
 from roboirg.language.instruction import hidden_slots as hidden_in
+from roboirg.language.meaning import picked_operand
 from roboirg.shortcuts.command_chance import blind_goals, right_share
-from roboirg.shortcuts.goal_learner import Told
+from roboirg.shortcuts.goal_learner import InstructedEpisode
+from roboirg.shortcuts.goal_vocabulary import Value
 from roboirg.shortcuts.surface_rules import SURFACE_RULES
 from roboirg.shortcuts.text_guess import TextGuess, goal_share, guess_goal, slot_share
 
@@ -30,56 +32,108 @@ class ShortcutScore(NamedTuple):
     goal: Fraction
 
 
-Scorer = Callable[[Told], ShortcutScore]
-
-
-def hidden_slots(told: Told) -> tuple[str, ...]:
+def hidden_slots(instructed: InstructedEpisode) -> tuple[str, ...]:
     """Return the slots that the command leaves out, in the order of the goal."""
-    episode, instruction = told
+    episode, instruction = instructed
     hidden = hidden_in(instruction, episode.goal)
-    return tuple(slot for slot, _ in episode.goal.slots if slot in hidden)
+    return _in_order(hidden, episode.goal)
 
 
-def counted_slots(told: Told) -> tuple[str, ...]:
+def counted_slots(instructed: InstructedEpisode) -> tuple[str, ...]:
     """Return the slots that count: those that the instruction names as touched, or all hidden."""
-    touched = cast("list[str]", told[1].metadata.get("touched", []))
-    slots = tuple(slot for slot, _ in told[0].goal.slots if slot in touched)
-    return slots or hidden_slots(told)
+    episode, instruction = instructed
+    touched = cast("list[str]", instruction.metadata.get("touched", []))
+    return _in_order(touched, episode.goal) or hidden_slots(instructed)
 
 
-def score_chance(told: Told) -> ShortcutScore:
-    """Score a blind guess among the goals that command and scene leave; see `blind_goals`."""
-    episode, instruction = told
+def _in_order(slots: Collection[str], goal: Goal) -> tuple[str, ...]:
+    """Return some slots in the order of a goal."""
+    return tuple(slot for slot, _ in goal.slots if slot in slots)
+
+
+def counted_places(instructed: InstructedEpisode) -> Mapping[str, Sequence[int]]:
+    """Return the places of each slot that count, from 0: all, or those that only the scene gives.
+
+    *The container next to the button, and the one over the red cube*: of the two colors, only the
+    first counts -> ``{"colors": [0]}``.
+    """
+    episode, instruction = instructed
+    goal = episode.goal.as_mapping()
+    counted: dict[str, Sequence[int]] = {}
+    for slot in counted_slots(instructed):
+        places = range(len(values_in(goal[slot])))
+        counted[slot] = places
+        # Amounts may be said in another order than the goal has.
+        if len(places) > 1 and "counts" not in goal:
+            meaning = instruction.meaning
+            described = [place for place in places if _is_described(meaning, f"{slot}.{place}")]
+            counted[slot] = described or places
+    return counted
+
+
+def _is_described(meaning: Meaning | None, field: str) -> bool:
+    """Return whether a value is that of a thing that words describe by its place or history.
+
+    `field` names the value in the meaning: ``"colors.1"`` is the second color.
+    """
+    term = meaning.terms.get(field) if meaning else None
+    return term is not None and isinstance(picked_operand(term), Described)
+
+
+def score_chance(instructed: InstructedEpisode) -> ShortcutScore:
+    """Score a blind guess among the goals that command and scene leave; see `blind_goals`.
+
+    With three colors and nothing known, it gets a third of the slot right, and a third of the
+    goals. Of a slot of which a part does not count, that part is known to the guesser.
+    """
+    episode, instruction = instructed
     goals = blind_goals(instruction, episode)
     share = right_share(goals, episode)
     if share is None:
         raise InvalidValueError(f"{episode.key}: no meaning is known of {instruction.text!r}.")
     slots: dict[str, Fraction] = {}
-    for slot in counted_slots(told):
-        overlaps = [_overlap(goal, episode.goal, slot) for goal in goals]
-        slots[slot] = sum(overlaps, Fraction(0)) / len(goals)
+    for slot, places in counted_places(instructed).items():
+        meant = values_in(episode.goal[slot])
+        slots[slot] = _slot_chance([values_in(goal[slot]) for goal in goals], meant, places)
     return ShortcutScore(slots, share)
 
 
-def _overlap(guess: Goal, goal: Goal, slot: str) -> Fraction:
-    wanted = values_in(goal[slot])
-    right = sum(a == b for a, b in zip(values_in(guess[slot]), wanted, strict=False))
-    return Fraction(right, len(wanted))
+def _slot_chance(
+    guesses: Sequence[Sequence[Value]], meant: Sequence[Value], places: Sequence[int]
+) -> Fraction:
+    """Return the expected share of right values at some places of a slot.
+
+    Guesses red-blue, red-green and blue-red where red-blue is meant and place 1 counts: place 0 is
+    known, so the first two are possible, and one of them is right -> 1/2.
+    """
+    known_places = set(range(len(meant))).difference(places)
+    numbers_right: list[int] = []
+    for guess in guesses:
+        pairs = zip(guess, meant, strict=False)
+        right_places = {place for place, (value, wanted) in enumerate(pairs) if value == wanted}
+        if known_places <= right_places:
+            numbers_right.append(len(right_places) - len(known_places))
+    return Fraction(sum(numbers_right), len(numbers_right) * len(places))
 
 
-def score_guess(guess: TextGuess, told: Told) -> ShortcutScore:
-    """Score a guess of the whole goal."""
-    goal = told[0].goal
-    slots = {slot: slot_share(guess, slot, goal[slot]) for slot in counted_slots(told)}
-    return ShortcutScore(slots, goal_share(guess, told[0]))
+def score_guess(guess: TextGuess, instructed: InstructedEpisode) -> ShortcutScore:
+    """Score a guess of the whole goal: each slot that counts, and all of the goal."""
+    episode, _ = instructed
+    slots: dict[str, Fraction] = {}
+    for slot, places in counted_places(instructed).items():
+        slots[slot] = slot_share(guess, slot, episode.goal[slot], places)
+    return ShortcutScore(slots, goal_share(guess, episode))
 
 
-def score_rule(rule: str, told: Told) -> ShortcutScore:
+def score_rule(rule: str, instructed: InstructedEpisode) -> ShortcutScore:
     """Score a surface rule, which sees the text of the instruction only."""
-    episode, instruction = told
-    return score_guess(guess_goal(rule, instruction.text, episode.task), told)
+    episode, instruction = instructed
+    return score_guess(guess_goal(rule, instruction.text, episode.task), instructed)
 
 
-def rule_scorers() -> Mapping[str, Scorer]:
-    """Return chance and all surface rules, by name."""
-    return {CHANCE: score_chance} | {rule: partial(score_rule, rule) for rule in SURFACE_RULES}
+def rule_scores(instructed: InstructedEpisode) -> dict[str, ShortcutScore]:
+    """Return the scores of chance and of all surface rules, by name."""
+    scores = {CHANCE: score_chance(instructed)}
+    for rule in SURFACE_RULES:
+        scores[rule] = score_rule(rule, instructed)
+    return scores

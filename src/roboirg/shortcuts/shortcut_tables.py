@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import NormalDist
@@ -17,12 +16,12 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions
-from roboirg.shortcuts.goal_learner import LEARNED_FLOORS, GoalLearner, Heard, Told
+from roboirg.shortcuts.goal_learner import LEARNED_FLOORS, GoalLearner, Heard, InstructedEpisode
 from roboirg.shortcuts.shortcut_scores import (
     CHANCE,
     ShortcutScore,
     counted_slots,
-    rule_scorers,
+    rule_scores,
     score_guess,
 )
 from roboirg.tasks import get_task
@@ -32,8 +31,12 @@ TRAINING_SPLIT: Split = "train"
 JUDGING_SPLIT: Split = "val"
 LEARNING_SCENES = 500
 """Random scenes of a task to learn from, beyond the train split."""
-FIRST_LEARNED, FIRST_JUDGED = 500_000, 700_000
-"""Numbers of the first random scene to learn from, and to choose on: none of them is tested."""
+FIRST_LEARNED = 500_000
+"""Number of the first random scene to learn from; none of them is tested."""
+FIRST_JUDGED = 700_000
+"""The same for those on which the best learner is chosen."""
+_MADE_UP_TEXTS = 2
+"""Texts, one right and one wrong, with which a standard error stays above 0."""
 MARGIN = 0.05
 """By how much a floor may exceed chance before its setting counts as solved by it."""
 
@@ -41,9 +44,9 @@ Grouping = Literal["pattern", "task", "slot"]
 GROUPINGS: tuple[Grouping, ...] = get_args(Grouping)
 Group = tuple[str, ...]
 """A setting, and within it a reasoning pattern, task or slot if the table has a row for each."""
-Scored = tuple[Told, Mapping[str, ShortcutScore]]
+Scored = tuple[InstructedEpisode, Mapping[str, ShortcutScore]]
 """An instruction, and its score by shortcut."""
-GroupsOf = Callable[[Told], Iterable[tuple[Group, Sequence[str]]]]
+GroupsOf = Callable[[InstructedEpisode], Iterable[tuple[Group, Sequence[str]]]]
 """Returns the rows in which an instruction counts, and those of its slots that count there."""
 
 
@@ -105,33 +108,49 @@ class _Tally:
     goals: dict[str, list[float]] = field(default_factory=dict)
 
     def add(self, scores: Mapping[str, ShortcutScore], slots: Sequence[str]) -> None:
+        """Add an instruction: its scores by shortcut, and the slots of it that count here."""
         self.sizes.append(len(slots))
         for name, score in scores.items():
-            self.slots.setdefault(name, []).append(float(sum(score.slots[one] for one in slots)))
+            right = sum(score.slots[slot] for slot in slots)
+            self.slots.setdefault(name, []).append(float(right))
             self.goals.setdefault(name, []).append(float(score.goal))
 
     def row(self, group: Group) -> ShortcutRow:
-        size = sum(self.sizes)
-        shares = {
-            name: ShortcutShares(
-                # Shares are fractions; what floats add to their sum could change a rounding.
-                round(sum(right) / size, 12) if size else None,
-                round(sum(self.goals[name]) / len(self.sizes), 12),
-            )
-            for name, right in self.slots.items()
-        }
-        return ShortcutRow(group, len(self.sizes), shares, self._excess() if size else None)
+        """Return the mean scores of all instructions that were added."""
+        slot_count = sum(self.sizes)
+        text_count = len(self.sizes)
+        shares: dict[str, ShortcutShares] = {}
+        for name, right in self.slots.items():
+            slots = _share(right, slot_count) if slot_count else None
+            goals = _share(self.goals[name], text_count)
+            shares[name] = ShortcutShares(slots, goals)
+        return ShortcutRow(group, text_count, shares, self._excess())
 
     def _excess(self) -> Excess | None:
-        if "text-only" not in self.slots:
+        """Return by how much text-only exceeds the better of chance and majority; see `Excess`.
+
+        The value is a ratio of sums over instructions, right slots by slots, so its standard error
+        follows from what each instruction deviates from the ratio.
+        """
+        slot_count = sum(self.sizes)
+        if not slot_count or "text-only" not in self.slots:
             return None
-        size = sum(self.sizes)
-        least = max((CHANCE, "majority"), key=lambda name: sum(self.slots[name]))
-        more = np.subtract(self.slots["text-only"], self.slots[least])
-        value = float(more.sum()) / size
-        # A ratio of sums. Two made-up texts, one right and one wrong, keep it above 0.
-        rest = more - value * np.array(self.sizes)
-        return Excess(value, float(np.sqrt((rest**2).sum() + 2)) / (size + 2))
+        chance = self.slots[CHANCE]
+        majority = self.slots["majority"]
+        baseline = chance if sum(chance) >= sum(majority) else majority
+        more_right = np.subtract(self.slots["text-only"], baseline)
+        value = float(more_right.sum()) / slot_count
+        residuals = more_right - value * np.array(self.sizes)
+        squares = (residuals**2).sum() + _MADE_UP_TEXTS
+        return Excess(value, float(np.sqrt(squares)) / (slot_count + _MADE_UP_TEXTS))
+
+
+def _share(right: Sequence[float], count: int) -> float:
+    """Return the share that is right of a number of things.
+
+    Shares are fractions: what floats add to their sum could change a rounding.
+    """
+    return round(sum(right) / count, 12)
 
 
 def shortcut_rows(
@@ -157,30 +176,35 @@ def shortcut_rows(
             learned floors learn; None for no learned floors.
     """
     scored = score_texts(tasks, splits, settings, options, seeds=seeds, learning=learning)
-    rows = tabulate(scored, lambda told: _groups_of(told, by))
+    rows = tabulate(scored, lambda instructed: _groups_of(instructed, by))
     return sorted(rows, key=lambda row: settings.index(row.group[0]))
 
 
 def tabulate(scored: Iterable[Scored], groups_of: GroupsOf) -> list[ShortcutRow]:
     """Return the rows of scored instructions, in the order in which their groups occur."""
     tallies: dict[Group, _Tally] = {}
-    for told, scores in scored:
-        for group, slots in groups_of(told):
+    for instructed, scores in scored:
+        for group, slots in groups_of(instructed):
             tallies.setdefault(group, _Tally()).add(scores, slots)
     return [tally.row(group) for group, tally in tallies.items()]
 
 
-def _groups_of(told: Told, by: Grouping | None) -> Iterator[tuple[Group, Sequence[str]]]:
-    episode, instruction = told
-    slots = counted_slots(told)
-    if by == "slot":
-        for slot in slots:
-            yield (instruction.setting, f"{episode.task} {slot}"), (slot,)
-    elif by is None:
-        yield (instruction.setting,), slots
+def _groups_of(
+    instructed: InstructedEpisode, by: Grouping | None
+) -> Iterator[tuple[Group, Sequence[str]]]:
+    """Yield the rows in which an instruction counts, and those of its slots that count there."""
+    episode, instruction = instructed
+    setting = instruction.setting
+    slots = counted_slots(instructed)
+    if by is None:
+        yield (setting,), slots
+    elif by == "task":
+        yield (setting, episode.task), slots
+    elif by == "pattern":
+        yield (setting, str(instruction.metadata["pattern"] or "–")), slots
     else:
-        pattern = str(instruction.metadata["pattern"] or "–")
-        yield (instruction.setting, pattern if by == "pattern" else episode.task), slots
+        for slot in slots:
+            yield (setting, f"{episode.task} {slot}"), (slot,)
 
 
 def score_texts(
@@ -192,22 +216,34 @@ def score_texts(
     seeds: int = 0,
     learning: int | None = None,
 ) -> Iterator[Scored]:
-    """Yield every instruction with its scores, task by task; arguments as of `shortcut_rows`."""
+    """Yield every instruction with its scores, task by task; arguments as of `shortcut_rows`.
+
+    Settings that a task does not have are left out.
+    """
     check_whole("seeds", seeds, least=0)
     for task in tasks:
-        tested = [*split_episodes((task,), splits), *_random(task, 0, seeds)]
-        for setting in (one for one in settings if one in settings_of(get_task(task))):
-            told = _told(tested, setting, options)
-            learned = [{} for _ in told] if learning is None else _learned(told, options, learning)
-            for one, own in zip(told, learned, strict=True):
-                yield one, {name: score(one) for name, score in rule_scorers().items()} | own
+        tested = _episodes(task, splits, range(seeds))
+        present = settings_of(get_task(task))
+        for setting in settings:
+            if setting not in present:
+                continue
+            texts = _instructed(tested, setting, options)
+            scores = [rule_scores(pair) for pair in texts]
+            if learning is not None and texts:
+                _add_learned(scores, texts, options, learning)
+            yield from zip(texts, scores, strict=True)
 
 
-def _random(task: str, first: int, count: int) -> list[Episode]:
-    return [get_episode(task, "random", first + index) for index in range(count)]
+def _episodes(task: str, splits: Sequence[Split], random_scenes: range) -> list[Episode]:
+    """Return the episodes of a task in some splits, then some of its random ones."""
+    episodes = list(split_episodes((task,), splits))
+    episodes += [get_episode(task, "random", number) for number in random_scenes]
+    return episodes
 
 
-def _told(episodes: Iterable[Episode], setting: str, options: InstructionOptions) -> list[Told]:
+def _instructed(
+    episodes: Iterable[Episode], setting: str, options: InstructionOptions
+) -> list[InstructedEpisode]:
     return list(instructions(episodes, (setting,), (options.form,), options))
 
 
@@ -217,69 +253,73 @@ def learn_goals(task: str, options: InstructionOptions, scenes: int) -> GoalLear
     What they learn from are the train split and random scenes; what is best is chosen on the val
     split and a quarter as many random scenes, in the words of test.
     """
-
-    def said(split: Split, first: int, count: int, pool: str) -> list[Told]:
-        episodes = itertools.chain(split_episodes((task,), (split,)), _random(task, first, count))
-        wanted = replace(options, wordings=options.wordings or pool)
-        return _told(episodes, options.setting, wanted)
-
+    to_learn = range(FIRST_LEARNED, FIRST_LEARNED + scenes)
+    to_judge = range(FIRST_JUDGED, FIRST_JUDGED + scenes // 4)
+    learned = _episodes(task, (TRAINING_SPLIT,), to_learn)
+    judged = _episodes(task, (JUDGING_SPLIT,), to_judge)
+    in_train = replace(options, wordings=options.wordings or "train")
+    in_test = replace(options, wordings=options.wordings or "test")
     return GoalLearner(
-        said(TRAINING_SPLIT, FIRST_LEARNED, scenes, "train"),
-        said(JUDGING_SPLIT, FIRST_JUDGED, scenes // 4, "test"),
+        _instructed(learned, options.setting, in_train),
+        _instructed(judged, options.setting, in_test),
     )
 
 
-def _learned(
-    told: Sequence[Told], options: InstructionOptions, scenes: int
-) -> list[dict[str, ShortcutScore]]:
-    """Return the scores of the learned floors on instructions of one task and setting."""
-    if not told:
-        return []
-    episode, instruction = told[0]
-    learner = learn_goals(episode.task, replace(options, setting=instruction.setting), scenes)
-    heard = [Heard.of(one) for one in told]
-    scores: list[dict[str, ShortcutScore]] = [{} for _ in told]
+def _add_learned(
+    scores: Sequence[dict[str, ShortcutScore]],
+    texts: Sequence[InstructedEpisode],
+    options: InstructionOptions,
+    scenes: int,
+) -> None:
+    """Add to each instruction's scores those of the learned floors; all have a task and setting."""
+    episode, instruction = texts[0]
+    options = replace(options, setting=instruction.setting)
+    learner = learn_goals(episode.task, options, scenes)
+    heard = [Heard.of(pair) for pair in texts]
     for floor in LEARNED_FLOORS:
         guesses = learner.guesses(floor, heard)
-        for found, one, guess in zip(scores, told, guesses, strict=True):
-            found[floor] = score_guess(guess, one)
-    return scores
+        for text_scores, instructed, guess in zip(scores, texts, guesses, strict=True):
+            text_scores[floor] = score_guess(guess, instructed)
 
 
 def shortcut_table(rows: Sequence[ShortcutRow], title: str, by: Grouping | None = None) -> Table:
     """Return the rows as a table for the terminal: slots that count, and goals, in percent."""
     table = Table(title=title, title_justify="left", title_style="bold", caption_justify="left")
     table.caption = "Percent of hidden slots right / of whole goals right."
-    for head in ("setting", *((by,) if by else ())):
-        table.add_column(head)
-    for head in ("texts", *(rows[0].shares if rows else ())):
-        table.add_column(head, justify="right")
-    compared = [row.excess for row in rows if row.excess is not None]
+    table.add_column("setting")
+    if by is not None:
+        table.add_column(by)
+    table.add_column("texts", justify="right")
+    for shortcut in rows[0].shares if rows else ():
+        table.add_column(shortcut, justify="right")
+    compared = sum(row.excess is not None for row in rows)
     if compared:
         table.add_column("text-only over chance", justify="right")
         table.caption += (
             " Over chance: points of slots above the larger of chance and majority, with 95 % "
-            f"intervals, Bonferroni-adjusted for {counted(len(compared), 'row')}."
+            f"intervals, Bonferroni-adjusted for {counted(compared, 'row')}."
         )
     for row in rows:
-        cells = [_cell(one) for one in row.shares.values()]
+        cells = [_cell(shares) for shares in row.shares.values()]
         if compared:
-            cells.append(excess_text(row.excess, len(compared)))
+            cells.append(excess_text(row.excess, compared))
         table.add_row(*row.group, str(row.count), *cells)
     return table
 
 
 def excess_text(excess: Excess | None, count: int) -> str:
-    """Return an excess in points with its interval, Bonferroni-adjusted for `count` of them."""
+    """Return an excess in points with its interval, Bonferroni-adjusted for `count` of them.
+
+    For example ``+53.1 (+47.8 to +58.5)``.
+    """
     if excess is None:
         return "–"
     low, high = excess.interval(count)
-    return " ".join(
-        text.replace("-", "−")
-        for text in (f"{100 * excess.value:+.1f}", f"({100 * low:+.1f} to {100 * high:+.1f})")
-    )
+    text = f"{100 * excess.value:+.1f} ({100 * low:+.1f} to {100 * high:+.1f})"
+    return text.replace("-", "−")
 
 
 def _cell(shares: ShortcutShares) -> str:
+    """Return shares of slots and of goals in percent: ``44 / 43``."""
     slots = "–" if shares.slots is None else f"{100 * shares.slots:.0f}"
     return f"{slots} / {100 * shares.goals:.0f}"

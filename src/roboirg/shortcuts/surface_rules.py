@@ -6,13 +6,13 @@ takes what the command states plainly, and decides about the slots that the comm
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.reader.tokens import Sentence, number_of
 from roboirg.shortcuts.goal_vocabulary import SlotVocabulary, Value
-from roboirg.shortcuts.named_values import EXCLUSIONS, NEIGHBOR, ORDINAL_TYPES
+from roboirg.shortcuts.named_values import EXCLUSIONS, ORDINAL_TYPES
 
 Candidates = tuple[Value, ...]
 """Values for one place of a slot, among which a rule chooses with equal probability."""
@@ -50,6 +50,16 @@ class SlotWords(NamedTuple):
     ranks: tuple[int, ...] = ()
 
     @property
+    def different(self) -> tuple[Value, ...]:
+        """The named values, each once."""
+        return tuple(dict.fromkeys(self.named))
+
+    @property
+    def not_last(self) -> tuple[Value, ...]:
+        """The named values, each once, without the one that is named last."""
+        return tuple(value for value in self.different if value != self.named[-1])
+
+    @property
     def is_number(self) -> bool:
         """Whether the slot holds counts or ordinals."""
         return isinstance(self.vocabulary.values[0], int)
@@ -58,6 +68,11 @@ class SlotWords(NamedTuple):
     def is_ordinal(self) -> bool:
         """Whether the slot holds an ordinal."""
         return SLOT_TYPE_NAMES.get(self.slot) in ORDINAL_TYPES
+
+
+def certain(values: Iterable[Value]) -> list[Candidates]:
+    """Return candidates for places whose values are certain: each value is alone at its place."""
+    return [(value,) for value in values]
 
 
 SurfaceRule = Callable[[SlotWords], list[Candidates]]
@@ -69,12 +84,12 @@ Where they are none, or missing, every value of the vocabulary is as likely.
 
 def take_first(words: SlotWords) -> list[Candidates]:
     """Take the values that are named first."""
-    return [(value,) for value in words.named[: words.parts]]
+    return certain(words.named[: words.parts])
 
 
 def take_last(words: SlotWords) -> list[Candidates]:
     """Take the values that are named last."""
-    return [(value,) for value in words.named[-words.parts :]]
+    return certain(words.named[-words.parts :])
 
 
 def take_unnamed(words: SlotWords) -> list[Candidates]:
@@ -84,65 +99,88 @@ def take_unnamed(words: SlotWords) -> list[Candidates]:
 
 
 def take_by_cues(words: SlotWords) -> list[Candidates]:
-    """Choose among four rules by key words of the command and of what points at one of two values.
+    """Choose a rule by key words; the first row that fits decides.
 
-    *The former*, *the third one* in the command: the values at those places. *Other* or *left*
-    after a value that is named again: of the values, the first one that is not that. After a
-    pointer, such as *former* or *latter*, the value at its place, and then the other one.
-    *Other*, *different*, *not* or *neighbor*: the value that is not named, then the one that is
-    named but not last. *One fewer*, *twice*, *right after* and the like: the number that is named
-    first, changed by the difference. Otherwise the first value.
+    | the words | the values |
+    | --- | --- |
+    | *the former*, *the third one* in the command | at those places |
+    | *other*, *left* after a value that is named again | the first one that is another |
+    | *former*, *latter* before the command | at that place, then the other one of two |
+    | *one fewer*, *twice*, *right after* | the number that is named first, so changed |
+    | a number without such words | the first one |
+    | *other*, *different*, *not* | one that is not named, then one named but not last |
+    | otherwise | the first one |
     """
-    pair = tuple(dict.fromkeys(words.named))
-    pointed = _pointed_values(words, pair)
+    pointed = _pointed_values(words)
     if pointed:
         return pointed[: words.parts]
     if words.is_number:
-        change = _change(words)
-        first = [one for (one,) in take_first(words)]
-        return [change(int(one)) for one in first] if change else take_first(words)
+        return _changed_number(words)
     if EXCLUSIONS.isdisjoint(words.command):
         return take_first(words)
-    unnamed = take_unnamed(words)[:1] if set(words.vocabulary.values) - set(words.named) else []
-    complement = tuple(value for value in dict.fromkeys(words.named) if value != words.named[-1])
-    return [*unnamed, complement]
+
+    if set(words.vocabulary.values) <= set(words.named):
+        return [words.not_last]
+    return [*take_unnamed(words)[:1], words.not_last]
 
 
-def _pointed_values(words: SlotWords, named: tuple[Value, ...]) -> list[Candidates]:
-    """Return the named values at which the words point; none if they point at none."""
-    if words.ranks and not words.is_number and max(words.ranks) < len(named):
-        return [(named[rank],) for rank in words.ranks]
-    if words.parts == 1 and len(named) < len(words.named) and not REST.isdisjoint(words.command):
-        rest = [value for value in named if value != words.named[-1]]
-        return [(rest[0],)] if rest else []
-    if words.pointed is not None and len(named) == PAIR:
-        return [(named[words.pointed],), (named[1 - words.pointed],)]
+def _pointed_values(words: SlotWords) -> list[Candidates]:
+    """Return the named values at which the words point; none if they point at none.
+
+    *Red and blue* before *take the latter* -> blue; before *red is gone; take the one that is left*
+    -> blue; after *I mean the latter* -> blue, then red.
+    """
+    values = words.different
+    if words.ranks and not words.is_number and max(words.ranks) < len(values):
+        return certain(values[rank] for rank in words.ranks)
+
+    is_one_named_again = words.parts == 1 and len(values) < len(words.named)
+    if is_one_named_again and not REST.isdisjoint(words.command):
+        return certain(words.not_last[:1])
+
+    if words.pointed is not None and len(values) == PAIR:
+        other = 1 - words.pointed
+        return certain((values[words.pointed], values[other]))
     return []
 
 
-def _change(words: SlotWords) -> Callable[[int], Candidates] | None:
-    """Return how the command changes a number that was named; None if it does not."""
-    command = words.command
-    if "half" in command:
-        return lambda number: (number // 2,)
-    if "twice" in command or "double" in command:
-        return lambda number: (2 * number,)
-    if words.is_ordinal and NEIGHBOR in command:
-        near = words.vocabulary.values
-        return lambda number: tuple(one for one in (number - 1, number + 1) if one in near)
-    difference = next(_differences(words), None)
-    return None if difference is None else lambda number: (number + difference,)
+def _changed_number(words: SlotWords) -> list[Candidates]:
+    """Return the numbers that are named first, changed as the command says."""
+    change = _change(words)
+    if change is None:
+        return take_first(words)
+    return certain(change(int(value)) for value in words.named[: words.parts])
 
 
-def _differences(words: SlotWords) -> Iterator[int]:
-    """Yield the differences that a command names: -1 for *one time fewer* or *right before*."""
+def _change(words: SlotWords) -> Callable[[int], int] | None:
+    """Return how the command changes a number that was named; None if it does not.
+
+    *Twice as often* doubles it; *two times fewer* subtracts 2.
+    """
+    if "half" in words.command:
+        return lambda number: number // 2
+    if "twice" in words.command or "double" in words.command:
+        return lambda number: 2 * number
+    difference = _difference(words)
+    return None if difference is None else lambda number: number + difference
+
+
+def _difference(words: SlotWords) -> int | None:
+    """Return the first difference in a command; None without any.
+
+    *Two times more* -> 2, *one time fewer* -> -1, *the visit right before* -> -1.
+    """
     for place, word in enumerate(words.command):
-        sign = (word in MORE) - (word in FEWER)
-        if not sign or (word in ONLY_ORDINAL and not words.is_ordinal):
+        if word not in MORE | FEWER:
             continue
-        nearby = words.command[max(0, place - _REACH) : place]
-        numbers = [number_of(one) for one in nearby if number_of(one) is not None]
-        yield sign * (numbers[-1] or 1) if numbers else sign
+        if word in ONLY_ORDINAL and not words.is_ordinal:
+            continue
+        words_before = words.command[max(0, place - _REACH) : place]
+        numbers = [number for number in map(number_of, words_before) if number is not None]
+        size = numbers[-1] if numbers else 1
+        size = max(size, 1)  # "zero times fewer" is once fewer
+        return size if word in MORE else -size
+    return None
 
 
 SURFACE_RULES: Mapping[str, SurfaceRule] = {

@@ -1,11 +1,12 @@
-"""Guess a whole goal from the words of an instruction."""
+"""Guess a whole goal from the words of an instruction.
+
+A slot of a goal has one place or several: the colors of two containers are two places of a slot.
+"""
 
 from __future__ import annotations
 
 import functools
-import itertools
-import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 import numpy as np
@@ -25,8 +26,9 @@ from roboirg.shortcuts.named_values import (
     named_values,
     part_count,
     pointed_value,
+    stated_values,
 )
-from roboirg.shortcuts.surface_rules import SURFACE_RULES, Candidates, SlotWords
+from roboirg.shortcuts.surface_rules import SURFACE_RULES, Candidates, SlotWords, certain
 from roboirg.tasks import get_task, goals_of
 
 TextGuess = Mapping[str, tuple[Candidates, ...]]
@@ -35,73 +37,99 @@ TextGuess = Mapping[str, tuple[Candidates, ...]]
 
 @functools.lru_cache(maxsize=1024)
 def guess_goal(rule: str, text: str, task: str) -> TextGuess:
-    """Return what one of `SURFACE_RULES` makes of a whole prompt of a task."""
+    """Return what one of `SURFACE_RULES` makes of a whole prompt of a task.
+
+    ``first-mention`` of *Red and blue are fine. Pick one of them twice.* -> ``{"color":
+    (("red",),), "repeats": ((2,),)}``.
+    """
     check_names("rule", [rule], SURFACE_RULES)
     vocabulary = goal_vocabulary(task)
-    parts = part_count(text, get_task(task).commands.thing, vocabulary)
-    return {
-        slot: _candidates(rule, text, slot, one, parts if one.several else 1)
-        for slot, one in vocabulary.items()
-    }
+    thing_count = part_count(text, get_task(task).things.handled, vocabulary)
+    guess: dict[str, tuple[Candidates, ...]] = {}
+    for slot, slot_vocabulary in vocabulary.items():
+        parts = thing_count if slot_vocabulary.several else 1
+        candidates = _candidates(rule, text, slot, slot_vocabulary, parts)
+        # Where a rule has nothing to go by, every value is as likely.
+        candidates += [slot_vocabulary.values] * parts
+        guess[slot] = tuple(candidates[:parts])
+    return guess
 
 
 def _candidates(
     rule: str, text: str, slot: str, vocabulary: SlotVocabulary, parts: int
-) -> tuple[Candidates, ...]:
+) -> list[Candidates]:
+    """Return the values that the command states, or those that a rule finds, for each place."""
+    stated = stated_values(text, slot, vocabulary)
+    if stated:
+        return certain(stated)
     named = named_values(text, slot, vocabulary)
-    found: list[Candidates] = [(one.value,) for one in named if one.stated]
-    if not found:
-        values = tuple(one.value for one in named)
-        command, ranks = command_words(text), command_ranks(text)
-        words = SlotWords(slot, vocabulary, values, command, parts, pointed_value(text), ranks)
-        found = SURFACE_RULES[rule](words)
-    # Where a rule has nothing to go by, every value is as likely.
-    padded = itertools.chain(found, itertools.repeat(()))
-    return tuple(one or vocabulary.values for one in itertools.islice(padded, parts))
+    words = SlotWords(
+        slot=slot,
+        vocabulary=vocabulary,
+        named=tuple(mention.value for mention in named),
+        command=command_words(text),
+        parts=parts,
+        pointed=pointed_value(text),
+        ranks=command_ranks(text),
+    )
+    found = SURFACE_RULES[rule](words)
+    return [candidates or vocabulary.values for candidates in found]
 
 
-def slot_share(guess: TextGuess, slot: str, content: SlotValue) -> Fraction:
-    """Return the expected share of a slot's values that a guess gets right."""
+def slot_share(guess: TextGuess, slot: str, content: SlotValue, places: Sequence[int]) -> Fraction:
+    """Return the expected share of some places of a slot that a guess gets right."""
     values = values_in(content)
-    places = zip(guess[slot], values, strict=False)
-    return sum((_share(place, value) for place, value in places), Fraction(0)) / len(values)
+    guessed = guess[slot]
+    total = Fraction(0)
+    for place in places:
+        if place < len(guessed):
+            total += _share(guessed[place], values[place])
+    return total / len(places)
 
 
 def goal_share(guess: TextGuess, episode: Episode) -> Fraction:
-    """Return the probability that a guess is the right goal."""
+    """Return the probability that a guess is the right goal.
+
+    Several goals of the scene may be right, as they have the same stages: their probabilities add.
+    """
     total = Fraction(0)
     for goal in goals_of(episode):
-        probability = sum((_probability(guess, slots) for slots in orders(goal)), Fraction(0))
+        probability = Fraction(0)
+        for slots in orders(goal):
+            probability += _probability(guess, slots)
         if probability and is_right(goal, episode):
             total += probability
     return total
 
 
 def draw_goal(guess: TextGuess, episode: Episode, rng: np.random.Generator) -> Goal | None:
-    """Draw a goal from a guess; None if the scene does not have it."""
-    drawn = {
-        slot: tuple(candidates[int(rng.integers(len(candidates)))] for candidates in places)
-        for slot, places in guess.items()
-    }
+    """Draw a value for each place of a guess, and return the goal; None if the scene lacks it."""
+    drawn: dict[str, tuple[Value, ...]] = {}
+    for slot, places in guess.items():
+        values = [candidates[int(rng.integers(len(candidates)))] for candidates in places]
+        drawn[slot] = tuple(values)
     for goal in goals_of(episode):
         for slots in orders(goal):
-            if {slot: values_in(content) for slot, content in slots.items()} == drawn:
+            goal_values = {slot: values_in(content) for slot, content in slots.items()}
+            if goal_values == drawn:
                 return goal
     return None
 
 
 def _probability(guess: TextGuess, slots: Mapping[str, SlotValue]) -> Fraction:
-    """Return the probability that a guess is exactly these values."""
-    shares: list[Fraction] = []
+    """Return the probability that a guess is exactly these values: one of two, and sure -> 1/2."""
+    probability = Fraction(1)
     for slot, places in guess.items():
         values = values_in(slots[slot])
         if len(values) != len(places):
             return Fraction(0)
-        if not all(value in place for place, value in zip(places, values, strict=True)):
-            return Fraction(0)
-        shares += [_share(place, value) for place, value in zip(places, values, strict=True)]
-    return math.prod(shares, start=Fraction(1))
+        for candidates, value in zip(places, values, strict=True):
+            if value not in candidates:
+                return Fraction(0)
+            probability *= _share(candidates, value)
+    return probability
 
 
 def _share(candidates: Candidates, value: Value) -> Fraction:
+    """Return the probability of a value if one of the candidates is drawn."""
     return Fraction(candidates.count(value), len(candidates))

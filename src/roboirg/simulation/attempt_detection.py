@@ -1,7 +1,9 @@
 """Detect what the hand tries: facts that no stage expects, by which failures are attributed.
 
-"Next to" an object is up to `BESIDE` from its outline, so a bigger body has a bigger surrounding.
-What costs time waits for fingers that close or open, or for a low hand.
+Such a fact is an attempt, for example *clutched*: the fingers have closed on nothing next to an
+object. `roboirg.core.fact_traits` defines each kind. "Next to" an object is up to `BESIDE` from its
+outline, so a bigger body has a bigger surrounding. What costs time waits for fingers that close or
+open, or for a low hand.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from collections.abc import Set as AbstractSet
+from typing import NamedTuple
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import SceneObject
@@ -28,87 +31,140 @@ from roboirg.simulation.bodies import Body
 from roboirg.simulation.panda import Panda
 
 
+class NearObject(NamedTuple):
+    """An object that the hand is near in one step.
+
+    Attributes:
+        item: its data.
+        position: of its origin, m.
+        gap: from its outline to the tool center in the plane, m; negative above the object.
+        is_held: whether the hand holds it.
+    """
+
+    item: SceneObject
+    position: Point
+    gap: float
+    is_held: bool
+
+
 class AttemptDetector:
     """Detects the attempts in one world, step by step.
 
     Attributes:
-        near: what the hand is near in this step: the object, the position of its origin, how far
-            the tool center is from its outline in the plane, m, and whether the hand holds it. Each
-            step begins without.
+        near: the objects that the hand is near in this step; each step begins without.
         found: the attempts of the last step.
     """
 
     def __init__(self, bodies: Mapping[str, Body], robot: Panda) -> None:
-        self._robot, self._bodies = robot, tuple(bodies.values())
-        self._peak, self._anchor, self._stays = 0.0, Point(0.0, 0.0, 0.0), 0
-        self._gaps: dict[str, float] = {}
-        self.near: list[tuple[SceneObject, Point, float, bool]] = []
-        self._spots: Mapping[str, Point] = {}
+        self._robot = robot
+        self._bodies = tuple(bodies.values())
+        self.near: list[NearObject] = []
         self.found: AbstractSet[Fact] = frozenset()
+        self._place_positions: Mapping[str, Point] = {}
+        # The greatest height since the fingers closed on nothing, m; 0 while they have not.
+        self._peak = 0.0
+        # The gaps to the objects under the hand when the fingers were open last: closing fingers
+        # can push away what they are meant to grasp.
+        self._open_gaps: dict[str, float] = {}
+        self._lingers_at = Point(0.0, 0.0, 0.0)
+        self._lingering_steps = 0
 
-    def detect(self, tool: Point, facts: AbstractSet[Fact], spots: Mapping[str, Point]) -> None:
+    def detect(
+        self, tool: Point, facts: AbstractSet[Fact], place_positions: Mapping[str, Point]
+    ) -> None:
         """Find the attempts of this step.
 
         Args:
             tool: the tool center.
             facts: of the world.
-            spots: positions of places by name, m.
+            place_positions: of the objects that can be places, by name, m.
         """
-        self._spots = spots
+        self._place_positions = place_positions
         opening = float(self._robot.finger_positions.max())
-        shut = opening < FINGERS_SHUT
-        # The greatest height since the fingers closed on nothing; 0 while they have not.
-        peak, self._peak = self._peak, max(self._peak, tool.z) if shut else 0.0
-        stays = math.dist(tool, self._anchor) <= BESIDE
-        self._anchor, self._stays = (self._anchor, self._stays + 1) if stays else (tool, 0)
-        found = [Fact("lingering", "robot")] if self._stays >= LINGER_STEPS else []
+        is_shut = opening < FINGERS_SHUT
+        peak = self._peak
+        self._peak = max(peak, tool.z) if is_shut else 0.0
+
+        found: list[Fact] = []
+        if self._lingers(tool):
+            found.append(Fact("lingering", "robot"))
         if tool.z <= HAND_HIGH:
-            if opening > FINGERS_OPEN:  # closing fingers can push away what they mean
-                self._gaps = {
-                    item.name: gap
-                    for item, position, gap, _ in self.near
-                    if tool.z - position.z <= HAND_LOWERED
-                }
-            found += self._handled(tool, just_shut=shut and not peak)
-            if peak > HAND_RAISED:
-                found += self._ended(tool, facts, shut=shut)
+            if opening > FINGERS_OPEN:
+                self._open_gaps = self._gaps_below(tool)
+            if is_shut and not peak:
+                found += self._missed_objects()
+            found += self._hand_at_objects(tool)
+            if peak > HAND_RAISED and is_shut:
+                found += self._missed_buttons(tool, facts)
+            if peak > HAND_RAISED and not is_shut:
+                found += self._emptied_places(tool)
         self.found = frozenset(found)
         self.near.clear()
 
-    def _handled(self, tool: Point, *, just_shut: bool) -> Iterator[Fact]:
-        """Yield what the hand is above, where it has carried something, and what it missed."""
-        if tool.z <= HAND_RAISED and all(one[2] > BESIDE for one in self.near):
-            yield from (Fact("emptied", "robot", one) for one in self._next_to(tool, "target"))
-        most = min((*self._gaps.values(), BESIDE - UNCLEAR)) + UNCLEAR
-        if just_shut:
-            yield from (Fact("clutched", one) for one, gap in self._gaps.items() if gap <= most)
-        for item, position, gap, held in self.near:
-            name = item.name
+    def _lingers(self, tool: Point) -> bool:
+        """Return whether the hand has been at about the same point for `LINGER_STEPS`."""
+        if math.dist(tool, self._lingers_at) <= BESIDE:
+            self._lingering_steps += 1
+        else:
+            self._lingers_at = tool
+            self._lingering_steps = 0
+        return self._lingering_steps >= LINGER_STEPS
+
+    def _gaps_below(self, tool: Point) -> dict[str, float]:
+        """Return the gaps to the near objects that the hand is low over, by name."""
+        return {
+            near.item.name: near.gap
+            for near in self.near
+            if tool.z - near.position.z <= HAND_LOWERED
+        }
+
+    def _missed_objects(self) -> Iterator[Fact]:
+        """Yield what fingers that have just closed on nothing may have been meant to grasp.
+
+        It is the nearest object, and those that are not clearly farther away.
+        """
+        farthest = min((*self._open_gaps.values(), BESIDE - UNCLEAR)) + UNCLEAR
+        for name, gap in self._open_gaps.items():
+            if gap <= farthest:
+                yield Fact("clutched", name)
+
+    def _hand_at_objects(self, tool: Point) -> Iterator[Fact]:
+        """Yield what the hand is above, what it lowers where, and targets that it visits empty."""
+        if tool.z <= HAND_RAISED and all(near.gap > BESIDE for near in self.near):
+            for target in self._next_to(tool, "target"):
+                yield Fact("emptied", "robot", target)
+        for item, position, gap, is_held in self.near:
             if gap <= BESIDE:
-                yield Fact("above", "robot", name)
-            if held and tool.z < HAND_LOWERED:
-                yield Fact("lowered", name)
-            places = ("target", "bin", "box") if held else ()
-            yield from (Fact("beside", name, one) for one in self._next_to(position, *places))
+                yield Fact("above", "robot", item.name)
+            if is_held and tool.z < HAND_LOWERED:
+                yield Fact("lowered", item.name)
+            if is_held:
+                for place in self._next_to(position, "target", "bin", "box"):
+                    yield Fact("beside", item.name, place)
 
-    def _ended(self, tool: Point, facts: AbstractSet[Fact], *, shut: bool) -> Iterator[Fact]:
-        """Yield where closed fingers that were up let go of nothing, or press nothing."""
-        if not shut:
-            kinds = ("bin", "box", "cube")[: 2 if tool.z > HAND_RAISED else None]
-            yield from (Fact("emptied", "robot", one) for one in self._next_to(tool, *kinds))
-        elif tool.z < HAND_LOW:
-            missed = (Fact("pressed_beside", one) for one in self._next_to(tool, "button"))
-            yield from (one for one in missed if Fact("pressed", one.subject) not in facts)
+    def _emptied_places(self, tool: Point) -> Iterator[Fact]:
+        """Yield where fingers that were closed on nothing have opened, as if to let go."""
+        kinds = ["bin", "box"]
+        if tool.z <= HAND_RAISED:
+            kinds.append("cube")
+        for place in self._next_to(tool, *kinds):
+            yield Fact("emptied", "robot", place)
 
-    def _next_to(self, point: Point, *kinds: str) -> list[str]:
-        """Return the names of objects of some kinds to which a point is next."""
-        return [
-            body.item.name
-            for body in self._bodies
-            if body.item.kind in kinds
-            and distance_in_plane(point, self._spots.get(body.item.name) or body.position)
-            <= body.item.half_width + BESIDE
-        ]
+    def _missed_buttons(self, tool: Point, facts: AbstractSet[Fact]) -> Iterator[Fact]:
+        """Yield the buttons next to which closed fingers have come down without pressing them."""
+        if tool.z >= HAND_LOW:
+            return
+        for button in self._next_to(tool, "button"):
+            if Fact("pressed", button) not in facts:
+                yield Fact("pressed_beside", button)
+
+    def _next_to(self, point: Point, *kinds: str) -> Iterator[str]:
+        """Yield the names of the objects of some kinds to which a point is next."""
+        for body in self._bodies:
+            if body.item.kind in kinds:
+                center = self._place_positions.get(body.item.name) or body.position
+                if distance_in_plane(point, center) <= body.item.half_width + BESIDE:
+                    yield body.item.name
 
 
 def distance_in_plane(first: Point, second: Point) -> float:

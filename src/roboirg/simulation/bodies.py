@@ -24,6 +24,7 @@ from roboirg.core.errors import InvalidValueError, check_names
 from roboirg.core.motions import Point
 from roboirg.simulation.rendering.tube_mesh import Rgba, tube_mesh
 
+# SAPIEN takes half sizes everywhere: half sides, half heights, half thicknesses.
 Triple = tuple[float, float, float]
 Cuboid = tuple[Triple, Triple]
 """Center and half sides in the object's frame, m."""
@@ -45,8 +46,13 @@ BLACK: Rgba = (0.0, 0.0, 0.0, 1.0)
 
 UPRIGHT = (math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0)
 """Turns SAPIEN's cylinders, which lie along x, upright."""
+JOINT_UP = (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0)
+"""Turns the frames of SAPIEN's prismatic joints, which slide along x, so that x points up."""
 UPSIDE_DOWN = (0.0, 1.0, 0.0, 0.0)
 RING_SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
+"""Radii of a disc's rings, in radii of the disc."""
+RING_STEP = 1e-5
+"""Meters by which each ring is higher than the next larger one, which it covers."""
 CAP_DENSITY = 1500.0
 FLOOR_SHADE = 0.5
 """Brightness of a box's floor in that of its walls: no shadow shows its depth."""
@@ -78,7 +84,8 @@ class Body:
     @property
     def yaw(self) -> float:
         """Rotation about the vertical, rad."""
-        return math.atan2(*self.entity.pose.to_transformation_matrix()[1::-1, 0])
+        x_axis = self.entity.pose.to_transformation_matrix()[:, 0]
+        return math.atan2(x_axis[1], x_axis[0])
 
     def put(self, position: Point) -> None:
         """Teleport the object, upright and at rest, with its own yaw."""
@@ -100,7 +107,9 @@ class Body:
     @property
     def pressed_depth(self) -> float:
         """Distance by which a button's cap is down, m; 0 for other objects."""
-        return -float(self.button.get_qpos()[0]) if self.button is not None else 0.0
+        if self.button is None:
+            return 0.0
+        return -float(self.button.get_qpos()[0])
 
 
 BodyBuilder = Callable[[sapien.Scene, SceneObject, bool], Body]
@@ -131,9 +140,12 @@ def register_body_builder(kind: ObjectKind, builder: BodyBuilder) -> None:
 
 
 def _pose(item: SceneObject, position: Point) -> sapien.Pose:
+    """Return the pose of an object that stands at a position, with its own yaw."""
     half = item.yaw / 2.0
-    turned = sapien.Pose(position, [math.cos(half), 0.0, 0.0, math.sin(half)])
-    return turned * sapien.Pose(q=UPSIDE_DOWN) if item.kind == "container" else turned
+    pose = sapien.Pose(position, [math.cos(half), 0.0, 0.0, math.sin(half)])
+    if item.kind == "container":
+        return pose * sapien.Pose(q=UPSIDE_DOWN)
+    return pose
 
 
 def _material(rgba: Rgba) -> sapien.render.RenderMaterial:
@@ -141,7 +153,10 @@ def _material(rgba: Rgba) -> sapien.render.RenderMaterial:
 
 
 def _rgba(item: SceneObject, usual: Rgba) -> Rgba:
-    return usual if item.rgb is None else (*item.rgb, 1.0)
+    """Return the color that the scene gives an object; the usual one of its kind without."""
+    if item.rgb is None:
+        return usual
+    return (*item.rgb, 1.0)
 
 
 def finish_body(
@@ -168,41 +183,53 @@ def _build_cube(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
 
 def _build_container(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     """Build six boxes, upside down; the gripper grasps the knob."""
-    wall, side = object_sizes.CONTAINER_WALL / 2, object_sizes.CONTAINER_HALF
-    roof, height = object_sizes.CONTAINER_ROOF / 2, object_sizes.CONTAINER_WALL_HEIGHT / 2
+    half_wall = object_sizes.CONTAINER_WALL / 2
+    half_side = object_sizes.CONTAINER_HALF
+    half_roof = object_sizes.CONTAINER_ROOF / 2
+    half_height = object_sizes.CONTAINER_WALL_HEIGHT / 2
     # Upside down, z is measured from the origin (the roof's top) towards the opening.
-    roof_z, wall_z = roof, object_sizes.CONTAINER_HEIGHT - height
+    wall_z = object_sizes.CONTAINER_HEIGHT - half_height
     boxes = [
-        ((0.0, 0.0, roof_z), (side, side, roof)),
-        ((-side, 0.0, wall_z), (wall, side, height)),
-        ((side, 0.0, wall_z), (wall, side, height)),
-        ((0.0, -side, wall_z), (side, wall, height)),
-        ((0.0, side, wall_z), (side, wall, height)),
-        ((0.0, 0.0, 0.0), (object_sizes.CUBE_HALF,) * 3),
+        ((0.0, 0.0, half_roof), (half_side, half_side, half_roof)),
+        ((-half_side, 0.0, wall_z), (half_wall, half_side, half_height)),
+        ((half_side, 0.0, wall_z), (half_wall, half_side, half_height)),
+        ((0.0, -half_side, wall_z), (half_side, half_wall, half_height)),
+        ((0.0, half_side, wall_z), (half_side, half_wall, half_height)),
+        ((0.0, 0.0, 0.0), (object_sizes.CUBE_HALF,) * 3),  # the knob
     ]
     builder = ActorBuilder()
     _add_boxes(builder, boxes, WHITE if visible else None)
     return finish_body(builder, scene, item, "dynamic")
 
 
-def _build_disc(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
-    """Build five concentric discs, colored and white in turn, without collision shapes.
-
-    A target is purple unless the scene gives a color; a red marker is thick enough to cover one.
-    """
-    rgba, half = _rgba(item, PURPLE), (item.thickness or object_sizes.TARGET_THICKNESS) / 2
-    if item.kind == "marker":
-        rgba, half = RED, object_sizes.MARKER_HALF_THICKNESS
-    radius = float(item.radius or 0.0)
+def _build_target(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    """Build a target, purple unless the scene gives a color, without collision shapes."""
     builder = ActorBuilder()
-    for index, share in enumerate(RING_SHARES if visible else ()):
+    if visible:
+        thickness = item.thickness or object_sizes.TARGET_THICKNESS
+        _add_rings(builder, item, _rgba(item, PURPLE), thickness / 2)
+    return finish_body(builder, scene, item, "kinematic")
+
+
+def _build_marker(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
+    """Build a red disc that is thick enough to cover a target, without collision shapes."""
+    builder = ActorBuilder()
+    if visible:
+        _add_rings(builder, item, RED, object_sizes.MARKER_HALF_THICKNESS)
+    return finish_body(builder, scene, item, "kinematic")
+
+
+def _add_rings(builder: ActorBuilder, item: SceneObject, rgba: Rgba, half_height: float) -> None:
+    """Add five concentric discs, colored and white in turn; the smaller ones rise a bit higher."""
+    radius = float(item.radius or 0.0)
+    for number, share in enumerate(RING_SHARES):
+        color = WHITE if number % 2 else rgba
         builder.add_cylinder_visual(
             sapien.Pose(q=UPRIGHT),
             radius=radius * share,
-            half_length=half + index * 1e-5,
-            material=_material(WHITE if index % 2 else rgba),
+            half_length=half_height + number * RING_STEP,
+            material=_material(color),
         )
-    return finish_body(builder, scene, item, "kinematic")
 
 
 def _build_site(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
@@ -222,15 +249,16 @@ def _build_shuttle(scene: sapien.Scene, item: SceneObject, visible: bool) -> Bod
 
 def _build_bin(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     """Build four walls and a black floor without collision: objects fall to the table."""
-    height = object_sizes.BIN_HEIGHT / 2
+    half_height = object_sizes.BIN_HEIGHT / 2
     builder = ActorBuilder()
-    walls = _walls(object_sizes.BIN_HALF, object_sizes.BIN_WALL / 2, height)
+    walls = _walls(object_sizes.BIN_HALF, object_sizes.BIN_WALL / 2, half_height)
     _add_boxes(builder, walls, WOOD if visible else None)
     if visible:
-        floor = object_sizes.BIN_FLOOR_HEIGHT / 2
+        half_floor = object_sizes.BIN_FLOOR_HEIGHT / 2
+        half_hole = object_sizes.BIN_HOLE_HALF
         builder.add_box_visual(
-            sapien.Pose([0.0, 0.0, floor - height]),
-            half_size=(object_sizes.BIN_HOLE_HALF, object_sizes.BIN_HOLE_HALF, floor),
+            sapien.Pose([0.0, 0.0, half_floor - half_height]),
+            half_size=(half_hole, half_hole, half_floor),
             material=_material(BLACK),
         )
     return finish_body(builder, scene, item, "kinematic")
@@ -238,33 +266,39 @@ def _build_bin(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
 
 def _build_box(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     """Build four walls and a floor, fixed to the table."""
-    rgba = COLOR_RGBA[str(item.color)]
-    red, green, blue, _ = rgba
-    dark = (FLOOR_SHADE * red, FLOOR_SHADE * green, FLOOR_SHADE * blue, 1.0)
-    wall, height, floor = (
-        object_sizes.BOX_WALL / 2,
-        object_sizes.BOX_HEIGHT / 2,
-        object_sizes.BOX_FLOOR / 2,
-    )
-    inner = object_sizes.BOX_HALF - object_sizes.BOX_WALL
-    bottom = ((0.0, 0.0, floor - height), (inner, inner, floor))
+    half_height = object_sizes.BOX_HEIGHT / 2
+    half_floor = object_sizes.BOX_FLOOR / 2
+    half_hole = object_sizes.BOX_HALF - object_sizes.BOX_WALL
+    walls = _walls(object_sizes.BOX_HALF, object_sizes.BOX_WALL / 2, half_height)
+    floor = ((0.0, 0.0, half_floor - half_height), (half_hole, half_hole, half_floor))
+    color = COLOR_RGBA[str(item.color)]
     builder = ActorBuilder()
-    _add_boxes(builder, _walls(object_sizes.BOX_HALF, wall, height), rgba if visible else None)
-    _add_boxes(builder, [bottom], dark if visible else None)
+    _add_boxes(builder, walls, color if visible else None)
+    _add_boxes(builder, [floor], _darkened(color) if visible else None)
     return finish_body(builder, scene, item, "kinematic")
 
 
-def _walls(half: float, wall: float, height: float) -> list[Cuboid]:
-    """Return four walls around a square, given half its outer side, thickness and height."""
-    side, hole = half - wall, half - 2 * wall
-    return [
-        cuboid
-        for sign in (-1.0, 1.0)
-        for cuboid in (
-            ((0.0, sign * side, 0.0), (half, wall, height)),
-            ((sign * side, 0.0, 0.0), (wall, hole, height)),
-        )
-    ]
+def _darkened(rgba: Rgba) -> Rgba:
+    """Return the color of a box's floor, given that of its walls."""
+    red, green, blue, opacity = rgba
+    return (FLOOR_SHADE * red, FLOOR_SHADE * green, FLOOR_SHADE * blue, opacity)
+
+
+def _walls(half_side: float, half_wall: float, half_height: float) -> list[Cuboid]:
+    """Return four walls around a square.
+
+    Args:
+        half_side: half the square's outer side, m.
+        half_wall: half the walls' thickness, m.
+        half_height: half their height, m.
+    """
+    center = half_side - half_wall
+    half_hole = half_side - 2 * half_wall
+    walls: list[Cuboid] = []
+    for sign in (-1.0, 1.0):
+        walls.append(((0.0, sign * center, 0.0), (half_side, half_wall, half_height)))
+        walls.append(((sign * center, 0.0, 0.0), (half_wall, half_hole, half_height)))
+    return walls
 
 
 def _add_boxes(builder: ActorBuilder, cuboids: Sequence[Cuboid], rgba: Rgba | None) -> None:
@@ -278,72 +312,79 @@ def _add_boxes(builder: ActorBuilder, cuboids: Sequence[Cuboid], rgba: Rgba | No
 
 def _build_tape(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     """Build a ring of boxes, to be grasped from outside or by its wall; it looks round."""
-    outer, inner = object_sizes.TAPE_RADIUS, object_sizes.TAPE_HOLE_RADIUS
-    wall = (outer - inner) / 2
-    half = (wall, outer * math.tan(math.pi / object_sizes.TAPE_SIDES), object_sizes.TAPE_HALF)
+    outer = object_sizes.TAPE_RADIUS
+    inner = object_sizes.TAPE_HOLE_RADIUS
+    half_height = object_sizes.TAPE_HALF
+    half_wall = (outer - inner) / 2
+    half_side = outer * math.tan(math.pi / object_sizes.TAPE_SIDES)
     builder = ActorBuilder()
     for number in range(object_sizes.TAPE_SIDES):
         angle = 2 * math.pi * number / object_sizes.TAPE_SIDES
-        center = (math.cos(angle) * (inner + wall), math.sin(angle) * (inner + wall), 0.0)
-        turned = [math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)]
-        builder.add_box_collision(sapien.Pose(center, turned), half_size=half)
+        pose = _pose_on_circle(inner + half_wall, angle)
+        builder.add_box_collision(pose, half_size=(half_wall, half_side, half_height))
     body = finish_body(builder, scene, item, "dynamic")
     if visible:
         component = sapien.render.RenderBodyComponent()
-        mesh = tube_mesh(outer, inner, object_sizes.TAPE_HALF, COLOR_RGBA[str(item.color)])
+        mesh = tube_mesh(outer, inner, half_height, COLOR_RGBA[str(item.color)])
         component.attach(mesh.clone())
         body.entity.add_component(component)
     return body
 
 
+def _pose_on_circle(radius: float, angle: float) -> sapien.Pose:
+    """Return the pose of a point on a circle around the origin, with x away from the origin."""
+    center = (math.cos(angle) * radius, math.sin(angle) * radius, 0.0)
+    return sapien.Pose(center, [math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)])
+
+
 def _build_button(scene: sapien.Scene, item: SceneObject, visible: bool) -> Body:
     """Build a base and a cap on a sprung vertical joint; negative positions are pressed."""
+    base_half = object_sizes.BUTTON_BASE_HALF
+    cap_size = {
+        "radius": object_sizes.BUTTON_CAP_RADIUS,
+        "half_length": object_sizes.BUTTON_CAP_HALF_LENGTH,
+    }
+    upright = sapien.Pose(q=UPRIGHT)
     builder = ArticulationBuilder()
     builder.set_scene(scene)
     builder.set_initial_pose(_pose(item, item.position))
     base = builder.create_link_builder()
     base.set_name("button_base")
-    base.add_box_collision(half_size=object_sizes.BUTTON_BASE_HALF)
+    base.add_box_collision(half_size=base_half)
     cap = builder.create_link_builder(base)
     cap.set_name("button_cap")
     cap.set_joint_name("button_joint")
-    # SAPIEN's prismatic joints slide along x: both joint frames are turned so that x points up.
-    rest = object_sizes.BUTTON_BASE_HALF[2] + object_sizes.BUTTON_CAP_HALF_LENGTH
-    up = (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0)
+    rest = base_half[2] + object_sizes.BUTTON_CAP_HALF_LENGTH
     cap.set_joint_properties(
         "prismatic",
         [[-object_sizes.BUTTON_TRAVEL, 0.0]],
-        sapien.Pose([0.0, 0.0, rest], up),
-        sapien.Pose([0.0, 0.0, 0.0], up),
+        sapien.Pose([0.0, 0.0, rest], JOINT_UP),
+        sapien.Pose([0.0, 0.0, 0.0], JOINT_UP),
     )
-    shape = {
-        "radius": object_sizes.BUTTON_CAP_RADIUS,
-        "half_length": object_sizes.BUTTON_CAP_HALF_LENGTH,
-    }
-    cap.add_cylinder_collision(sapien.Pose(q=UPRIGHT), density=CAP_DENSITY, **shape)
+    cap.add_cylinder_collision(upright, density=CAP_DENSITY, **cap_size)
     if visible:
-        base.add_box_visual(half_size=object_sizes.BUTTON_BASE_HALF, material=_material(WHITE))
-        cap.add_cylinder_visual(sapien.Pose(q=UPRIGHT), material=_material(GRAY), **shape)
+        base.add_box_visual(half_size=base_half, material=_material(WHITE))
+        cap.add_cylinder_visual(upright, material=_material(GRAY), **cap_size)
     articulation = builder.build(fix_root_link=True)
     articulation.set_name(item.name)
     articulation.set_qpos(np.zeros(1))
     joint = articulation.active_joints[0]
     joint.set_drive_properties(BUTTON_STIFFNESS, BUTTON_DAMPING, mode="force")
     joint.set_drive_target(0.0)
-    cap_link = articulation.links[1]
-    return Body(item, articulation.links[0].entity, cap_link, articulation)
+    base_link, cap_link = articulation.links
+    return Body(item, base_link.entity, cap_link, articulation)
 
 
 _BUILDERS: dict[ObjectKind, BodyBuilder] = {
     "cube": _build_cube,
     "hidden_cube": _build_cube,
     "container": _build_container,
-    "target": _build_disc,
+    "target": _build_target,
     "button": _build_button,
     "bin": _build_bin,
     "site": _build_site,
     "shuttle": _build_shuttle,
-    "marker": _build_disc,
+    "marker": _build_marker,
     "box": _build_box,
     "tape": _build_tape,
 }

@@ -6,7 +6,7 @@ Drawing is most of the cost of a step on a CPU, so a camera draws only what it c
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -42,8 +42,8 @@ backward) and the entity id."""
 
 
 @dataclass
-class _DrawnState:
-    """The inputs and fetched outputs of a drawing.
+class _View:
+    """A view of a camera, which is drawn or will be: its inputs and fetched outputs.
 
     Attributes:
         state: everything that determines the picture.
@@ -66,23 +66,28 @@ class Cameras:
         self, scene: sapien.Scene, robot: Panda, rendering: RenderSettings = FAITHFUL
     ) -> None:
         self._scene = scene
-        shader = slim_shader() if rendering.slim_shader else ""  # SAPIEN's own
+        self._color = STOCK_COLOR
+        shader = ""  # SAPIEN's own
+        if rendering.slim_shader:
+            self._color = COLOR
+            shader = slim_shader()
+        self._components = {name: _make_camera(name, shader) for name in CAMERAS}
         fixed = sapien.Entity()
         fixed.name = "front_camera"
-        self._color = COLOR if shader else STOCK_COLOR
-        self._components = {name: _make_camera(name, shader) for name in CAMERAS}
         fixed.add_component(self._components[FRONT])
         fixed.set_pose(front_camera_pose())
         scene.add_entity(fixed)
         robot.links[CAMERA_LINK].entity.add_component(self._components[WRIST])
-        for component in self._components.values() if rendering.quick_start else ():
-            component.set_texture("BRDFLUT", placeholder_brdf_table())
+        if rendering.quick_start:
+            for component in self._components.values():
+                component.set_texture("BRDFLUT", placeholder_brdf_table())
+
         self._bodies = CullableBodies(scene, robot.cullable_bodies)
-        self._culling = rendering.culling
-        self._last: dict[str, _DrawnState] = {}
+        self._has_culling = rendering.culling
+        self._last: dict[str, _View] = {}
         # All poses, the wrist camera's included, for which each camera's last picture is valid.
         self._last_poses: dict[str, bytes] = {}
-        self._frozen = False
+        self._is_frozen = False
 
     def picture(self, camera: str) -> Pixels:
         """Return the current picture, RGB, shape (256, 256, 3)."""
@@ -91,18 +96,21 @@ class Cameras:
     def pictures(self, cameras: Sequence[str]) -> dict[str, Pixels]:
         """Return the current pictures of several cameras; faster than one at a time."""
         self.draw(cameras)
-        return {
-            camera: np.asarray(cv2.cvtColor(self._fetch(camera, self._color), cv2.COLOR_RGBA2RGB))
-            for camera in cameras
-        }
+        pictures: dict[str, Pixels] = {}
+        for camera in cameras:
+            rgba = self._fetch(camera, self._color)
+            pictures[camera] = np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2RGB))
+        return pictures
 
     def depth(self, camera: str) -> NDArray[np.int16]:
         """Return the depth in mm, shape (256, 256, 1); 0 where nothing is visible."""
-        return np.asarray(-self._geometry(camera)[..., 2:3], dtype=np.int16)
+        z = self._geometry(camera)[..., 2:3]
+        return np.asarray(-z, dtype=np.int16)
 
     def segmentation(self, camera: str) -> NDArray[np.int16]:
         """Return the ``entity.per_scene_id`` at each pixel, shape (256, 256)."""
-        return np.asarray(self._geometry(camera)[..., 3], dtype=np.int16).copy()
+        entity_ids = self._geometry(camera)[..., 3]
+        return np.asarray(entity_ids, dtype=np.int16).copy()
 
     def extrinsic(self, camera: str) -> NDArray[np.float32]:
         """Return the world-to-camera matrix (3, 4): x right, y down, z forward (OpenCV)."""
@@ -119,49 +127,61 @@ class Cameras:
         Drawing runs in the background. A later read returns these pictures if nothing has moved
         since, or within `frozen`.
         """
-        if self._frozen:
+        if self._is_frozen:
             return
         poses = self._bodies.poses()
-        state = poses.tobytes()
-        stale = [camera for camera in cameras if self._last_poses.get(camera) != state]
-        now = {camera: self._view_of(camera, poses) for camera in stale}
-        due = [camera for camera in stale if self._is_new(camera, now[camera])]
-        with DRAWING:
-            if due:
-                self._scene.update_render()
-            for camera in due:
-                if self._culling:
-                    self._bodies.take_picture(self._components[camera], now[camera].bodies)
-                else:
-                    self._components[camera].take_picture()
-                self._last[camera] = now[camera]
-        self._last_poses.update(dict.fromkeys(stale, state))
+        poses_bytes = poses.tobytes()
+        stale = [camera for camera in cameras if self._last_poses.get(camera) != poses_bytes]
+        changed: dict[str, _View] = {}
+        for camera in stale:
+            view = self._view_of(camera, poses)
+            if self._is_new(camera, view):
+                changed[camera] = view
+        if changed:
+            self._take_pictures(changed)
+        for camera in stale:
+            self._last_poses[camera] = poses_bytes
 
-    def _view_of(self, camera: str, poses: NDArray[np.float64]) -> _DrawnState:
+    def _take_pictures(self, views: Mapping[str, _View]) -> None:
+        """Start drawing views of cameras."""
+        with DRAWING:
+            self._scene.update_render()
+            for camera, view in views.items():
+                component = self._components[camera]
+                if self._has_culling:
+                    self._bodies.take_picture(component, view.bodies)
+                else:
+                    component.take_picture()
+                self._last[camera] = view
+
+    def _view_of(self, camera: str, poses: NDArray[np.float64]) -> _View:
         """Return what a camera would draw now."""
         component = self._components[camera]
-        view = np.asarray(component.get_extrinsic_matrix(), dtype=np.float64)[:3]
-        bodies = np.ones(len(poses), dtype=bool)
-        if self._culling:
-            bodies = self._bodies.visible(camera, poses, view)
+        if self._has_culling:
+            extrinsic = np.asarray(component.get_extrinsic_matrix(), dtype=np.float64)[:3]
+            bodies = self._bodies.visible(camera, poses, extrinsic)
+        else:
+            bodies = np.ones(len(poses), dtype=bool)
         eye = component.entity.pose
-        state = b"".join(it.tobytes() for it in (eye.p, eye.q, bodies, poses[bodies]))
-        return _DrawnState(state, bodies)
+        eye_bytes = eye.p.tobytes() + eye.q.tobytes()
+        return _View(eye_bytes + bodies.tobytes() + poses[bodies].tobytes(), bodies)
 
-    def _is_new(self, camera: str, drawn: _DrawnState) -> bool:
+    def _is_new(self, camera: str, view: _View) -> bool:
+        """Return whether a camera has drawn no picture like this last."""
         last = self._last.get(camera)
-        return last is None or last.state != drawn.state
+        return last is None or last.state != view.state
 
     @contextmanager
     def frozen(self) -> Iterator[None]:
         """Context in which reads return the last drawn pictures, even if bodies have moved."""
-        self._frozen = True
+        self._is_frozen = True
         try:
             yield
         finally:
-            self._frozen = False
+            self._is_frozen = False
 
     def _geometry(self, camera: str) -> NDArray[np.integer[Any]]:
+        """Return `GEOMETRY` of the current view, (256, 256, 4)."""
         self.draw((camera,))
         return self._fetch(camera, GEOMETRY)
 
@@ -177,6 +197,7 @@ class Cameras:
 def _make_camera(name: str, shader: str) -> sapien.render.RenderCameraComponent:
     component = sapien.render.RenderCameraComponent(SIZE, SIZE, shader)
     component.set_fovy(FIELD_OF_VIEW, compute_x=True)
-    component.near, component.far = NEAR, FAR
+    component.near = NEAR
+    component.far = FAR
     component.name = name
     return component

@@ -27,8 +27,12 @@ from roboirg.simulation.panda import JointTrajectory, Panda, with_gripper
 from roboirg.simulation.physics_settings import CLOSED, GRIPPER_STEPS, OPEN
 
 if TYPE_CHECKING:
+    from roboirg.core.subgoal_text import Point
     from roboirg.simulation.expert.motion_planning import MotionPlanner, ToolPose
     from roboirg.simulation.world import World
+
+LONG_NUMBER = 1e6
+"""From here on, messages give numbers with an exponent."""
 
 
 class Controller(Protocol):
@@ -58,8 +62,8 @@ def make_controller(space: ActionSpace, world: World, choices: Sequence[Choice] 
 class JointAngleController:
     """Passes joint targets through unchanged."""
 
-    def __init__(self, _robot: Panda) -> None:
-        pass
+    def __init__(self, robot: Panda) -> None:
+        del robot
 
     def trajectories(self, action: CheckedActions) -> Iterator[JointTrajectory]:
         """Yield one control step."""
@@ -101,11 +105,11 @@ class WaypointController:
                 f"no straight move reaches {describe_pose(action)}"
             ) from error
         yield with_gripper(path, self._gripper)
-        if action[POSE_SIZE] in (OPEN, CLOSED):
-            self._gripper = float(action[POSE_SIZE])
-            yield with_gripper(
-                np.tile(self._robot.arm_positions, (GRIPPER_STEPS, 1)), self._gripper
-            )
+        gripper = float(action[POSE_SIZE])
+        if gripper in (OPEN, CLOSED):
+            self._gripper = gripper
+            at_rest = np.tile(self._robot.arm_positions, (GRIPPER_STEPS, 1))
+            yield with_gripper(at_rest, gripper)
 
 
 class ChoiceController:
@@ -114,35 +118,51 @@ class ChoiceController:
     def __init__(self, world: World, choices: Sequence[Choice]) -> None:
         from roboirg.simulation.expert.primitives import MotionPrimitives
 
-        self._world, self._choices = world, choices
+        self._world = world
+        self._choices = choices
         self._expert = MotionPrimitives(world)
 
     def trajectories(self, action: CheckedActions) -> Iterator[JointTrajectory]:
         """Yield the trajectories of the motion; one control step at rest if it has none."""
-        motion = self._motion(self._choices[int(action[0])], (round(action[1]), round(action[2])))
+        number, row, column = action
+        motion = self._motion(self._choices[int(number)], (round(row), round(column)))
         if motion is None:
             yield np.append(self._world.robot.arm_positions, self._expert.gripper)[None]
             return
         yield from self._expert.execute(motion)
 
-    def _motion(self, choice: Choice, point: tuple[int, int]) -> Primitive | None:
-        """Return the motion of a choice; None if nothing is left to wait for or to point at."""
+    def _motion(self, choice: Choice, point: Point) -> Primitive | None:
+        """Return the motion of a choice; None if nothing is left to wait for or to point at.
+
+        Args:
+            choice: its motion lacks the object, which is the one of its kind nearest to the point.
+            point: row and column in the front picture.
+        """
         from roboirg.simulation.expert.things import held_thing, nearest_thing, present_things
 
-        world = self._world
-        ahead = (one for one in choice.primitives if not 0 < one.steps <= world.elapsed)
-        motion = next(ahead, None)
-        if motion is None or choice.kind is None:
-            meant = None if motion is None else motion.place
-        elif (found := nearest_thing(present_things(world, (choice.kind,)), point)) is None:
+        motion = self._first_ahead(choice)
+        if motion is None:
             return None
-        else:
-            meant = found[0].item.name
-        if motion is None or motion.kind in PICKS:
-            return motion and motion._replace(subject=str(meant))
+        meant = motion.place
+        if choice.kind is not None:
+            things = present_things(self._world, (choice.kind,))
+            nearest = nearest_thing(things, point)
+            if nearest is None:
+                return None
+            meant = nearest.thing.item.name
+        if motion.kind in PICKS:
+            return motion._replace(subject=str(meant))
         if motion.kind in HANDLES_HELD:
-            return motion._replace(subject=held_thing(world) or ROBOT, place=meant)
+            return motion._replace(subject=held_thing(self._world) or ROBOT, place=meant)
         return motion
+
+    def _first_ahead(self, choice: Choice) -> Primitive | None:
+        """Return the first motion of a choice whose time has not passed; None if all are past."""
+        for motion in choice.primitives:
+            is_past = 0 < motion.steps <= self._world.elapsed  # 0: it has no time
+            if not is_past:
+                return motion
+        return None
 
 
 def tool_pose(action: CheckedActions) -> ToolPose:
@@ -156,7 +176,8 @@ def tool_pose(action: CheckedActions) -> ToolPose:
 
 def describe_pose(action: CheckedActions) -> str:
     """Return the pose of an action in words."""
-    x, y, z, roll, pitch, yaw = (_format_number(number) for number in action[:POSE_SIZE])
+    numbers = [_format_number(number) for number in action[:POSE_SIZE]]
+    x, y, z, roll, pitch, yaw = numbers
     return f"({x}, {y}, {z}) with roll {roll}, pitch {pitch}, yaw {yaw}"
 
 
@@ -168,7 +189,9 @@ def _make_planner(robot: Panda) -> MotionPlanner:
 
 
 def _format_number(number: float) -> str:
-    return f"{number:.3f}" if abs(number) < 1e6 else f"{number:.3e}"  # noqa: PLR2004
+    if abs(number) < LONG_NUMBER:
+        return f"{number:.3f}"
+    return f"{number:.3e}"
 
 
 _CONTROLLERS: Mapping[str, Callable[[Panda], Controller]] = {

@@ -21,6 +21,7 @@ from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSetting
 from roboirg.simulation.world import World
 
 StepHook = Callable[[Stage], object]
+"""Called with the current stage after a control step."""
 
 
 def _do_nothing(stage: Stage) -> None:
@@ -72,10 +73,11 @@ class EpisodeSession:
 
     def step(self, action: Actions) -> None:
         """Execute one action (8) and judge the result."""
-        before, tried = self.world.facts, self.world.attempts
-        now = self.world.step(action)
-        self.events += changes(self.world.elapsed, before, now)
-        self.attempts += changes(self.world.elapsed, tried, self.world.attempts)
+        last_facts = self.world.facts
+        last_attempts = self.world.attempts
+        self.world.step(action)
+        self.events += changes(self.world.elapsed, last_facts, self.world.facts)
+        self.attempts += changes(self.world.elapsed, last_attempts, self.world.attempts)
         self._judge()
 
     def play_demonstration(
@@ -94,17 +96,19 @@ class EpisodeSession:
         Raises:
             MotionPlanningError: a stage was not completed; the scene cannot be used.
         """
+        stages = self.episode.demonstration
+        steps = self._plan_demonstration() if recording is None else recording.steps()
         executed: list[RecordedStep] = []
-        for step in self._plan_demonstration() if recording is None else recording.steps():
-            stage = self.episode.demonstration[step.stage]
+        for step in steps:
+            stage = stages[step.stage]
             self.step(step.action)
             executed.append(step)
             if stage.in_video:
                 after_step(stage)
-        if self.judge.index < len(self.episode.demonstration):
+        if self.judge.index < len(stages):
             raise MotionPlanningError(
                 f"The demonstration of {self.episode.key} ended before stage {self.judge.index + 1}"
-                f" of {len(self.episode.demonstration)} was complete."
+                f" of {len(stages)} was complete."
             )
         self.step(HOME_ACTION)
         return Recording.from_steps(executed, self.state_hash())
@@ -124,9 +128,11 @@ class EpisodeSession:
         Units: rad, m and s. An object has its position and orientation (w, x, y, z), its linear and
         angular velocity if it can move, and a button the position and velocity of its joint.
         """
-        return np.concatenate([np.asarray(one, np.float64).ravel() for one in self._state()])
+        numbers = [np.asarray(array, np.float64).ravel() for array in self._state()]
+        return np.concatenate(numbers)
 
     def _state(self) -> list[NDArray[Any]]:
+        """Return the arrays of `state_numbers`, of any shape and type."""
         robot = self.world.robot.articulation
         numbers = [robot.get_qpos(), robot.get_qvel()]
         for body in self.world.bodies.values():
@@ -141,18 +147,19 @@ class EpisodeSession:
         from roboirg.simulation.expert.primitives import MotionPrimitives
 
         expert = MotionPrimitives(self.world)
-        yield from (
-            RecordedStep(index, action)
-            for index, stage in enumerate(self.episode.demonstration)
-            for trajectory in expert.execute(stage.primitive)
-            for action in trajectory
-        )
+        for index, stage in enumerate(self.episode.demonstration):
+            for trajectory in expert.execute(stage.primitive):
+                for action in trajectory:
+                    yield RecordedStep(index, action)
 
     @property
     def _judges(self) -> tuple[Judge, ...]:
-        return (self.judge,) if self.original is None else (self.judge, self.original)
+        if self.original is None:
+            return (self.judge,)
+        return self.judge, self.original
 
     def _judge(self) -> None:
+        """Let the judges see the facts, and the world the stage that is due."""
         for judge in self._judges:
             judge.update(self.world.elapsed, self.world.facts)
         self.world.note_stage(self.judge.index)

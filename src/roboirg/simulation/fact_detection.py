@@ -1,4 +1,8 @@
-"""Detect facts: thresholds on positions and contacts, as RoboMME evaluates them."""
+"""Detect facts: thresholds on positions and contacts, as RoboMME evaluates them.
+
+A fact says what is the case after a control step, for example *placed, cube 1, target 2*;
+`roboirg.core.fact_traits` defines each kind. Distances and heights are in meters.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +17,11 @@ import sapien.physx
 from roboirg.core.conditions import Fact
 from roboirg.core.fact_traits import FACT_TRAITS
 from roboirg.core.motions import Point
-from roboirg.simulation.attempt_detection import AttemptDetector, distance_in_plane
+from roboirg.simulation.attempt_detection import (
+    AttemptDetector,
+    NearObject,
+    distance_in_plane,
+)
 from roboirg.simulation.bodies import Body
 from roboirg.simulation.panda import Panda
 from roboirg.simulation.physics_settings import FINGER_OPEN, HOME
@@ -21,20 +29,25 @@ from roboirg.simulation.physics_settings import FINGER_OPEN, HOME
 PICKED_HEIGHT = 0.05
 RELEASED_HEIGHT = 0.035
 ON_TARGET_DISTANCE = 0.05
-OVER_DISTANCE, OVER_HEIGHT = 0.03, 0.12
-BEYOND_DISTANCE, BEYOND_HEIGHT = 0.04, 0.3
+OVER_DISTANCE = 0.03
+OVER_HEIGHT = 0.12
+BEYOND_DISTANCE = 0.04
+BEYOND_HEIGHT = 0.3
 """A cube that is over a target stays so until it is beyond one of these."""
-BINNED_FINGERS, BINNED_TOOL_DISTANCE = 0.02, 0.02
+BINNED_FINGERS = 0.02
+BINNED_TOOL_DISTANCE = 0.02
 LIFTED_HEIGHT = 0.15
 PUT_DOWN_HEIGHT = 0.07
 PUT_DOWN_TOOL_HEIGHT = 0.05
 PRESSED_DEPTH = 0.005
-HOVER_DISTANCE, HOVER_HEIGHT = 0.03, 0.2
+HOVER_DISTANCE = 0.03
+HOVER_HEIGHT = 0.2
 NEAR_DISTANCE = 0.06
 HOME_TOLERANCE = 0.01
+"""Radians of an arm joint, meters of a finger."""
 REACHED_DISTANCE = 0.03
 REACH = 0.12
-"""Objects farther from the tool center than this cannot be between the fingers, m."""
+"""Objects farther from the tool center than this cannot be between the fingers."""
 
 Contacts = list[sapien.physx.PhysxContact]
 
@@ -69,11 +82,11 @@ class FactDetector:
     def __init__(self, bodies: Mapping[str, Body], robot: Panda) -> None:
         self._robot = robot
         self._bodies = tuple(bodies.values())
-        self._targets = self._of_kind("target")
-        self._places = (*self._targets, *self._of_kind("site"))
-        self._bins = (*self._of_kind("bin"), *self._of_kind("box"))
-        self._spots: dict[str, Point] = {}
-        self._before: frozenset[Fact] = frozenset()
+        self._targets = self._of_kinds("target")
+        self._places = self._of_kinds("target", "site")
+        self._bins = self._of_kinds("bin", "box")
+        self._place_positions: dict[str, Point] = {}
+        self._last_facts: frozenset[Fact] = frozenset()
         self._contacts: Contacts = []
         self._stopped: AbstractSet[str] = frozenset()
         self._tool = self._tool_now()
@@ -93,114 +106,132 @@ class FactDetector:
                 kept meanwhile mean nothing.
             stopped: names of objects that have been stopped for good.
         """
-        self._contacts, self._tool, self._stopped = contacts, self._tool_now(), stopped
+        self._contacts = contacts
+        self._stopped = stopped
+        self._tool = self._tool_now()
         # Read once for all cubes: this is most of what detection costs.
         fixed = (*self._places, *self._bins)
-        self._spots = {body.item.name: body.position for body in fixed}
+        self._place_positions = {body.item.name: body.position for body in fixed}
+
+        facts = {fact for fact in self._last_facts if fact.traits.lasts}
         present = [body for body in self._bodies if body.item.name not in absent]
-        facts = {fact for fact in self._before if fact.traits.lasts}
         for body in present:
-            if body.item.kind in _FINDERS:
-                facts.update(_FINDERS[body.item.kind](self, body))
+            finder = _FINDERS.get(body.item.kind)
+            if finder is not None:
+                facts.update(finder(self, body))
         facts.update(self._robot_facts())
         facts.update(self._registered_facts(present))
-        self._before = frozenset(facts)
-        self.attempts.detect(self._tool, self._before, self._spots)
-        return self._before
+        self._last_facts = frozenset(facts)
+        self.attempts.detect(self._tool, self._last_facts, self._place_positions)
+        return self._last_facts
 
     def _registered_facts(self, present: Sequence[Body]) -> Iterator[Fact]:
         """Yield the facts of the kinds that other packages have registered."""
-        detectors = [one.detect for one in FACT_TRAITS.values() if one.detect is not None]
-        if detectors:
-            bodies = {body.item.name: body for body in present}
-            context = DetectionContext(
-                bodies, self._robot, self._tool, self._contacts, self._before
-            )
-            for detect in detectors:
-                yield from (Fact(*found) for found in detect(context))
+        detectors = [traits.detect for traits in FACT_TRAITS.values() if traits.detect is not None]
+        if not detectors:
+            return
+        bodies = {body.item.name: body for body in present}
+        context = DetectionContext(
+            bodies, self._robot, self._tool, self._contacts, self._last_facts
+        )
+        for detect in detectors:
+            for found in detect(context):
+                yield Fact(*found)
 
     def _cube_facts(self, cube: Body) -> Iterator[Fact]:
-        name, position = cube.item.name, cube.position
-        held = yield from self._hand_facts(cube, position)
+        """Yield the facts about a cube or a roll of tape."""
+        name = cube.item.name
+        position = cube.position
+        is_held = yield from self._hand_facts(cube, position)
         for target in self._targets:
             fact = Fact("over", name, target.item.name)
-            distance, height = BEYOND_DISTANCE, BEYOND_HEIGHT
-            if fact not in self._before:
-                distance, height = OVER_DISTANCE, OVER_HEIGHT
-            if (
-                position.z < height
-                and distance_in_plane(position, self._spots[target.item.name]) <= distance
-            ):
+            if fact in self._last_facts:
+                is_low = position.z < BEYOND_HEIGHT
+                distance = BEYOND_DISTANCE
+            else:
+                is_low = position.z < OVER_HEIGHT
+                distance = OVER_DISTANCE
+            if is_low and self._is_at(position, target, distance):
                 yield fact
-        if position.z > PICKED_HEIGHT:
-            if held:
-                yield Fact("picked", name)
-        elif position.z <= RELEASED_HEIGHT and not held:
+        if position.z > PICKED_HEIGHT and is_held:
+            yield Fact("picked", name)
+        if position.z <= RELEASED_HEIGHT and not is_held:
             yield from self._released_facts(name, position)
 
     def _released_facts(self, name: str, position: Point) -> Iterator[Fact]:
+        """Yield where an object lies that the hand has let go."""
         yield Fact("lying", name)
-        yield from (
-            Fact("placed", name, place.item.name)
-            for place in self._places
-            if distance_in_plane(position, self._spots[place.item.name]) <= ON_TARGET_DISTANCE
-        )
-        yield from (
-            Fact("binned", name, bin_.item.name)
-            for bin_ in self._bins
-            if distance_in_plane(position, self._spots[bin_.item.name]) <= ON_TARGET_DISTANCE
-            and float(self._robot.finger_positions.min()) > BINNED_FINGERS
-            and math.dist(position, self._tool) > BINNED_TOOL_DISTANCE
-        )
+        for place in self._places:
+            if self._is_at(position, place, ON_TARGET_DISTANCE):
+                yield Fact("placed", name, place.item.name)
+        for container in self._bins:
+            if (
+                self._is_at(position, container, ON_TARGET_DISTANCE)
+                and float(self._robot.finger_positions.min()) > BINNED_FINGERS
+                and math.dist(position, self._tool) > BINNED_TOOL_DISTANCE
+            ):
+                yield Fact("binned", name, container.item.name)
+
+    def _is_at(self, position: Point, place: Body, distance: float) -> bool:
+        """Return whether a position is within a distance of a place's center in the plane."""
+        center = self._place_positions[place.item.name]
+        return distance_in_plane(position, center) <= distance
 
     def _container_facts(self, container: Body) -> Iterator[Fact]:
+        name = container.item.name
         position = container.position
-        height, held = position.z, (yield from self._hand_facts(container, position))
-        if height > LIFTED_HEIGHT:
-            yield Fact("lifted", container.item.name)
-        elif height <= PUT_DOWN_HEIGHT and self._tool.z > PUT_DOWN_TOOL_HEIGHT and not held:
-            yield Fact("put_down", container.item.name)
+        is_held = yield from self._hand_facts(container, position)
+        is_down = position.z <= PUT_DOWN_HEIGHT and not is_held
+        if position.z > LIFTED_HEIGHT:
+            yield Fact("lifted", name)
+        if is_down and self._tool.z > PUT_DOWN_TOOL_HEIGHT:
+            yield Fact("put_down", name)
 
     def _button_facts(self, button: Body) -> Iterator[Fact]:
         if button.pressed_depth > PRESSED_DEPTH:
             yield Fact("pressed", button.item.name)
-        apart = distance_in_plane(self._tool, button.position)
-        if self._tool.z < HOVER_HEIGHT and apart <= HOVER_DISTANCE:
+        distance = distance_in_plane(self._tool, button.position)
+        if self._tool.z < HOVER_HEIGHT and distance <= HOVER_DISTANCE:
             yield Fact("hovering", "robot", button.item.name)
 
     def _shuttle_facts(self, shuttle: Body) -> Iterator[Fact]:
+        """Yield the facts about a cube that moves back and forth by itself."""
+        name = shuttle.item.name
         for target in self._targets:
             if distance_in_plane(shuttle.position, target.position) <= NEAR_DISTANCE:
-                yield Fact("near", shuttle.item.name, target.item.name)
-                if shuttle.item.name in self._stopped:
-                    yield Fact("stopped", shuttle.item.name, target.item.name)
+                yield Fact("near", name, target.item.name)
+                if name in self._stopped:
+                    yield Fact("stopped", name, target.item.name)
 
     def _robot_facts(self) -> Iterator[Fact]:
         if self._robot.is_still():
             yield Fact("still", "robot")
-        arm, fingers = self._robot.arm_positions, self._robot.finger_positions
-        away = max(np.abs(arm - HOME).max(), np.abs(fingers - FINGER_OPEN).max())
-        if away < HOME_TOLERANCE:
+        arm_error = np.abs(self._robot.arm_positions - HOME).max()
+        finger_error = np.abs(self._robot.finger_positions - FINGER_OPEN).max()
+        if max(arm_error, finger_error) < HOME_TOLERANCE:
             yield Fact("home", "robot")
 
     def _hand_facts(self, body: Body, position: Point) -> Generator[Fact, None, bool]:
         """Yield the facts about the hand at a movable object; return whether the hand holds it."""
         apart = distance_in_plane(position, self._tool)
-        if apart > REACH:
+        if apart > REACH:  # spares the search through all contacts
             return False
         distance = math.dist(position, self._tool)
         if distance <= REACHED_DISTANCE:
             yield Fact("reached", body.item.name)
-        held = distance <= REACH and self._robot.grasps(body.physics, self._contacts)
-        if held:
+        is_held = distance <= REACH and self._robot.grasps(body.physics, self._contacts)
+        if is_held:
             yield Fact("held", body.item.name)
-        self.attempts.near.append((body.item, position, apart - body.item.half_width, held))
-        return held
+        gap = apart - body.item.half_width
+        self.attempts.near.append(NearObject(body.item, position, gap, is_held))
+        return is_held
 
-    def _of_kind(self, kind: str) -> tuple[Body, ...]:
-        return tuple(body for body in self._bodies if body.item.kind == kind)
+    def _of_kinds(self, *kinds: str) -> list[Body]:
+        """Return the objects of each of some kinds in turn."""
+        return [body for kind in kinds for body in self._bodies if body.item.kind == kind]
 
     def _tool_now(self) -> Point:
+        """Return the tool center."""
         return Point(*self._robot.tool_pose.p.tolist())
 
 

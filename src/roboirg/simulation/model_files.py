@@ -39,6 +39,7 @@ MODEL_FILES = (
 )
 """Their names in ManiSkill's package, which are kept."""
 _SHA256 = "9f361fea8bcea5593b0632f053d5798e5412a7532de7987230f0a72b15cca236"
+"""Of the names and contents of all model files; see `_digest`."""
 
 
 @functools.cache
@@ -62,7 +63,7 @@ def fetched_folder() -> Path:
 
 
 def _problem_of(root: Path) -> str | None:
-    """Return what is wrong with the model files in a folder."""
+    """Return what is wrong with the model files in a folder; None if nothing is."""
     missing = [name for name in MODEL_FILES if not (root / name).is_file()]
     if len(missing) == len(MODEL_FILES):
         return f"The model files of the robot and the table are not in {root}"
@@ -78,6 +79,7 @@ def _problem_of(root: Path) -> str | None:
 
 
 def _digest(root: Path) -> str:
+    """Return one hash for all model files in a folder."""
     digest = hashlib.sha256()
     for name in MODEL_FILES:
         digest.update(name.encode())

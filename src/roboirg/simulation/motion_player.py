@@ -10,6 +10,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 import sapien
+from numpy.typing import NDArray
 
 from roboirg.core.conditions import Fact
 from roboirg.core.motions import Away, Glow, Motion, Point, Shuttle, Swap, Vanish
@@ -18,8 +19,10 @@ from roboirg.simulation.bodies import Body
 Bodies = Mapping[str, Body]
 M = TypeVar("M", bound=Motion)
 
+_PARKING = Point(10.0, 10.0, 10.0)
+"""Where the first object is kept while it is out of the world, far from everything."""
 _SPACING = 0.5
-"""Meters between the parking spots of absent objects, so that they do not touch."""
+"""Meters between the places of absent objects, so that they do not touch."""
 
 
 class MotionContext(NamedTuple):
@@ -40,13 +43,12 @@ class MotionPlayer:
     """Plays all motions of a scene."""
 
     def __init__(self, motions: Sequence[Motion], bodies: Bodies) -> None:
-        spots = (Point(10.0 + _SPACING * index, 10.0, 10.0) for index in range(len(motions)))
-        players = [
-            _PLAYERS[type(motion)](motion, bodies, spot)
-            for motion, spot in zip(motions, spots, strict=True)
-        ]
-        # Swaps come first: an object that returns under another needs that one's new position.
-        self._players = sorted(players, key=lambda player: not isinstance(player, _SwapMotion))
+        players: list[_ScriptedMotion[Any]] = []
+        for number, motion in enumerate(motions):
+            parking = _PARKING._replace(x=_PARKING.x + _SPACING * number)
+            player = _PLAYERS[type(motion)]
+            players.append(player(motion, bodies, parking))
+        self._players = sorted(players, key=_turn)
 
     def before_step(self, context: MotionContext) -> None:
         """Move the objects for the next control step."""
@@ -73,7 +75,7 @@ class _ScriptedMotion(ABC, Generic[M]):
     Args:
         motion: what is played.
         bodies: all objects of the scene, by name.
-        spot: where the object is while it is out of the world.
+        parking: where the object is while it is out of the world.
 
     Attributes:
         subject: name of the object.
@@ -84,8 +86,10 @@ class _ScriptedMotion(ABC, Generic[M]):
     absent = False
     stopped = False
 
-    def __init__(self, motion: M, bodies: Bodies, spot: Point) -> None:
-        self._motion, self._bodies, self._spot = motion, bodies, spot
+    def __init__(self, motion: M, bodies: Bodies, parking: Point) -> None:
+        self._motion = motion
+        self._bodies = bodies
+        self._parking = parking
         self.subject = motion.first if isinstance(motion, Swap) else motion.subject
         self._body = bodies[self.subject]
 
@@ -97,14 +101,14 @@ class _ScriptedMotion(ABC, Generic[M]):
 
 
 class _AwayMotion(_ScriptedMotion[Away]):
-    def __init__(self, motion: Away, bodies: Bodies, spot: Point) -> None:
-        super().__init__(motion, bodies, spot)
+    def __init__(self, motion: Away, bodies: Bodies, parking: Point) -> None:
+        super().__init__(motion, bodies, parking)
         self.absent = motion.start == 0
 
     def before_step(self, context: MotionContext) -> None:
         self.absent = self._motion.start <= context.step < self._motion.end
         if self.absent:
-            self._body.put(self._spot)
+            self._body.put(self._parking)
         elif context.step == self._motion.end:
             place = self._body.item.position
             if self._motion.under is not None:
@@ -114,29 +118,34 @@ class _AwayMotion(_ScriptedMotion[Away]):
 
 
 class _SwapMotion(_ScriptedMotion[Swap]):
-    def __init__(self, motion: Swap, bodies: Bodies, spot: Point) -> None:
-        super().__init__(motion, bodies, spot)
-        names = (motion.first, motion.second, *motion.pinned)
-        self._moved = [bodies[name] for name in names]
-        self._poses: list[sapien.Pose] = []
+    # The poses when the motion began: of the two that swap, and of those that are held in place.
+    _first_start: sapien.Pose
+    _second_start: sapien.Pose
+    _pinned_starts: list[sapien.Pose]
+
+    def __init__(self, motion: Swap, bodies: Bodies, parking: Point) -> None:
+        super().__init__(motion, bodies, parking)
+        self._second = bodies[motion.second]
+        self._pinned = [bodies[name] for name in motion.pinned]
 
     def before_step(self, context: MotionContext) -> None:
-        begin = 0 if self._motion.stage is None else context.stages.get(self._motion.stage)
+        motion = self._motion
+        begin = 0 if motion.stage is None else context.stages.get(motion.stage)
         if begin is None:
             return
-        elapsed = context.step - begin - self._motion.start
-        if not 0 <= elapsed <= self._motion.steps:
+        elapsed = context.step - begin - motion.start
+        if not 0 <= elapsed <= motion.steps:
             return
         if elapsed == 0:
-            self._poses = [body.entity.pose for body in self._moved]
-        first, second = self._poses[:2]
-        share = elapsed / self._motion.steps
-        poses = (
-            _on_lane(first, second, share, self._motion.lane),
-            _on_lane(second, first, share, self._motion.lane),
-            *self._poses[2:],
-        )
-        for body, pose in zip(self._moved, poses, strict=True):
+            self._first_start = self._body.entity.pose
+            self._second_start = self._second.entity.pose
+            self._pinned_starts = [body.entity.pose for body in self._pinned]
+        share = elapsed / motion.steps
+        first = _pose_on_lane(self._first_start, self._second_start, share, motion.lane)
+        second = _pose_on_lane(self._second_start, self._first_start, share, motion.lane)
+        self._body.set_pose(first)
+        self._second.set_pose(second)
+        for body, pose in zip(self._pinned, self._pinned_starts, strict=True):
             body.set_pose(pose)
 
 
@@ -150,25 +159,31 @@ class _ShuttleMotion(_ScriptedMotion[Shuttle]):
 
 class _GlowMotion(_ScriptedMotion[Glow]):
     absent = True
-    _last: int | None = None
+    _lit_at: int | None = None
+    """The last step with the fact that it glows during; None before the first."""
 
     def before_step(self, context: MotionContext) -> None:
         if self._motion.during in context.facts:
-            self._last = context.step
-        self.absent = self._last is None or context.step - self._last > self._motion.linger
-        self._body.put(self._spot if self.absent else self._body.item.position)
+            self._lit_at = context.step
+        self.absent = self._lit_at is None or context.step - self._lit_at > self._motion.linger
+        self._body.put(self._parking if self.absent else self._body.item.position)
 
 
 class _VanishMotion(_ScriptedMotion[Vanish]):
     def before_step(self, context: MotionContext) -> None:
         del context
         if self.absent:
-            self._body.put(self._spot)
+            self._body.put(self._parking)
 
     def after_step(self, facts: AbstractSet[Fact]) -> None:
         if not self.absent and self._motion.when in facts:
             self.absent = True
-            self._body.put(self._spot)
+            self._body.put(self._parking)
+
+
+def _turn(player: _ScriptedMotion[Any]) -> int:
+    """Put swaps first: an object that returns under another needs the place that it has then."""
+    return 0 if isinstance(player, _SwapMotion) else 1
 
 
 _PLAYERS: Mapping[type[Motion], type[_ScriptedMotion[Any]]] = {
@@ -182,31 +197,52 @@ _PLAYERS: Mapping[type[Motion], type[_ScriptedMotion[Any]]] = {
 
 
 def shuttle_position(motion: Shuttle, step: int) -> Point:
-    """Return the position of an unstopped shuttle at a control step."""
+    """Return the position of an unstopped shuttle at a control step.
+
+    It goes from the motion's begin to its end, back again, and so on, `passes` times in all.
+    """
     done = min(step / motion.interval, float(motion.passes))
-    number = min(int(done), motion.passes - 1)
-    share = _smooth(done - number)
-    begin, end = (motion.begin, motion.end) if number % 2 == 0 else (motion.end, motion.begin)
-    return Point(*_between(begin, end, share))
+    complete_passes = min(int(done), motion.passes - 1)
+    share = _smooth(done - complete_passes)
+    if complete_passes % 2 == 0:
+        return Point(*_between(motion.begin, motion.end, share))
+    return Point(*_between(motion.end, motion.begin, share))
 
 
-def _on_lane(start: sapien.Pose, goal: sapien.Pose, share: float, lane: float) -> sapien.Pose:
-    """Return the pose on a curve from one place to another, left of the straight line."""
+def _pose_on_lane(start: sapien.Pose, goal: sapien.Pose, share: float, lane: float) -> sapien.Pose:
+    """Return the pose on a curve from one pose to another, at the height of the first.
+
+    Args:
+        start: pose at share 0.
+        goal: pose at share 1.
+        share: of the motion that is done.
+        lane: distance of the curve's middle from the straight line, to its left, m.
+    """
+    height = start.p[2]
     if share >= 1.0:
         x, y, _ = goal.p
-        return sapien.Pose([x, y, start.p[2]], goal.q)
+        return sapien.Pose([x, y, height], goal.q)
     smooth = _smooth(share)
     x, y, _ = _between(start.p, goal.p, smooth)
-    dx, dy = float(goal.p[0] - start.p[0]), float(goal.p[1] - start.p[1])
+    dx = float(goal.p[0] - start.p[0])
+    dy = float(goal.p[1] - start.p[1])
     swing = lane * math.sin(math.pi * smooth) / math.hypot(dx, dy)
+    return sapien.Pose([x - dy * swing, y + dx * swing, height], _turned(start, goal, smooth))
+
+
+def _turned(start: sapien.Pose, goal: sapien.Pose, share: float) -> NDArray[np.float32]:
+    """Return the quaternion that has turned by a share from one pose to another."""
+    begin = np.asarray(start.q)
+    end = np.asarray(goal.q)
     # Quaternions q and -q are the same rotation; the nearer one gives the shorter turn.
-    sign = 1.0 if float(np.dot(start.q, goal.q)) >= 0.0 else -1.0
-    turned = np.asarray(start.q) + smooth * (sign * np.asarray(goal.q) - np.asarray(start.q))
-    turned /= np.linalg.norm(turned)
-    return sapien.Pose([x - dy * swing, y + dx * swing, start.p[2]], turned)
+    if float(np.dot(begin, end)) < 0.0:
+        end = -end
+    turned = begin + share * (end - begin)
+    return np.asarray(turned / np.linalg.norm(turned))
 
 
 def _between(begin: Iterable[float], end: Iterable[float], share: float) -> tuple[float, ...]:
+    """Return the point that divides the line between two points by a share."""
     return tuple(float(a) + share * (float(b) - float(a)) for a, b in zip(begin, end, strict=True))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,8 +42,9 @@ class ObservationSpec(NamedTuple):
     @property
     def for_history(self) -> ObservationSpec:
         """The spec of the observations in ``history``."""
-        cameras = self.cameras if self.history_cameras is None else self.history_cameras
-        return self._replace(cameras=cameras)
+        if self.history_cameras is None:
+            return self
+        return self._replace(cameras=self.history_cameras)
 
     def validated(self) -> ObservationSpec:
         """Return this spec, with the cameras as a tuple, if it is valid."""
@@ -85,17 +86,23 @@ class ObservationBuilder:
         """Return the given fields that are drawn, for example ``front_rgb``."""
         if fields:
             # All cameras start drawing before the first picture is fetched.
-            cameras = dict.fromkeys(field.rpartition("_")[0] for field in fields)
-            self._world.cameras.draw(tuple(cameras))
+            self._world.cameras.draw(cameras_of(fields))
         return {field: read_picture(self._world, field) for field in fields}
 
     def read_proprioception(self) -> dict[str, Any]:
         """Return the observation fields that need no drawing: proprioception and calibration."""
         fields: dict[str, Any] = {}
-        for camera in self._spec.cameras if self._spec.calibration else ():
-            fields[f"{camera}_extrinsic"] = self._world.cameras.extrinsic(camera)
-            fields[f"{camera}_intrinsic"] = self._world.cameras.intrinsic(camera)
+        if self._spec.calibration:
+            for camera in self._spec.cameras:
+                fields[f"{camera}_extrinsic"] = self._world.cameras.extrinsic(camera)
+                fields[f"{camera}_intrinsic"] = self._world.cameras.intrinsic(camera)
         return {**fields, **self.proprioception.read()}
+
+
+def cameras_of(picture_fields: Iterable[str]) -> tuple[str, ...]:
+    """Return the cameras of fields, each once: of ``front_rgb`` and ``front_depth``, ``front``."""
+    cameras = [field.rpartition("_")[0] for field in picture_fields]
+    return tuple(dict.fromkeys(cameras))
 
 
 def read_picture(world: World, field: str) -> NDArray[Any]:
@@ -119,35 +126,36 @@ class FieldFormat(NamedTuple):
 
 def picture_fields(spec: ObservationSpec) -> dict[str, FieldFormat]:
     """Return the format of each field that is drawn."""
-    pictures = {f"{camera}_rgb": FieldFormat((SIZE, SIZE, 3), np.uint8) for camera in spec.cameras}
-    depth = {
-        f"{camera}_depth": FieldFormat((SIZE, SIZE, 1), np.int16)
-        for camera in (spec.cameras if spec.depth else ())
-    }
-    return pictures | depth
+    formats = {}
+    for camera in spec.cameras:
+        formats[f"{camera}_rgb"] = FieldFormat((SIZE, SIZE, 3), np.uint8)
+    if spec.depth:
+        for camera in spec.cameras:
+            formats[f"{camera}_depth"] = FieldFormat((SIZE, SIZE, 1), np.int16)
+    return formats
 
 
 def proprioception_fields(spec: ObservationSpec) -> dict[str, FieldFormat]:
     """Return the format of each field of `ObservationBuilder.read_proprioception`."""
-    fields: dict[str, FieldFormat] = {}
-    for camera in spec.cameras if spec.calibration else ():
-        fields[f"{camera}_extrinsic"] = FieldFormat((3, 4), np.float32)
-        fields[f"{camera}_intrinsic"] = FieldFormat((3, 3), np.float32)
-    return {
-        **fields,
-        "joint_positions": FieldFormat(JOINT_LOW.shape, np.float32),
-        "gripper": FieldFormat((2,), np.float32),
-        "end_effector": FieldFormat((POSE_SIZE,), np.float64),
-    }
+    formats = {}
+    if spec.calibration:
+        for camera in spec.cameras:
+            formats[f"{camera}_extrinsic"] = FieldFormat((3, 4), np.float32)
+            formats[f"{camera}_intrinsic"] = FieldFormat((3, 3), np.float32)
+    formats["joint_positions"] = FieldFormat(JOINT_LOW.shape, np.float32)
+    formats["gripper"] = FieldFormat((2,), np.float32)
+    formats["end_effector"] = FieldFormat((POSE_SIZE,), np.float64)
+    return formats
 
 
 def stack_proprioception(
     readings: Sequence[dict[str, Any]], spec: ObservationSpec
 ) -> dict[str, NDArray[Any]]:
     """Stack readings of `read_proprioception` to arrays with a leading axis T >= 0."""
-    return {
-        key: np.stack([reading[key] for reading in readings])
-        if readings
-        else np.zeros((0, *kind.shape), kind.dtype)
-        for key, kind in proprioception_fields(spec).items()
-    }
+    arrays = {}
+    for field, kind in proprioception_fields(spec).items():
+        if readings:
+            arrays[field] = np.stack([reading[field] for reading in readings])
+        else:
+            arrays[field] = np.zeros((0, *kind.shape), kind.dtype)
+    return arrays

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,10 +31,15 @@ JointTrajectory = NDArray[np.float64]
 """Actions (n, 8), n >= 1: joint targets (rad) and the gripper."""
 
 FINGERS = ("panda_leftfinger", "panda_rightfinger")
+OPENING_SIGNS = (1.0, -1.0)
+"""Signs of the fingers' opening directions along their y axes."""
 TOOL_LINK = "panda_hand_tcp"
 CAMERA_LINK = "camera_link"
 BASE_LINK = "panda_link0"
 
+FINGER_FRICTION = 2.0
+FINGER_PATCH = 0.1
+"""Radius of the patch of a finger that touches an object, m (ManiSkill)."""
 GRASP_FORCE = 0.5
 """Newtons on each finger at which an object counts as grasped (ManiSkill)."""
 GRASP_ANGLE = math.radians(85.0)
@@ -63,9 +68,8 @@ class Panda:
         builder.set_scene(scene)
         builder.initial_pose = sapien.Pose(ROBOT_BASE)
         self.articulation = builder.build()
-        for link in self.articulation.links:
-            link.disable_gravity = True
-        for joint in self.articulation.active_joints:
+        self._joints = list(self.articulation.active_joints)
+        for joint in self._joints:
             joint.set_drive_properties(
                 physics_settings.STIFFNESS,
                 physics_settings.DAMPING,
@@ -74,53 +78,43 @@ class Panda:
             )
             joint.set_friction(0.0)
         self.links = {link.name: link for link in self.articulation.links}
-        self.cullable_bodies: dict[sapien.render.RenderBodyComponent, CullableBody] = {}
-        self._add_meshes(loader.visuals, rendering)
+        for link in self.links.values():
+            link.disable_gravity = True
         self.tool = self.links[TOOL_LINK]
-        self._joints = list(self.articulation.active_joints)
         self._fingers = [self.links[name] for name in FINGERS]
+        self.cullable_bodies: dict[sapien.render.RenderBodyComponent, CullableBody] = {}
+        for name, records in loader.visuals.items():
+            self._add_meshes(name, records, rendering)
         self.reset()
 
-    def _add_meshes(self, visuals: Mapping[str, Sequence[Any]], rendering: RenderSettings) -> None:
-        for name, records in visuals.items():
-            if name == BASE_LINK and rendering.culling:
-                # The base never moves; the front camera draws only what reaches a pixel.
-                others = [camera for camera in CAMERAS if camera != FRONT]
-                self._add_body(name, records, rendering, (FRONT,), sapien.Pose(ROBOT_BASE))
-                self._add_body(name, records, rendering, others)
-            else:
-                self._add_body(name, records, rendering, CAMERAS)
-
-    def _add_body(
-        self,
-        link: str,
-        records: Sequence[Any],
-        rendering: RenderSettings,
-        cameras: Sequence[str],
-        fixed_at: sapien.Pose | None = None,
-    ) -> None:
-        """Add a render body to a link.
+    def _add_meshes(self, link: str, records: Sequence[Any], rendering: RenderSettings) -> None:
+        """Add what is drawn of a link.
 
         Args:
             link: name of the link.
             records: SAPIEN's visual records of the link's meshes.
             rendering: how pictures are drawn.
-            cameras: cameras that draw the body.
-            fixed_at: fixed pose of the link in the world frame; keeps only what reaches a
-                pixel of the front camera there.
         """
-        component, hulls = sapien.render.RenderBodyComponent(), []
-        for record in records:
-            path, pose = Path(record.filename), record.pose
-            place = None if fixed_at is None else fixed_at * pose
-            for shape in link_shapes(path, record.material, rendering, place):
-                shape.local_pose = pose
-                component.attach(shape)
-            matrix = pose.to_transformation_matrix()
-            hulls.append(link_hull(path, rendering) @ matrix[:3, :3].T + matrix[:3, 3])
-        self.links[link].entity.add_component(component)
-        apply_shading(component, rendering)
-        self.cullable_bodies[component] = CullableBody(np.concatenate(hulls), cameras)
+        hull = _hull(records, rendering)
+        cameras: Sequence[str] = CAMERAS
+        if link == BASE_LINK and rendering.culling:
+            # The base never moves; the front camera draws only what reaches a pixel.
+            front_body = _render_body(records, rendering, fixed_at=sapien.Pose(ROBOT_BASE))
+            self._add_body(link, front_body, rendering, CullableBody(hull, (FRONT,)))
+            cameras = [camera for camera in CAMERAS if camera != FRONT]
+        body = _render_body(records, rendering)
+        self._add_body(link, body, rendering, CullableBody(hull, cameras))
+
+    def _add_body(
+        self,
+        link: str,
+        body: sapien.render.RenderBodyComponent,
+        rendering: RenderSettings,
+        cullable: CullableBody,
+    ) -> None:
+        self.links[link].entity.add_component(body)
+        apply_shading(body, rendering)
+        self.cullable_bodies[body] = cullable
 
     def reset(self) -> None:
         """Put the robot at home, at rest."""
@@ -133,9 +127,10 @@ class Panda:
 
     def set_targets(self, action: Actions) -> None:
         """Set the drive targets of an action (8): seven joints (rad) and the gripper in [-1, 1]."""
-        for joint, target in zip(self._joints, action[:ARM_JOINTS], strict=False):
+        for joint, target in zip(self._joints[:ARM_JOINTS], action[:ARM_JOINTS], strict=True):
             joint.set_drive_target(float(target))
-        share = (min(max(float(action[ARM_JOINTS]), -1.0), 1.0) + 1.0) / 2.0
+        gripper = min(max(float(action[ARM_JOINTS]), -1.0), 1.0)
+        share = (gripper + 1.0) / 2.0  # 0 for closed, 1 for open
         span = physics_settings.FINGER_OPEN - physics_settings.FINGER_SQUEEZE
         for joint in self._joints[ARM_JOINTS:]:
             joint.set_drive_target(physics_settings.FINGER_SQUEEZE + share * span)
@@ -167,14 +162,15 @@ class Panda:
 
         `contacts` are those of the last physics step.
         """
-        for finger, sign in zip(self._fingers, (1.0, -1.0), strict=True):
+        for finger, sign in zip(self._fingers, OPENING_SIGNS, strict=True):
             force = _force_on(finger, body, contacts)
             size = float(np.linalg.norm(force))
             if size < GRASP_FORCE:
                 return False
-            opening = sign * finger.entity_pose.to_transformation_matrix()[:3, 1]
-            cosine = float(np.dot(opening, force)) / size
-            if math.acos(min(max(cosine, -1.0), 1.0)) > GRASP_ANGLE:
+            y_axis = finger.entity_pose.to_transformation_matrix()[:3, 1]
+            cosine = float(np.dot(sign * y_axis, force)) / size
+            angle = math.acos(min(max(cosine, -1.0), 1.0))
+            if angle > GRASP_ANGLE:
                 return False
         return True
 
@@ -186,6 +182,36 @@ def rotation_of(pose: sapien.Pose) -> Rotation:
 
     w, x, y, z = np.asarray(pose.q, dtype=np.float64)
     return Rotation.from_quat([x, y, z, w])
+
+
+def _render_body(
+    records: Sequence[Any], rendering: RenderSettings, fixed_at: sapien.Pose | None = None
+) -> sapien.render.RenderBodyComponent:
+    """Return the meshes of a link as one body.
+
+    Args:
+        records: SAPIEN's visual records of the link's meshes.
+        rendering: how pictures are drawn.
+        fixed_at: fixed pose of the link in the world frame; keeps only what reaches a pixel of the
+            front camera there.
+    """
+    body = sapien.render.RenderBodyComponent()
+    for record in records:
+        mesh_at = None if fixed_at is None else fixed_at * record.pose
+        for shape in link_shapes(Path(record.filename), record.material, rendering, mesh_at):
+            shape.local_pose = record.pose
+            body.attach(shape)
+    return body
+
+
+def _hull(records: Sequence[Any], rendering: RenderSettings) -> NDArray[np.float64]:
+    """Return the vertices (n, 3) of the convex hulls of a link's meshes, m in its frame."""
+    hulls = []
+    for record in records:
+        matrix = record.pose.to_transformation_matrix()
+        hull = link_hull(Path(record.filename), rendering)
+        hulls.append(hull @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.concatenate(hulls)
 
 
 def _force_on(
@@ -200,7 +226,7 @@ def _force_on(
         if first == finger and second == body:
             sign = 1.0
         elif first == body and second == finger:
-            sign = -1.0
+            sign = -1.0  # SAPIEN gives the impulse on the first body
         else:
             continue
         for point in contact.points:
@@ -229,14 +255,15 @@ class _PandaLoader(URDFLoader):  # type: ignore[misc]  # SAPIEN's wrappers have 
         # Parsing needs a scene too; the scene to build in is set later.
         self.set_scene(sapien.Scene([sapien.physx.PhysxCpuSystem()]))
         for finger in FINGERS:
-            self.set_link_material(finger, 2.0, 2.0, 0.0)
-            self.set_link_patch_radius(finger, 0.1)
-            self.set_link_min_patch_radius(finger, 0.1)
+            self.set_link_material(finger, FINGER_FRICTION, FINGER_FRICTION, 0.0)
+            self.set_link_patch_radius(finger, FINGER_PATCH)
+            self.set_link_min_patch_radius(finger, FINGER_PATCH)
         urdf = find_model_files() / ROBOT_FILE
         builders, _, _ = self.parse(str(urdf), str(urdf.with_suffix(".srdf")))
         self.builder = builders[0]
 
     def _build_link(self, link: Any, link_builder: Any) -> None:  # noqa: ANN401
+        """Build a link; note its meshes apart, so that others can be drawn in their place."""
         if not self._visible:
             link.visuals.clear()
         super()._build_link(link, link_builder)

@@ -25,7 +25,8 @@ HOME = np.array([0.0, 0.0, 0.0, -math.pi / 2, 0.0, math.pi / 2, math.pi / 4])
 HOME_ACTION = np.append(HOME, 1.0)
 """Action (8) that keeps the robot at home with an open gripper."""
 
-OPEN, CLOSED = 1.0, -1.0
+OPEN = 1.0
+CLOSED = -1.0
 """Gripper actions."""
 GRIPPER_STEPS = 6
 """Control steps for opening or closing the gripper (RoboMME)."""
@@ -43,7 +44,7 @@ LIGHT_DIRECTIONS = ((1.0, 1.0, -1.0), (0.0, 0.0, -1.0))
 
 @functools.cache
 def apply_physics_settings() -> None:
-    """Set SAPIEN's global physics defaults; call before building anything."""
+    """Set SAPIEN's defaults for the physics of all scenes; call before building anything."""
     physx = sapien.physx
     physx.set_scene_config(
         gravity=np.array([0, 0, -9.81]),
@@ -83,7 +84,7 @@ def add_lights(scene: sapien.Scene) -> None:
         entity = sapien.Entity()
         entity.name = "directional_light"
         entity.add_component(light)
-        light.pose = sapien.Pose(
-            [0.0, 0.0, 0.0], sapien.math.shortest_rotation([1.0, 0.0, 0.0], direction)
-        )
+        along_x = [1.0, 0.0, 0.0]
+        turn = sapien.math.shortest_rotation(along_x, direction)
+        light.pose = sapien.Pose([0.0, 0.0, 0.0], turn)
         scene.add_entity(entity)

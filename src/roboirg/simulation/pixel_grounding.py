@@ -18,7 +18,9 @@ REACH_PIXELS = 6
 
 
 class PixelGrounding:
-    """Follows the stages of one episode; draws only until a stage's object is visible.
+    """Follows the stages of one episode and puts pixels into their texts.
+
+    It draws only until a stage's object is visible.
 
     Attributes:
         text: the current subgoal, with ``at <y, x>`` (row and column in the front picture) from
@@ -29,7 +31,7 @@ class PixelGrounding:
         self._bodies = bodies
         self._cameras = cameras
         self._stage: Stage | None = None
-        self._settled = False
+        self._has_pixel = False
         self.text = ""
 
     def update(self, stage: Stage | None) -> None:
@@ -40,29 +42,34 @@ class PixelGrounding:
         if stage is None:
             return
         if stage is not self._stage:
-            self._stage, self.text = stage, plain_subgoal(stage)
-            self._settled = stage.points_at is None
-        if self._settled or stage.points_at is None:
+            self._stage = stage
+            self._has_pixel = False
+            self.text = plain_subgoal(stage)
+        if self._has_pixel or stage.points_at is None:
             return
         pixel = self._pixel(stage.points_at)
         if pixel is not None:
             row, column = pixel
+            self._has_pixel = True
             self.text = stage.subgoal.replace("{at}", f"at <{row}, {column}>")
-            self._settled = True
 
-    def _pixel(self, name: str) -> tuple[int, int] | None:
+    def _pixel(self, name: str) -> Point | None:
         """Return the mean row and column of an object's visible pixels; None if it has none."""
-        seen = self._cameras.segmentation(CAMERA) == self._bodies[name].segment
-        rows, columns = np.nonzero(seen)
-        return (int(rows.mean()), int(columns.mean())) if len(rows) else None
+        is_object = self._cameras.segmentation(CAMERA) == self._bodies[name].segment
+        rows, columns = np.nonzero(is_object)
+        if not len(rows):
+            return None
+        return int(rows.mean()), int(columns.mean())
 
 
 def objects_at(bodies: Mapping[str, Body], cameras: Cameras, point: Point) -> frozenset[str]:
     """Return the names of the objects seen within `REACH_PIXELS` of a point of the picture."""
     row, column = point
-    top, left = max(row - REACH_PIXELS, 0), max(column - REACH_PIXELS, 0)
-    around = cameras.segmentation(CAMERA)[
-        top : row + REACH_PIXELS + 1, left : column + REACH_PIXELS + 1
-    ]
-    seen = {int(one) for one in np.unique(around)}
-    return frozenset(name for name, body in bodies.items() if body.segment in seen)
+    around = cameras.segmentation(CAMERA)[_reach_of(row), _reach_of(column)]
+    segments = np.unique(around).tolist()
+    return frozenset(name for name, body in bodies.items() if body.segment in segments)
+
+
+def _reach_of(pixel: int) -> slice:
+    """Return the rows or columns within `REACH_PIXELS` of one."""
+    return slice(max(pixel - REACH_PIXELS, 0), pixel + REACH_PIXELS + 1)

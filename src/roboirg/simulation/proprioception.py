@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from roboirg.simulation.panda import Panda
 
+TURN = 2.0 * math.pi
 LOCKED = 1e-7
 """Radians from gimbal lock within which yaw is set to 0."""
 
@@ -33,7 +34,7 @@ class Proprioception:
     def update(self) -> None:
         """Update the unwrapped angles; call after every control step."""
         pairs = zip(self._angles.tolist(), self._principal_angles().tolist(), strict=True)
-        self._angles = np.array([unwrap_angle(before, now) for before, now in pairs])
+        self._angles = np.array([unwrap_angle(previous, angle) for previous, angle in pairs])
 
     def read(self) -> ProprioceptiveState:
         """Return the robot's state at the last update."""
@@ -49,40 +50,54 @@ class Proprioception:
         return euler_angles(self._robot.tool_pose)
 
 
-def unwrap_angle(before: float, now: float) -> float:
-    """Unwrap an angle (rad) relative to the previous one, like `numpy.unwrap` but faster."""
-    change = now - before
+def unwrap_angle(previous: float, angle: float) -> float:
+    """Return an angle plus full turns, at most half a turn from the previous one; rad.
+
+    For example 3.3 after 3.2 for an angle of -2.98. It is `numpy.unwrap`, but faster.
+    """
+    change = angle - previous
     if abs(change) < math.pi:
-        return now + 0.0
-    short = (change + math.pi) % (2.0 * math.pi) - math.pi
-    if short == -math.pi and change > 0.0:
-        short = math.pi
-    return now + (short - change)
+        return angle + 0.0  # no negative zero
+    short_change = (change + math.pi) % TURN - math.pi
+    if short_change == -math.pi and change > 0.0:
+        short_change = math.pi
+    return angle + (short_change - change)
 
 
 def euler_angles(pose: sapien.Pose) -> NDArray[np.float64]:
     """Return roll, pitch and yaw of a pose (extrinsic x-y-z), rad, each from -pi to pi.
 
     Uses the formulas of Bernardes and Viollet (2022), as SciPy does, and gives the same bits;
-    importing SciPy would take a fifth of a process's startup time.
+    importing SciPy would take a fifth of a process's startup time. Where roll and yaw turn about
+    the same axis (gimbal lock), yaw is 0.
     """
     w, x, y, z = pose.q.tolist()
     # The order of the sum determines the last bit.
     norm = math.sqrt(x * x + y * y + z * z + w * w)
-    w, x, y, z = w / norm, x / norm, y / norm, z / norm
-    half_sum, half_difference = math.atan2(x + z, w - y), math.atan2(z - x, w + y)
+    # Sums and differences of the unit quaternion's parts.
+    a = w / norm - y / norm
+    b = x / norm + z / norm
+    c = w / norm + y / norm
+    d = z / norm - x / norm
+    half_sum = math.atan2(b, a)
+    half_difference = math.atan2(d, c)
     # NumPy's hypot is the C library's; Python's is not.
-    tilt = 2.0 * math.atan2(np.hypot(w + y, z - x), np.hypot(w - y, x + z))
-    roll, yaw = half_sum - half_difference, half_sum + half_difference
+    tilt = 2.0 * math.atan2(np.hypot(c, d), np.hypot(a, b))
+    pitch = tilt - math.pi / 2.0
     if tilt <= LOCKED:
-        roll, yaw = 2.0 * half_sum, 0.0
+        roll = 2.0 * half_sum
+        yaw = 0.0
     elif math.pi - tilt <= LOCKED:
-        roll, yaw = -2.0 * half_difference, 0.0
-    return np.array([_principal(angle) for angle in (roll, tilt - math.pi / 2.0, yaw)])
+        roll = -2.0 * half_difference
+        yaw = 0.0
+    else:
+        roll = half_sum - half_difference
+        yaw = half_sum + half_difference
+    return np.array([_principal(roll), _principal(pitch), _principal(yaw)])
 
 
 def _principal(angle: float) -> float:
-    """Wrap an angle to -pi to pi."""
+    """Return an angle from -pi to pi, given one that is at most a turn away from one."""
     if abs(angle) <= math.pi:
         return angle
-    return angle - math.copysign(2.0 * math.pi, angle)
+    return angle - math.copysign(TURN, angle)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.core.actions import CheckedActions
+from roboirg.core.actions import JOINT_ANGLE, CheckedActions
 from roboirg.core.episode import Episode
 from roboirg.core.observations import DemonstrationSource
 
@@ -47,18 +47,22 @@ class Recording:
     @classmethod
     def from_steps(cls, steps: list[RecordedStep], end: str) -> Recording:
         """Create a recording from its steps and the state hash at the end."""
-        actions = np.array([step.action for step in steps], dtype=np.float64).reshape(-1, 8)
-        return cls(actions, np.array([step.stage for step in steps], dtype=np.uint8), end)
+        actions = np.array([step.action for step in steps], dtype=np.float64)
+        stages = np.array([step.stage for step in steps], dtype=np.uint8)
+        return cls(actions.reshape(-1, JOINT_ANGLE.size), stages, end)
 
     def steps(self) -> Iterator[RecordedStep]:
         """Yield the recorded steps."""
-        pairs = zip(self.stages, self.actions, strict=True)
-        return (RecordedStep(int(stage), action) for stage, action in pairs)
+        for stage, action in zip(self.stages, self.actions, strict=True):
+            yield RecordedStep(int(stage), action)
 
     def video_actions(self, episode: Episode) -> CheckedActions:
         """Return the actions (T, 8) of the steps in the episode's video."""
-        in_video = np.array([stage.in_video for stage in episode.demonstration], dtype=bool)
-        return self.actions[in_video[self.stages]] if len(in_video) else self.actions[:0]
+        if not episode.demonstration:
+            return self.actions[:0]
+        is_shown = np.array([stage.in_video for stage in episode.demonstration], dtype=bool)
+        shown: CheckedActions = self.actions[is_shown[self.stages]]
+        return shown
 
     def video_length(self, episode: Episode) -> int:
         """Return the number of steps in the episode's video."""
@@ -67,7 +71,8 @@ class Recording:
     def to_bytes(self) -> bytes:
         """Serialize without loss."""
         file = io.BytesIO()
-        np.savez_compressed(file, actions=self.actions, stages=self.stages, end=np.array(self.end))
+        end = np.array(self.end)
+        np.savez_compressed(file, actions=self.actions, stages=self.stages, end=end)
         return file.getvalue()
 
     @classmethod

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
 
 import numpy as np
 import sapien
 import sapien.render
+from numpy.typing import NDArray
 from sapien.wrapper.actor_builder import ActorBuilder
 
 from roboirg.simulation.model_files import GROUND_FILE, TABLE_FILE, find_model_files
@@ -16,6 +16,7 @@ from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSetting
 from roboirg.simulation.rendering.table_mesh import table_shape
 
 Range = tuple[int, int]
+"""First square and the one after the last, along an axis of the floor."""
 
 TABLE_HEIGHT = 0.9196429
 TABLE_HALF = (2.418 / 2, 1.209 / 2, TABLE_HEIGHT / 2)
@@ -48,43 +49,54 @@ def add_scenery(
     scene: sapien.Scene, *, visible: bool, rendering: RenderSettings = FAITHFUL
 ) -> None:
     """Add the table, whose top is at z = 0, and the floor under it."""
-    _add_table(scene, visible=visible, rendering=rendering)
-    pieces = WHOLE_FLOOR if rendering.meshes == "stock" else FLOOR_PIECES
-    _add_floor(scene, pieces if visible else (), rendering)
+    table = _add_table(scene, has_stock_mesh=visible and rendering.meshes == "stock")
+    if visible and rendering.meshes != "stock":
+        _draw_table(table)
+    floor = _add_floor(scene)
+    if visible:
+        _draw_floor(floor, rendering)
 
 
-def _add_table(scene: sapien.Scene, *, visible: bool, rendering: RenderSettings) -> None:
+def _add_table(scene: sapien.Scene, *, has_stock_mesh: bool) -> sapien.Entity:
+    """Add the table without its mesh, or with the installed one."""
     builder = ActorBuilder()
     builder.set_scene(scene)
     builder.add_box_collision(sapien.Pose([0.0, 0.0, TABLE_HEIGHT / 2]), half_size=TABLE_HALF)
-    turned = sapien.Pose(q=QUARTER_TURN)
-    stock = rendering.meshes == "stock"
-    if visible and stock:
-        builder.add_visual_from_file(
-            str(find_model_files() / TABLE_FILE), turned, [TABLE_SCALE] * 3
-        )
+    if has_stock_mesh:
+        file = find_model_files() / TABLE_FILE
+        builder.add_visual_from_file(str(file), sapien.Pose(q=QUARTER_TURN), [TABLE_SCALE] * 3)
     builder.set_physx_body_type("kinematic")
     builder.set_initial_pose(sapien.Pose(TABLE_POSITION, QUARTER_TURN))
-    table = builder.build(name="table")
-    if visible and not stock:
-        shape = table_shape().clone()
-        shape.scale, shape.local_pose = [TABLE_SCALE] * 3, turned
-        component = sapien.render.RenderBodyComponent()
-        component.attach(shape)
-        table.add_component(component)
+    return builder.build(name="table")
 
 
-def _add_floor(
-    scene: sapien.Scene, pieces: Sequence[tuple[Range, Range]], rendering: RenderSettings
-) -> None:
+def _draw_table(table: sapien.Entity) -> None:
+    """Add the mesh whose textures are decoded once."""
+    shape = table_shape().clone()
+    shape.scale = [TABLE_SCALE] * 3
+    shape.local_pose = sapien.Pose(q=QUARTER_TURN)
+    component = sapien.render.RenderBodyComponent()
+    component.attach(shape)
+    table.add_component(component)
+
+
+def _add_floor(scene: sapien.Scene) -> sapien.Entity:
+    """Add the floor, a plane, without a mesh."""
     builder = ActorBuilder()
     builder.set_scene(scene)
     builder.add_plane_collision(sapien.Pose([0.0, 0.0, -TABLE_HEIGHT], PLANE_UP))
     builder.set_physx_body_type("static")
-    floor = builder.build(name="floor")
+    return builder.build(name="floor")
+
+
+def _draw_floor(floor: sapien.Entity, rendering: RenderSettings) -> None:
+    """Add the floor's meshes: of squares as in the stock mesh, or of larger ones."""
+    pieces = WHOLE_FLOOR if rendering.meshes == "stock" else FLOOR_PIECES
     for along_x, along_y in pieces:
-        near = (along_x, along_y) == NEAR_FLOOR and rendering.meshes != "light"
-        step = 1 if near or rendering.meshes == "stock" else FAR_FLOOR_STEP
+        is_near = (along_x, along_y) == NEAR_FLOOR
+        step = FAR_FLOOR_STEP
+        if rendering.meshes == "stock" or (is_near and rendering.meshes != "light"):
+            step = 1
         component = sapien.render.RenderBodyComponent()
         component.attach(_floor_piece(along_x, along_y, step).clone())
         floor.add_component(component)
@@ -94,31 +106,44 @@ def _add_floor(
 def _floor_piece(
     along_x: Range, along_y: Range, step: int
 ) -> sapien.render.RenderShapeTriangleMesh:
-    """Return a range of the floor's squares along x and y as a textured mesh."""
-    ticks = np.linspace(-FLOOR_WIDTH / 2, FLOOR_WIDTH / 2, FLOOR_CELLS + 1)
-    columns, rows = ((along[1] - along[0]) // step for along in (along_x, along_y))
-    x, y = (
-        axis.ravel()
-        for axis in np.meshgrid(
-            ticks[along_x[0] : along_x[1] + 1 : step],
-            ticks[along_y[0] : along_y[1] + 1 : step],
-            indexing="ij",
-        )
-    )
-    vertices = np.stack([x, y, np.full_like(x, -TABLE_HEIGHT)], axis=1)
-    corner = np.arange(columns)[:, None] * (rows + 1) + np.arange(rows)
-    near, right = corner.ravel(), corner.ravel() + rows + 1
-    triangles = np.concatenate(
-        [np.stack([near, right, near + 1], axis=1), np.stack([right, right + 1, near + 1], axis=1)]
-    )
+    """Return a range of the floor's squares along x and y as a textured mesh.
+
+    `step` squares per side are merged into one.
+    """
+    x_ticks = _floor_ticks(along_x, step)
+    y_ticks = _floor_ticks(along_y, step)
+    grid = np.stack(np.meshgrid(x_ticks, y_ticks, indexing="ij"), axis=-1)
+    points = grid.reshape(-1, 2)
+    vertices = np.column_stack([points, np.full(len(points), -TABLE_HEIGHT)])
+    texture_places = points * FLOOR_TEXTURE_REPEATS / FLOOR_WIDTH + 0.5
     material = sapien.render.RenderMaterial()
     material.base_color_texture = sapien.render.RenderTexture2D(
         filename=str(find_model_files() / GROUND_FILE), mipmap_levels=4
     )
     return sapien.render.RenderShapeTriangleMesh(
         vertices=vertices.astype(np.float32),
-        triangles=triangles.astype(np.uint32),
-        normals=np.tile(np.array([0.0, 0.0, 1.0], np.float32), (len(vertices), 1)),
-        uvs=(vertices[:, :2] * FLOOR_TEXTURE_REPEATS / FLOOR_WIDTH + 0.5).astype(np.float32),
+        triangles=_grid_triangles(len(x_ticks), len(y_ticks)).astype(np.uint32),
+        normals=np.tile(np.array([0.0, 0.0, 1.0], np.float32), (len(points), 1)),
+        uvs=texture_places.astype(np.float32),
         material=material,
     )
+
+
+def _floor_ticks(squares: Range, step: int) -> NDArray[np.float64]:
+    """Return the coordinates of the lines between a range of the floor's squares, m."""
+    ticks = np.linspace(-FLOOR_WIDTH / 2, FLOOR_WIDTH / 2, FLOOR_CELLS + 1)
+    first, end = squares
+    return ticks[first : end + 1 : step]
+
+
+def _grid_triangles(columns: int, rows: int) -> NDArray[np.intp]:
+    """Return the triangles of a grid of vertices, which are numbered column by column, (n, 3)."""
+    numbers = np.arange(columns * rows).reshape(columns, rows)
+    # The corners of each square: near and far along y, in its own column and the next.
+    near = numbers[:-1, :-1].ravel()
+    far = near + 1
+    next_near = near + rows
+    next_far = next_near + 1
+    first_halves = np.stack([near, next_near, far], axis=1)
+    second_halves = np.stack([next_near, next_far, far], axis=1)
+    return np.concatenate([first_halves, second_halves])

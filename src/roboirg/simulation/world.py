@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Set as AbstractSet
-from typing import Any
 
 import sapien
 import sapien.physx
@@ -43,22 +42,23 @@ class World:
         self, scene: Scene, *, visible: bool = True, rendering: RenderSettings = FAITHFUL
     ) -> None:
         physics_settings.apply_physics_settings()
-        systems: list[Any] = [sapien.physx.PhysxCpuSystem()]
+        self._physics = sapien.physx.PhysxCpuSystem()
+        systems: list[sapien.System] = [self._physics]
         if visible:
             check_drawing_process()
             systems.append(render_system(keep_engine=rendering.quick_start))
             physics_settings.apply_render_settings()
         self._scene = sapien.Scene(systems)
-        self._physics = systems[0]
         self._physics.timestep = 1.0 / physics_settings.PHYSICS_RATE
         self.robot = Panda(self._scene, visible=visible, rendering=rendering)
         add_scenery(self._scene, visible=visible, rendering=rendering)
-        self.bodies = {
-            item.name: bodies.build(self._scene, item, visible=visible) for item in scene.objects
-        }
+        self.bodies: dict[str, bodies.Body] = {}
+        for item in scene.objects:
+            self.bodies[item.name] = bodies.build(self._scene, item, visible=visible)
+
         self._motions = MotionPlayer(scene.motions, self.bodies)
         self._detector = FactDetector(self.bodies, self.robot)
-        self._stages: dict[int, int] = {}
+        self._stage_starts: dict[int, int] = {}
         self._cameras: Cameras | None = None
         if visible:
             physics_settings.add_lights(self._scene)
@@ -75,12 +75,12 @@ class World:
         Returns:
             The facts that hold afterwards.
         """
-        self._motions.before_step(MotionContext(self.elapsed, self.facts, self._stages))
+        context = MotionContext(self.elapsed, self.facts, self._stage_starts)
+        self._motions.before_step(context)
         self.advance(action)
         self.elapsed += 1
-        self.facts = self._detector.detect(
-            self._physics.get_contacts(), self._motions.absent(), self._motions.stopped()
-        )
+        contacts = self._physics.get_contacts()
+        self.facts = self._detector.detect(contacts, self.absent, self._motions.stopped())
         self._motions.after_step(self.facts)
         return self.facts
 
@@ -103,7 +103,7 @@ class World:
 
     def note_stage(self, index: int) -> None:
         """Record the step at which a stage became due, for the motions that wait for it."""
-        self._stages.setdefault(index, self.elapsed)
+        self._stage_starts.setdefault(index, self.elapsed)
 
     def picture(self, camera: str) -> Pixels:
         """Return the current picture of a camera, RGB, shape (256, 256, 3)."""
@@ -119,12 +119,13 @@ class World:
 
 
 _drawing_processes: set[int] = set()
-"""This process, if it has drawn; after a fork, the parent."""
+"""The id of this process, if it has drawn; a fork inherits that of its parent."""
 
 
 def check_drawing_process() -> None:
     """Remember that this process draws, and refuse if one from which it was forked had drawn."""
-    if _drawing_processes - {os.getpid()}:
+    other_processes = _drawing_processes - {os.getpid()}
+    if other_processes:
         raise RoboIRGError(
             "This process was forked from one that had drawn pictures, and the renderer's "
             "threads do not survive a fork; start it another way, such as AsyncVectorEnv(..., "

@@ -52,10 +52,8 @@ def all_suites() -> tuple[str, ...]:
 def every_task() -> Mapping[str, Task]:
     """Return every task by name: the benchmark's, the real robot's, then those of packages."""
     # The suites of packages are ordered by code together.
-    return {
-        **all_tasks(SUITES),
-        **all_tasks(tuple(suite for suite in all_suites() if suite not in SUITES)),
-    }
+    of_packages = tuple(suite for suite in all_suites() if suite not in SUITES)
+    return {**all_tasks(SUITES), **all_tasks(of_packages)}
 
 
 def get_task(name: str) -> Task:
@@ -69,11 +67,18 @@ def get_task(name: str) -> Task:
 def find_tasks(words: Iterable[str]) -> tuple[str, ...]:
     """Return the tasks meant by names of tasks, of suites, or ``all`` for the benchmark.
 
+    ``["real", "BinFill"]`` -> ``("PutInBox", "PickByCount", "BinFill")``.
+
     Returns:
         Their names, each once: those of ``all`` first, the others in the order of the words.
     """
-    in_turn = sorted(words, key=lambda word: word.lower() != ALL)
-    return tuple(dict.fromkeys(name for word in in_turn for name in _expand(word)))
+    words = list(words)
+    for_all = [word for word in words if word.lower() == ALL]
+    others = [word for word in words if word.lower() != ALL]
+    names: list[str] = []
+    for word in (*for_all, *others):
+        names += _expand(word)
+    return tuple(dict.fromkeys(names))
 
 
 def goals_of(episode: Episode) -> tuple[Goal, ...]:
@@ -83,7 +88,8 @@ def goals_of(episode: Episode) -> tuple[Goal, ...]:
 
 def with_goal(episode: Episode, goal: Goal) -> Episode:
     """Return the episode with another goal of its scene, and the stages to it."""
-    return replace(episode, goal=goal, stages=get_task(episode.task).stages(episode.scene, goal))
+    stages = get_task(episode.task).stages(episode.scene, goal)
+    return replace(episode, goal=goal, stages=stages)
 
 
 @functools.cache
@@ -103,21 +109,29 @@ def _registry() -> tuple[Task, ...]:
 
 
 def _expand(word: str) -> tuple[str, ...]:
-    lower = word.lower()
-    if lower == ALL:
+    """Return the names of the tasks that a word stands for: of all, of a suite, or of one.
+
+    Suites and ``all`` may be typed in any case, tasks only as they are spelled.
+    """
+    if word.lower() == ALL:
         return tuple(all_tasks())
-    suite = next((one for one in all_suites() if one.lower() == lower), None)
-    if suite is not None:
-        return tuple(all_tasks((suite,)))
+    for suite in all_suites():
+        if suite.lower() == word.lower():
+            return tuple(all_tasks((suite,)))
     if word not in every_task():
         raise _unknown_task(word, (*every_task(), *all_suites()))
     return (word,)
 
 
 def _unknown_task(name: str, known: Iterable[str]) -> InvalidValueError:
-    if name.lower() in map(str.lower, LEFT_OUT):
+    """Return the error about a name that is none of the known ones.
+
+    One of RoboMME that is left out, such as MoveCube, gets the reason; any other a suggestion.
+    """
+    others = [task for task in LEFT_OUT if task.lower() != name.lower()]
+    if len(others) < len(LEFT_OUT):
         return InvalidValueError(
             f"RoboMME's task {name!r} is left out: its instructions hold no variable to refer to. "
-            f"So are {', '.join(one for one in LEFT_OUT if one.lower() != name.lower())}."
+            f"So are {', '.join(others)}."
         )
     return UnknownNameError("task", name, known)

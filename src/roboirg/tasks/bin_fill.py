@@ -8,7 +8,9 @@ colors in an order of the scene. Facts: RoboMME.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,12 +25,13 @@ from roboirg.core.episode import (
     SceneObject,
     Stage,
 )
-from roboirg.core.footprints import Obstacle, Region
+from roboirg.core.footprints import Region
 from roboirg.core.motions import Away, Motion, Vanish
 from roboirg.core.plain_text import counted
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     Bounds,
+    CubePlan,
     bin_keep_out,
     button_keep_out,
     draw_bin,
@@ -38,7 +41,7 @@ from roboirg.tasks.shared.fixtures import (
     footprint,
 )
 from roboirg.tasks.shared.stages import PRESSED, press_stage
-from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.tasks.task import SceneAndGoal, Task
 from roboirg.util.random_draws import shuffled
 
 COLORS_PRESENT: dict[Difficulty, int] = {"easy": 1, "medium": 2, "hard": 3}
@@ -64,109 +67,133 @@ APPEAR_STEPS = 50
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
-    """Draw button, bin and cubes of one to three colors, and a count for one or more of them."""
-    late = bool(rng.integers(2))
+    """Draw button, bin and cubes of one to three colors, and a count for one or more of them.
+
+    The order of the draws decides which scene a seed gives; so it is in every function here.
+    """
+    is_late = bool(rng.integers(2))  # whether only one cube of each color is there at first
     button = draw_button(rng, BUTTON_REGION)
     # RoboMME places the bin without looking at the button; here its walls stay off the base.
     bin_ = draw_bin(rng, BIN_REGION, [footprint(button)])
+    wanted = _draw_wanted(rng, difficulty)
+    cube_colors = _draw_cube_colors(rng, difficulty, wanted)
+    obstacles = [button_keep_out(button), bin_keep_out(bin_)]
+    cubes = draw_cubes(rng, _numbered(cube_colors), CUBE_GAP, obstacles)
+    scene = Scene(
+        objects=(button, bin_, *cubes),
+        motions=plan_motions(cubes, late=is_late),
+        color_order=tuple(shuffled(rng, _named(wanted))),
+    )
+    return scene, _goal(wanted)
+
+
+def _draw_wanted(rng: np.random.Generator, difficulty: Difficulty) -> dict[Color, int]:
+    """Draw the colors that are present, and for each the goal's number of cubes, perhaps 0.
+
+    ``{"blue": 2, "red": 1, "green": 0}``: each cube of the goal gets one of the first colors.
+    """
     present = shuffled(rng, COLORS)[: COLORS_PRESENT[difficulty]]
-    wanted = _draw_wanted(rng, difficulty, present)
-    spawned = _draw_spawned(rng, difficulty, present, wanted)
-    obstacles: list[Obstacle] = [button_keep_out(button), bin_keep_out(bin_)]
-    cubes = draw_cubes(rng, _numbered(spawned), CUBE_GAP, obstacles)
-    named = tuple(color for color in GOAL_ORDER if wanted.get(color))
-    goal = Goal.of(colors=named, counts=tuple(wanted[color] for color in named))
-    order = tuple(shuffled(rng, named))
-    return Scene((button, bin_, *cubes), plan_motions(cubes, late=late), color_order=order), goal
-
-
-def _draw_wanted(
-    rng: np.random.Generator, difficulty: Difficulty, present: list[Color]
-) -> dict[Color, int]:
-    """Draw the goal's number of cubes for each color that is present."""
-    candidates = draw_number(rng, GOAL_COLORS[difficulty])
-    total = draw_number(rng, GOAL_CUBES[difficulty])
+    color_count = draw_number(rng, GOAL_COLORS[difficulty])
+    cube_count = draw_number(rng, GOAL_CUBES[difficulty])
     wanted = dict.fromkeys(present, 0)
-    for index in rng.integers(candidates, size=total):
-        wanted[present[index]] += 1
+    for index in rng.integers(color_count, size=cube_count):
+        color = present[index]
+        wanted[color] += 1
     return wanted
 
 
-def _draw_spawned(
-    rng: np.random.Generator,
-    difficulty: Difficulty,
-    present: list[Color],
-    wanted: dict[Color, int],
+def _draw_cube_colors(
+    rng: np.random.Generator, difficulty: Difficulty, wanted: Mapping[Color, int]
 ) -> list[Color]:
-    """Draw a color for each cube: enough for the goal, and at least one of each present."""
-    spawned = [color for color in present for _ in range(max(wanted[color], 1))]
-    left = draw_number(rng, CUBES[difficulty]) - len(spawned)
-    spawned += [present[index] for index in rng.integers(len(present), size=left)]
-    return shuffled(rng, spawned)
+    """Draw a color for each cube on the table, in the order in which they are placed.
+
+    First as many as the goal wants, and at least one of each present color; then the others, of any
+    present color.
+    """
+    present = list(wanted)
+    colors: list[Color] = []
+    for color, count in wanted.items():
+        colors += [color] * max(count, 1)
+    cube_count = draw_number(rng, CUBES[difficulty])
+    others = rng.integers(len(present), size=cube_count - len(colors))
+    colors += [present[index] for index in others]
+    return shuffled(rng, colors)
 
 
-def _numbered(spawned: list[Color]) -> Iterator[tuple[str, Color, Region]]:
-    """Yield cubes of the given colors, numbered within their color: ``cube_red_0`` and so on."""
-    numbers = {color: itertools.count() for color in COLORS}
-    for color in spawned:
-        yield f"cube_{color}_{next(numbers[color])}", color, CUBE_REGION
+def _numbered(colors: list[Color]) -> list[CubePlan]:
+    """Return cubes of the given colors, numbered within their color.
+
+    Red, blue, red -> ``cube_red_0``, ``cube_blue_0``, ``cube_red_1``.
+    """
+    plans: list[CubePlan] = []
+    numbers: Counter[Color] = Counter()
+    for color in colors:
+        plans.append(CubePlan(f"cube_{color}_{numbers[color]}", color, CUBE_REGION))
+        numbers[color] += 1
+    return plans
+
+
+def _named(wanted: Mapping[Color, int]) -> list[Color]:
+    """Return the colors of which cubes are wanted, in the order of goals."""
+    return [color for color in GOAL_ORDER if wanted.get(color)]
+
+
+def _goal(wanted: Mapping[Color, int]) -> Goal:
+    """Return the goal of some numbers of cubes by color; colors without any are not named."""
+    named = _named(wanted)
+    return Goal.of(colors=tuple(named), counts=tuple(wanted[color] for color in named))
 
 
 def plan_motions(cubes: Sequence[SceneObject], *, late: bool) -> tuple[Motion, ...]:
     """Return the motions: binned cubes vanish, and late ones appear after the first of their color.
 
-    As in RoboMME, the place of a late cube may be occupied.
+    If `late`, the second red cube appears after 50 steps, the third after 100. As in RoboMME, the
+    place of a late cube may be occupied.
     """
-    ranks = {
-        cube.name: number
-        for color in COLORS
-        for number, cube in enumerate(cube for cube in cubes if cube.color == color)
-    }
-    appearing = [
-        Away(name, 0, APPEAR_STEPS * number) for name, number in ranks.items() if late and number
-    ]
-    return (
-        *appearing,
-        *(Vanish(cube, fact) for cube, fact in zip(ranks, _binned(ranks), strict=True)),
-    )
+    appearing: list[Motion] = []
+    vanishing: list[Motion] = []
+    for color in COLORS:
+        names = [cube.name for cube in cubes if cube.color == color]
+        for number, name in enumerate(names):
+            if late and number > 0:
+                appearing.append(Away(name, 0, APPEAR_STEPS * number))
+            vanishing.append(Vanish(name, Fact("binned", name, "bin")))
+    return (*appearing, *vanishing)
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
     """Return all goals of up to five cubes in all, at most the present ones of each color."""
-    colors = [color for color in GOAL_ORDER if _of_color(scene, color)]
-    choices = [range(len(_of_color(scene, color)) + 1) for color in colors]
-    found: list[Goal] = []
-    for counts in itertools.product(*choices):
+    possible_counts = [range(len(_of_color(scene, color)) + 1) for color in GOAL_ORDER]
+    goals: list[Goal] = []
+    for counts in itertools.product(*possible_counts):
         if 1 <= sum(counts) <= MAX_GOAL_CUBES:
-            named = [pair for pair in zip(colors, counts, strict=True) if pair[1]]
-            goal = Goal.of(
-                colors=tuple(str(color) for color, _ in named),
-                counts=tuple(count for _, count in named),
-            )
-            found.append(goal)
-    return tuple(found)
+            wanted = dict(zip(GOAL_ORDER, counts, strict=True))
+            goals.append(_goal(wanted))
+    return tuple(goals)
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Return 2 N + 1 stages: pick and put in once for each of N cubes, then press.
 
-    Any cube completes a stage; the colors are judged when N are in.
+    Any cube completes a stage, so the cubes may come in any order; the colors are judged by what
+    the last stage forbids, a press with wrong numbers in the bin.
     """
     cubes = [cube.name for cube in scene.of_kind("cube")]
-    picked, binned = tuple(Fact("picked", cube) for cube in cubes), _binned(cubes)
+    any_picked = FactCount(tuple(Fact("picked", cube) for cube in cubes))
+    all_binned = _binned(cubes)
     plan: list[Stage] = []
-    for drops, (color, ordinal, cube) in enumerate(_wanted(scene, goal), start=1):
+    for number, cube in enumerate(_wanted_cubes(scene, goal), start=1):
         pick = Stage(
-            expects=FactCount(picked),
+            expects=any_picked,
             forbids=(PRESSED,),
-            primitive=Primitive("pick_cube", cube),
-            subgoal=f"pick up the {ordinal} {color} cube {{at}}",
-            points_at=cube,
+            primitive=Primitive("pick_cube", cube.name),
+            subgoal=f"pick up the {cube.ordinal} {cube.color} cube {{at}}",
+            points_at=cube.name,
         )
         put_in = Stage(
-            expects=FactCount(binned, least=drops),
+            expects=FactCount(all_binned, least=number),
             forbids=(PRESSED,),
-            primitive=Primitive("drop_into", cube, "bin"),
+            primitive=Primitive("drop_into", cube.name, "bin"),
             subgoal="put it into the bin {at}",
             points_at="bin",
         )
@@ -174,30 +201,47 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     return (*plan, press_stage(forbids=tuple(_wrong_counts(scene, goal))))
 
 
-def _wanted(scene: Scene, goal: Goal) -> Iterator[tuple[str, str, str]]:
-    """Yield color, ordinal and name of the cubes that the oracle takes, color by color."""
+class _WantedCube(NamedTuple):
+    """A cube that the oracle takes, and which one of its color it is: ``"first"``."""
+
+    name: str
+    color: str
+    ordinal: str
+
+
+def _wanted_cubes(scene: Scene, goal: Goal) -> Iterator[_WantedCube]:
+    """Yield the cubes that the oracle takes, color by color."""
     counts = dict(goal.amounts)
     for color in dict.fromkeys((*scene.color_order, *counts)):
-        cubes = _of_color(scene, color)[: counts.get(color, 0)]
-        for ordinal, cube in zip(ORDINALS, cubes, strict=False):
-            yield color, ordinal, cube
+        names = _of_color(scene, color)[: counts.get(color, 0)]
+        for name, ordinal in zip(names, ORDINALS, strict=False):
+            yield _WantedCube(name, color, ordinal)
 
 
 def _wrong_counts(scene: Scene, goal: Goal) -> Iterator[Rule]:
-    """Yield rules against more cubes in the bin than the goal's, and fewer, for each color."""
+    """Yield rules against more cubes in the bin than the goal's, and fewer, for each color.
+
+    Two red cubes wanted -> *put more than 2 red cubes into the bin*, *put fewer than …*; no blue
+    one wanted -> *put a blue cube into the bin*. Colors that the scene lacks have no rules.
+    """
     wanted = dict(goal.amounts)
     for color in GOAL_ORDER:
-        binned, count = _binned(_of_color(scene, color)), wanted.get(color, 0)
+        binned = _binned(_of_color(scene, color))
         if not binned:
             continue
+        count = wanted.get(color, 0)
         if count == 0:
             yield Rule(FactCount(binned), f"put a {color} cube into the bin", "wrong_object")
             continue
+
         cubes = f"{counted(count, f'{color} cube')} into the bin"
-        more, fewer = FactCount(binned, least=count + 1), FactCount(binned, 0, count - 1)
-        too_few = f"fewer than {cubes}" if count > 1 else f"no {color} cube into the bin"
+        too_few = f"put fewer than {cubes}"
+        if count == 1:
+            too_few = f"put no {color} cube into the bin"
+        more = FactCount(binned, least=count + 1)
+        fewer = FactCount(binned, least=0, most=count - 1)
         yield Rule(more, f"put more than {cubes}", "wrong_count")
-        yield Rule(fewer, f"put {too_few}", "wrong_count")
+        yield Rule(fewer, too_few, "wrong_count")
 
 
 def _of_color(scene: Scene, color: str) -> list[str]:
@@ -206,25 +250,9 @@ def _of_color(scene: Scene, color: str) -> list[str]:
 
 
 def _binned(cubes: Iterable[str]) -> tuple[Fact, ...]:
+    """Return the facts that cubes are in the bin, one for each."""
     return tuple(Fact("binned", cube, "bin") for cube in cubes)
 
-
-COMMANDS = Commands(
-    by_place="cube[|s] like the one {place}",
-    by_rank="cube[|s] like {place}",
-    wordings=command_pools(
-        train=(
-            "Put {cubes} into the bin and press the button.",
-            "Drop {cubes} into the bin and press the button.",
-            "Place {cubes} in the bin and press the button.",
-        ),
-        test=(
-            "Move {cubes} into the bin and push the button.",
-            "Toss {cubes} into the bin and push the button.",
-            "Throw {cubes} in the bin and press the button.",
-        ),
-    ),
-)
 
 TASK = Task(
     name="BinFill",
@@ -234,6 +262,5 @@ TASK = Task(
     sample=sample,
     goals=goals,
     stages=stages,
-    commands=COMMANDS,
     words="BinFill.toml",
 )

@@ -6,8 +6,6 @@ first steps, independent of its actions. Facts: RoboMME.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from roboirg.core.conditions import All, Fact, FactCount, OccurrenceCount
@@ -17,10 +15,12 @@ from roboirg.tasks.shared import unmask, unmask_swap
 from roboirg.tasks.shared.fixtures import button_keep_out, draw_button
 from roboirg.tasks.shared.layouts import PlanePoint
 from roboirg.tasks.shared.stages import press_stage
-from roboirg.tasks.task import SceneAndGoal, Task, command_pools
+from roboirg.tasks.task import SceneAndGoal, Task
+from roboirg.util.random_draws import draw
 
-RIGHT, LEFT = "button_right", "button_left"
-"""On the robot's right (smaller y) and left."""
+RIGHT = "button_right"
+"""On the robot's right (smaller y)."""
+LEFT = "button_left"
 RIGHT_REGION = Region(-0.2, -0.1, 0.025, 0.025)
 LEFT_REGION = Region(-0.2, 0.1, 0.025, 0.025)
 
@@ -33,12 +33,16 @@ MAX_SHIFT = 0.1
 
 def shifted_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ...]:
     """Draw three or four points near which the containers stand; the pattern is not turned."""
+    points: list[PlanePoint] = []
     if count == len(FOUR):
-        near, far = (MAX_SHIFT * rng.random(2)).tolist()
-        shifts = (near, near, far, far)
-        return tuple((x, y + shift) for (x, y), shift in zip(FOUR, shifts, strict=True))
-    pattern = (TRIANGLE, LINE)[int(rng.integers(2))]
-    return tuple((x + MAX_SHIFT * rng.random(), y) for x, y in pattern)
+        for row in (FOUR[:2], FOUR[2:]):
+            shift = MAX_SHIFT * rng.random()
+            points += [(x, y + shift) for x, y in row]
+        return tuple(points)
+    for x, y in draw(rng, (TRIANGLE, LINE)):
+        shift = MAX_SHIFT * rng.random()
+        points.append((x + shift, y))
+    return tuple(points)
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
@@ -53,41 +57,16 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Return the stages: press both buttons, in any order, then lift the containers."""
-    right, left = Fact("pressed", RIGHT), Fact("pressed", LEFT)
+    left = Fact("pressed", LEFT)
+    right = Fact("pressed", RIGHT)
+    either = FactCount((left, right))
     both = All((OccurrenceCount((left,)), OccurrenceCount((right,))))
     return (
-        press_stage("press the first button {at}", expects=FactCount((left, right)), button=LEFT),
+        press_stage("press the first button {at}", expects=either, button=LEFT),
         press_stage("press the second button {at}", expects=both, button=RIGHT),
         *unmask.pick_stages(scene, goal),
     )
 
-
-COMMANDS = replace(
-    unmask.container_commands(
-        command_pools(
-            train=(
-                "Press both buttons, then lift {colors.0}.",
-                "Press both buttons and lift {colors.0}.",
-                "First press both buttons, then lift {colors.0}.",
-                "Press both buttons, lift {colors.0}, put it down, then lift {colors.1}.",
-                "Press both buttons, lift {colors.0}, set it down, and lift {colors.1}.",
-                "Press both buttons, lift {colors.0}, put it back and lift {colors.1}.",
-            ),
-            test=(
-                "Push both buttons, then raise {colors.0}.",
-                "Push both buttons and pick up {colors.0}.",
-                "Start by pushing both buttons, then raise {colors.0}.",
-                "Push both buttons, raise {colors.0}, put it back, then raise {colors.1}.",
-                "Push both buttons, raise {colors.0}, put it back and raise {colors.1}.",
-                "Push both buttons, raise {colors.0}, set it back, and raise {colors.1}.",
-            ),
-        )
-    ),
-    by_place="the container over the cube {place} now",
-    # Only the cubes are there when the words are said.
-    pointed="hidden_cube",
-    things_at="the cube {place} now",
-)
 
 TASK = Task(
     name="ButtonUnmaskSwap",
@@ -97,6 +76,6 @@ TASK = Task(
     sample=sample,
     goals=unmask.goals,
     stages=stages,
-    commands=COMMANDS,
+    things=unmask.HIDDEN_CUBE_THINGS,
     words="containers.toml",
 )

@@ -10,7 +10,7 @@ import string
 from collections.abc import Iterator
 
 from roboirg.core.choices import Choice
-from roboirg.core.episode import Episode, Primitive, Scene
+from roboirg.core.episode import ROBOT, Episode, ObjectKind, Primitive, Scene
 from roboirg.tasks import get_task
 
 _WORDS = {
@@ -31,27 +31,49 @@ _PRESSES = ("press", "press_below")
 
 
 def choices_of(episode: Episode) -> tuple[Choice, ...]:
-    """Return the choices of an episode; they are the same in all episodes of a task."""
+    """Return the choices of an episode; they are the same in all episodes of a task.
+
+    PickXtimes -> a *pick up the cube*, b *place it on the target*, c *press the button*.
+    """
     scene = episode.scene
-    motions = list(dict.fromkeys(_motions(scene, episode)))
-    buttons = sorted(scene.of_kind("button"), key=lambda one: one.position.y)
-    presses = [one for one in motions if one.kind in _PRESSES]
+    each_once = list(dict.fromkeys(_motions(scene, episode)))
+    motions = _with_buttons(each_once, scene)
+    stages = [stage.primitive for stage in episode.stages]
+    checkpoints = tuple(motion for motion in stages if motion.kind == "hold_until")
+    choices: list[Choice] = []
+    for label, motion in zip(string.ascii_lowercase, motions, strict=False):
+        words = _words_for(motion)
+        if motion.kind == "hold_until":
+            # One choice, which is made again for each checkpoint.
+            choices.append(Choice(label, words, checkpoints))
+        else:
+            choices.append(_choice(label, words, motion, scene))
+    return tuple(choices)
+
+
+def _with_buttons(motions: list[Primitive], scene: Scene) -> list[Primitive]:
+    """Return motions with a press for each button; as in RoboMME, that at smaller y comes first.
+
+    A task whose stages press nothing gets a press of the first button, if there is one.
+    """
+    buttons = sorted(scene.of_kind("button"), key=lambda button: button.position.y)
+    presses = [motion for motion in motions if motion.kind in _PRESSES]
     if not presses and buttons:
-        motions.append(Primitive("press", buttons[0].name))
-    elif len(presses) > 1:  # as in RoboMME, the button at smaller y comes first
-        ordered = iter(Primitive("press", one.name) for one in buttons)
-        motions = [next(ordered) if one in presses else one for one in motions]
-    checkpoints = tuple(
-        stage.primitive for stage in episode.stages if stage.primitive.kind == "hold_until"
-    )
-    return tuple(
-        _choice(label, motion, scene, checkpoints)
-        for label, motion in zip(string.ascii_lowercase, motions, strict=False)
-    )
+        return [*motions, Primitive("press", buttons[0].name)]
+    if len(presses) <= 1:
+        return motions
+    # Several presses are one for each button, in the order of the stages; they change places.
+    ordered = list(motions)
+    for press, button in zip(presses, buttons, strict=True):
+        ordered[motions.index(press)] = Primitive("press", button.name)
+    return ordered
 
 
 def _motions(scene: Scene, episode: Episode) -> Iterator[Primitive]:
-    """Yield the motions of all goals' stages, those for the same choice being equal."""
+    """Yield the motions of all goals' stages, those for the same choice being equal.
+
+    Picking ``cube_red`` and ``cube_blue`` are both picking a ``cube``: a point says which one.
+    """
     task = get_task(episode.task)
     for goal in task.goals(scene):
         for stage in task.stages(scene, goal):
@@ -61,22 +83,30 @@ def _motions(scene: Scene, episode: Episode) -> Iterator[Primitive]:
             elif motion.kind in ("hover", "retreat"):
                 yield motion
             else:
-                kind = "" if motion.subject == "robot" else scene[motion.subject].kind
-                place = None if motion.place is None else scene[motion.place].kind
-                yield motion._replace(subject=kind, place=place, steps=0)
+                yield motion._replace(
+                    subject=_kind_of(motion.subject, scene) or "",
+                    place=_kind_of(motion.place, scene),
+                    steps=0,
+                )
 
 
-def _choice(
-    label: str, motion: Primitive, scene: Scene, checkpoints: tuple[Primitive, ...]
-) -> Choice:
-    words = _WORDS[motion.kind].format(
-        subject=motion.subject.replace("_", " "), place=motion.place or "place"
-    )
-    if motion.kind == "hold_until":
-        return Choice(label, words, checkpoints)
+def _kind_of(name: str | None, scene: Scene) -> ObjectKind | None:
+    """Return the kind of the object of a name; None for none and for the robot."""
+    return None if name in (None, ROBOT) else scene[str(name)].kind
+
+
+def _words_for(motion: Primitive) -> str:
+    """Return a motion in words, its objects by their kinds: ``place it on the target``."""
+    subject = motion.subject.replace("_", " ")
+    return _WORDS[motion.kind].format(subject=subject, place=motion.place or "place")
+
+
+def _choice(label: str, words: str, motion: Primitive, scene: Scene) -> Choice:
+    """Return the choice of a motion: with a point of its kind of object, if there are several."""
     if motion.kind.startswith("pick_"):
         return Choice(label, words, (motion,), motion.subject)
     places = scene.of_kind(motion.place) if motion.place else ()
     if len(places) == 1:
-        return Choice(label, words, (motion._replace(place=places[0].name),))
+        motion = motion._replace(place=places[0].name)
+        return Choice(label, words, (motion,))
     return Choice(label, words, (motion,), motion.place)

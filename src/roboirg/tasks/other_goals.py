@@ -16,16 +16,17 @@ from roboirg.util.random_draws import draw
 def other_goals(episode: Episode) -> tuple[Goal, ...]:
     """Return the goals of the scene that take as many picks as the episode's.
 
-    None of them is reached on the way to the episode's goal, or the episode's on the way to it.
+    None of them is reached on the way to the episode's goal, or the episode's on the way to it: to
+    *red, then blue*, *green, then blue* is another goal, and *red* is none.
     """
     task = get_task(episode.task)
-    found = []
+    others: list[Goal] = []
     for goal in task.goals(episode.scene):
         stages = task.stages(episode.scene, goal)
         overlaps = begins_with(stages, episode.stages) or begins_with(episode.stages, stages)
-        if not overlaps and _picks(stages) == _picks(episode.stages):
-            found.append(goal)
-    return tuple(found)
+        if not overlaps and _count_picks(stages) == _count_picks(episode.stages):
+            others.append(goal)
+    return tuple(others)
 
 
 def draw_other_goal(episode: Episode) -> Goal | None:
@@ -36,7 +37,8 @@ def draw_other_goal(episode: Episode) -> Goal | None:
     goals = other_goals(episode)
     if not goals:
         return None
-    rng = np.random.default_rng([episode.seed, zlib.crc32(f"{OTHER_GOAL}|{episode.task}".encode())])
+    task_number = zlib.crc32(f"{OTHER_GOAL}|{episode.task}".encode())
+    rng = np.random.default_rng([episode.seed, task_number])
     return draw(rng, goals)
 
 
@@ -46,8 +48,9 @@ def begins_with(stages: Sequence[Stage], first: Sequence[Stage]) -> bool:
 
 
 def _judged(stages: Sequence[Stage]) -> list[tuple[object, ...]]:
-    return [(one.expects, one.forbids, one.lasting, one.timer) for one in stages]
+    """Return what the judge reads of stages; the oracle's movements and the words differ more."""
+    return [(stage.expects, stage.forbids, stage.lasting, stage.timer) for stage in stages]
 
 
-def _picks(stages: Sequence[Stage]) -> int:
+def _count_picks(stages: Sequence[Stage]) -> int:
     return sum(stage.primitive.kind in PICKS for stage in stages)

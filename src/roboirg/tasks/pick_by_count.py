@@ -11,12 +11,12 @@ from functools import partial
 import numpy as np
 
 from roboirg.core.conditions import Elapsed, Fact, Rule
-from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stage
-from roboirg.core.footprints import Circle, Footprint, Region
-from roboirg.tasks.shared.fixtures import counted_goals, draw_number, draw_target
-from roboirg.tasks.shared.real_table import draw_sides, draw_tape, on_side
+from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.core.footprints import Region
+from roboirg.tasks.shared.fixtures import counted_goals, disc_area, draw_number, draw_target
+from roboirg.tasks.shared.real_table import draw_regions, draw_tape
 from roboirg.tasks.shared.stages import placing_stages
-from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.tasks.task import GoalThings, SceneAndGoal, Task
 from roboirg.util.random_draws import draw
 
 TAPES: tuple[Color, ...] = ("yellow", "gray")
@@ -34,36 +34,44 @@ then. The longest pick in RoboMME's data takes 137."""
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw the target and a tape on either side; sides, goal tape and number are uniform."""
     del difficulty
-    target = draw_target(rng, "target", TARGET_RADIUS, TARGET_REGION, 0.0, ())
-    obstacles: list[Footprint] = [Circle(target.position.x, target.position.y, TARGET_RADIUS)]
-    sides = draw_sides(rng, TAPES)
-    tapes = tuple(
-        draw_tape(
-            rng,
-            f"tape_{color}",
-            color,
-            on_side(LEFT_TAPE_REGION, sides[color]),
-            TAPE_GAP,
-            obstacles,
-        )
-        for color in TAPES
+    target = draw_target(
+        rng,
+        name="target",
+        radius=TARGET_RADIUS,
+        region=TARGET_REGION,
+        gap=0.0,
+        obstacles=(),
     )
-    chosen = draw(rng, TAPES)
-    goal = Goal.of(color=str(chosen), repeats=draw_number(rng, REPEATS))
+    tapes: list[SceneObject] = []
+    for color, region in draw_regions(rng, TAPES, LEFT_TAPE_REGION).items():
+        tape = draw_tape(
+            rng,
+            name=f"tape_{color}",
+            color=color,
+            region=region,
+            gap=TAPE_GAP,
+            obstacles=[disc_area(target)],
+        )
+        tapes.append(tape)
+    goal = Goal.of(color=draw(rng, TAPES), repeats=draw_number(rng, REPEATS))
     return Scene((*tapes, target)), goal
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Return the stages: N times pick and place, then leave all tapes alone for a while."""
+    """Return the stages: N times pick and place, then leave all tapes alone for a while.
+
+    The other tape is forbidden in all stages, a further pick of the right one in the last.
+    """
     color = goal.text("color")
-    tape = f"tape_{color}"
-    wrong = tuple(
-        Rule(Fact("picked", item.name), f"picked up the {item.color} tape", failure="wrong_object")
-        for item in scene.of_kind("tape")
-        if item.name != tape
+    wrong: list[Rule] = []
+    for tape in scene.of_kind("tape"):
+        if tape.color != color:
+            cause = f"picked up the {tape.color} tape"
+            wrong.append(Rule(Fact("picked", tape.name), cause, failure="wrong_object"))
+    again = Rule(
+        Fact("picked", f"tape_{color}"), f"picked up the {color} tape again", failure="wrong_count"
     )
-    again = Rule(Fact("picked", tape), f"picked up the {color} tape again", failure="wrong_count")
-    plan = placing_stages("tape", color, goal.number("repeats"), wrong)
+    plan = placing_stages("tape", color, goal.number("repeats"), tuple(wrong))
     leave = Stage(
         expects=Elapsed(WAIT_STEPS, timer="left alone"),
         forbids=(again, *wrong),
@@ -74,27 +82,6 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     return (*plan, leave)
 
 
-COMMANDS = Commands(
-    thing="tape",
-    colored="tape",
-    colors=TAPES,
-    by_place="the tape {place}",
-    pointed="tape",
-    things_at="the tape {place}",
-    wordings=command_pools(
-        train=(
-            "Take {color} and place it on the target {repeats}.",
-            "Put {color} on the target {repeats}.",
-            "Please place {color} on the target {repeats}.",
-        ),
-        test=(
-            "Grab {color} and set it on the target {repeats}.",
-            "Lay {color} on the target {repeats}.",
-            "Please set {color} on the target {repeats}.",
-        ),
-    ),
-)
-
 TASK = Task(
     name="PickByCount",
     suite="real",
@@ -103,5 +90,6 @@ TASK = Task(
     sample=sample,
     goals=partial(counted_goals, kind="tape", most=REPEATS[1]),
     stages=stages,
-    commands=COMMANDS,
+    things=GoalThings(handled="tape", colored="tape", pointed="tape", colors=TAPES),
+    words="real_study.toml",
 )

@@ -20,8 +20,8 @@ from roboirg.tasks.shared.fixtures import (
     draw_number,
     draw_target,
 )
-from roboirg.tasks.shared.stages import PRESSED, placing_stages, press_stage
-from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.tasks.shared.stages import PRESSED, facts_of_others, placing_stages, press_stage
+from roboirg.tasks.task import SceneAndGoal, Task
 from roboirg.util.random_draws import draw
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
@@ -38,41 +38,39 @@ TARGET_GAP = 0.04
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, cubes of different colors, target disc; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
-    button, cubes, obstacles = draw_button_and_cubes(
-        rng, BUTTON_REGION, CUBES[difficulty], WORK_REGION, CUBE_GAP
+    placed = draw_button_and_cubes(
+        rng,
+        button_region=BUTTON_REGION,
+        count=CUBES[difficulty],
+        region=WORK_REGION,
+        gap=CUBE_GAP,
     )
-    target = draw_target(rng, "target", TARGET_RADIUS, WORK_REGION, TARGET_GAP, obstacles)
-    chosen = draw(rng, cubes)
+    target = draw_target(
+        rng,
+        name="target",
+        radius=TARGET_RADIUS,
+        region=WORK_REGION,
+        gap=TARGET_GAP,
+        obstacles=placed.obstacles,
+    )
+    chosen = draw(rng, placed.cubes)
     goal = Goal.of(color=str(chosen.color), repeats=repeats)
-    return Scene((button, *cubes, target)), goal
+    return Scene((placed.button, *placed.cubes, target)), goal
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Return 2 N + 1 stages: N times pick and place, then press."""
+    """Return 2 N + 1 stages: N times pick and place, then press.
+
+    Other cubes and an early press are forbidden until then, and any pick in the last stage.
+    """
     color = goal.text("color")
-    cube = f"cube_{color}"
-    cubes = tuple(item.name for item in scene.of_kind("cube"))
-    wrong_cubes = (Fact("picked", other) for other in cubes if other != cube)
-    wrong = (*wrong_cubes, PRESSED)
-    plan = placing_stages("cube", color, goal.number("repeats"), wrong)
-    picks = tuple(Fact("picked", any_cube) for any_cube in cubes)
-    return (*plan, press_stage("press the button {at} to stop", picks))
+    cubes = scene.of_kind("cube")
+    wrong_picks = facts_of_others("picked", cubes, f"cube_{color}")
+    repeats = goal.number("repeats")
+    plan = placing_stages("cube", color, repeats, (*wrong_picks, PRESSED))
+    all_picks = tuple(Fact("picked", cube.name) for cube in cubes)
+    return (*plan, press_stage("press the button {at} to stop", all_picks))
 
-
-COMMANDS = Commands(
-    wordings=command_pools(
-        train=(
-            "Put {color} on the target {repeats}, then press the button.",
-            "Take {color} and place it on the target {repeats}, then press the button.",
-            "Place {color} on the target {repeats} and press the button.",
-        ),
-        test=(
-            "Set {color} on the target {repeats}, then push the button.",
-            "Grab {color}, set it down on the target {repeats}, then press the button.",
-            "Lay {color} on the target {repeats} and push the button.",
-        ),
-    ),
-)
 
 TASK = Task(
     name="PickXtimes",
@@ -82,6 +80,5 @@ TASK = Task(
     sample=sample,
     goals=partial(counted_goals, kind="cube", most=MAX_REPEATS),
     stages=stages,
-    commands=COMMANDS,
     words="color_and_number.toml",
 )

@@ -10,17 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from roboirg.core.conditions import Fact, Rule
-from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, Stage
-from roboirg.core.footprints import Footprint, Region
+from roboirg.core.episode import Color, Difficulty, Goal, Primitive, Scene, SceneObject, Stage
+from roboirg.core.footprints import Region
 from roboirg.tasks.shared.fixtures import footprint
-from roboirg.tasks.shared.real_table import (
-    draw_box,
-    draw_sides,
-    draw_tape,
-    on_side,
-)
+from roboirg.tasks.shared.real_table import draw_box, draw_regions, draw_tape
 from roboirg.tasks.shared.stages import pick_stage
-from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.tasks.task import GoalThings, SceneAndGoal, Task
 from roboirg.util.random_draws import draw
 
 BOXES: tuple[Color, ...] = ("green", "purple")
@@ -34,15 +29,18 @@ TAPE_GAP = 0.03
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw a box on either side, the tape in front of them; sides and goal box are uniform."""
     del difficulty
-    sides = draw_sides(rng, BOXES)
-    boxes = tuple(
-        draw_box(rng, f"box_{color}", color, on_side(LEFT_BOX_REGION, sides[color]))
-        for color in BOXES
+    boxes: list[SceneObject] = []
+    for color, region in draw_regions(rng, BOXES, LEFT_BOX_REGION).items():
+        boxes.append(draw_box(rng, f"box_{color}", color, region))
+    tape = draw_tape(
+        rng,
+        name="tape",
+        color=TAPE,
+        region=TAPE_REGION,
+        gap=TAPE_GAP,
+        obstacles=[footprint(box) for box in boxes],
     )
-    obstacles: list[Footprint] = [footprint(box) for box in boxes]
-    tape = draw_tape(rng, "tape", TAPE, TAPE_REGION, TAPE_GAP, obstacles)
-    goal = Goal.of(color=str(draw(rng, BOXES)))
-    return Scene((*boxes, tape)), goal
+    return Scene((*boxes, tape)), Goal.of(color=draw(rng, BOXES))
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
@@ -52,48 +50,22 @@ def goals(scene: Scene) -> tuple[Goal, ...]:
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Return the stages: pick the tape, and put it into the right box only."""
-    target = f"box_{goal.text('color')}"
-    wrong = tuple(
-        Rule(
-            Fact("binned", "tape", box.name),
-            f"put the tape into the {box.color} box",
-            failure="wrong_place",
-        )
-        for box in scene.of_kind("box")
-        if box.name != target
-    )
-    pick = pick_stage("tape", "pick up the tape {at}", wrong)
+    color = goal.text("color")
+    wrong: list[Rule] = []
+    for box in scene.of_kind("box"):
+        if box.color != color:
+            cause = f"put the tape into the {box.color} box"
+            wrong.append(Rule(Fact("binned", "tape", box.name), cause, failure="wrong_place"))
+    forbids = tuple(wrong)
     put_in = Stage(
-        expects=Fact("binned", "tape", target),
-        forbids=wrong,
-        primitive=Primitive("put_into", "tape", target),
-        subgoal=f"put the tape into the {goal.text('color')} box {{at}}",
-        points_at=target,
+        expects=Fact("binned", "tape", f"box_{color}"),
+        forbids=forbids,
+        primitive=Primitive("put_into", "tape", f"box_{color}"),
+        subgoal=f"put the tape into the {color} box {{at}}",
+        points_at=f"box_{color}",
     )
-    return pick, put_in
+    return pick_stage("tape", "pick up the tape {at}", forbids), put_in
 
-
-COMMANDS = Commands(
-    thing="box",
-    colored="box",
-    # Excluding the colors of the tape and one box leaves the other box.
-    colors=(*BOXES, TAPE),
-    by_place="the box {place}",
-    pointed="box",
-    things_at="the box {place}",
-    wordings=command_pools(
-        train=(
-            "Put the tape into {color}.",
-            "Please place the tape into {color}.",
-            "Drop the tape into {color}.",
-        ),
-        test=(
-            "Lay the tape in {color}.",
-            "Move the tape into {color}.",
-            "Please set the tape into {color}.",
-        ),
-    ),
-)
 
 TASK = Task(
     name="PutInBox",
@@ -103,5 +75,7 @@ TASK = Task(
     sample=sample,
     goals=goals,
     stages=stages,
-    commands=COMMANDS,
+    # Excluding the colors of the tape and one box leaves the other box.
+    things=GoalThings(handled="box", colored="box", pointed="box", colors=(*BOXES, TAPE)),
+    words="real_study.toml",
 )

@@ -16,7 +16,8 @@ from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject
 from roboirg.core.footprints import Region
 from roboirg.core.motions import Point, Shuttle
 from roboirg.tasks.shared.fixtures import ORDINALS, draw_button
-from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.tasks.shared.stages import PRESSED
+from roboirg.tasks.task import SceneAndGoal, Task
 from roboirg.util.random_draws import draw
 
 BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
@@ -38,29 +39,49 @@ LEAD = 30
 """Control steps before the cube is on the target at which the oracle starts to press."""
 CHECKPOINT = 100
 """Waiting is split into stages that end at multiples of this number of control steps."""
+STOPPED = Fact("stopped", "shuttle", "target")
 
 
 def sample(rng: np.random.Generator, _difficulty: Difficulty) -> SceneAndGoal:
-    """Draw button, target and cube; speed, goal visit and direction of the path are uniform."""
+    """Draw button, target and cube; speed, goal visit and direction of the path are uniform.
+
+    The cube has a random color, which means nothing.
+    """
     button = draw_button(rng, BUTTON_REGION)
-    x, y = TARGET_REGION.draw(rng)
+    middle = Point(*TARGET_REGION.draw(rng), HEIGHT)
     target = SceneObject(
         "target",
         "target",
-        Point(x, y, HEIGHT),
+        middle,
         radius=TARGET_RADIUS,
         thickness=TARGET_THICKNESS,
     )
     red, green, blue = rng.random(3).tolist()
     interval = draw(rng, INTERVALS)
     visit = int(rng.integers(VISITS.start, VISITS.stop))
-    angle = (2.0 * rng.random() - 1.0) * PATH_ANGLE
-    along_x, along_y = -PATH_HALF * math.sin(angle), PATH_HALF * math.cos(angle)
-    begin = Point(x - along_x, y - along_y, HEIGHT)
-    end = Point(x + along_x, y + along_y, HEIGHT)
-    shuttle = SceneObject("shuttle", "shuttle", begin, rgb=(red, green, blue))
-    run = Shuttle("shuttle", begin, end, interval, PASSES, stopped_by=Fact("pressed", "button"))
+    run = _draw_run(rng, middle, interval)
+    shuttle = SceneObject("shuttle", "shuttle", run.begin, rgb=(red, green, blue))
     return Scene((button, target, shuttle), motions=(run,)), Goal.of(visit=visit)
+
+
+def _draw_run(rng: np.random.Generator, middle: Point, interval: int) -> Shuttle:
+    """Draw the direction of the cube's path, given its middle and the steps of one pass.
+
+    The path runs from the robot's right to its left, turned by at most `PATH_ANGLE`.
+    """
+    angle = (2.0 * rng.random() - 1.0) * PATH_ANGLE
+    along_x = -PATH_HALF * math.sin(angle)
+    along_y = PATH_HALF * math.cos(angle)
+    begin = Point(middle.x - along_x, middle.y - along_y, HEIGHT)
+    end = Point(middle.x + along_x, middle.y + along_y, HEIGHT)
+    return Shuttle(
+        "shuttle",
+        begin,
+        end,
+        interval=interval,
+        passes=PASSES,
+        stopped_by=PRESSED,
+    )
 
 
 def goals(_scene: Scene) -> tuple[Goal, ...]:
@@ -69,10 +90,12 @@ def goals(_scene: Scene) -> tuple[Goal, ...]:
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Return the stages: move above the button, wait, press."""
+    """Return the stages: move above the button, wait, press.
+
+    The waiting is several stages, since as in RoboMME each ends at a checkpoint.
+    """
     visit = goal.number("visit")
     interval = scene.motions_of(Shuttle)[0].interval
-    stopped = Fact("stopped", "shuttle", "target")
     wrong = _wrong(interval, visit)
     hover = Stage(
         expects=Fact("hovering", "robot", "button"),
@@ -81,67 +104,65 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
         subgoal="move to the top of the button {at} to prepare",
         points_at="button",
     )
-    waits = [
-        Stage(
-            expects=Elapsed(least=checkpoint),
-            forbids=wrong,
-            primitive=Primitive("hold_until", "robot", steps=checkpoint),
-            subgoal="remain static",
-        )
-        for checkpoint in checkpoints(interval, visit)
-    ]
-    too_early = Rule(
-        OccurrenceCount((stopped,), least=1, until=interval * (visit - 1) - 1),
-        "stopped the cube on an earlier visit",
-        "wrong_time",
-    )
+    waits = [_wait(checkpoint, wrong) for checkpoint in checkpoints(interval, visit)]
     press = Stage(
-        expects=stopped,
-        forbids=(*wrong, too_early),
-        primitive=Primitive("press_below", "button", steps=interval * visit - interval // 2),
+        expects=STOPPED,
+        forbids=(*wrong, _too_early(interval, visit)),
+        primitive=Primitive("press_below", "button", steps=_middle_of(interval, visit)),
         subgoal="press the button to stop the cube on the target {at}",
         points_at="target",
     )
     return (hover, *waits, press)
 
 
+def _middle_of(interval: int, visit: int) -> int:
+    """Return the control steps since reset to the middle of a visit, counted from 1.
+
+    With passes of 60 steps, the second takes steps 60 to 120, its middle is 90.
+    """
+    return interval * visit - interval // 2
+
+
+def _wait(checkpoint: int, wrong: tuple[Rule, ...]) -> Stage:
+    """Return the stage in which the hand waits until a number of steps since reset."""
+    return Stage(
+        expects=Elapsed(least=checkpoint),
+        forbids=wrong,
+        primitive=Primitive("hold_until", "robot", steps=checkpoint),
+        subgoal="remain static",
+    )
+
+
 def checkpoints(interval: int, visit: int) -> tuple[int, ...]:
     """Return the control steps since reset at which waiting stages end, the last to press.
 
+    Passes of 80 steps, third visit -> 100 and 170: `LEAD` steps before the cube is on the target.
+
     Args:
         interval: control steps of one pass.
-        visit: the goal's visit, from 1; its middle is half an interval before its pass ends.
+        visit: the goal's visit, from 1.
     """
-    press = interval * visit - interval // 2 - LEAD
+    press = _middle_of(interval, visit) - LEAD
     return (*range(CHECKPOINT, press, CHECKPOINT), press)
 
 
 def _wrong(interval: int, visit: int) -> tuple[Rule, ...]:
-    """Return the rules of every stage."""
-    off = All((Fact("pressed", "button"), absent(Fact("near", "shuttle", "target"))))
+    """Return the rules of every stage: no press off the target, and none after the goal's visit."""
+    is_off_target = absent(Fact("near", "shuttle", "target"))
+    press_off_target = All((PRESSED, is_off_target))
+    too_late = Elapsed(least=interval * visit + 1)
     return (
-        Rule(off, "pressed the button while the cube was off the target", "mistimed"),
-        Rule(
-            Elapsed(least=interval * visit + 1),
-            f"let the cube's {ORDINALS[visit - 1]} visit pass",
-        ),
+        Rule(press_off_target, "pressed the button while the cube was off the target", "mistimed"),
+        Rule(too_late, f"let the cube's {ORDINALS[visit - 1]} visit pass"),
     )
 
 
-COMMANDS = Commands(
-    wordings=command_pools(
-        train=(
-            "Press the button to stop the cube on the target {visit}.",
-            "Use the button to stop the cube on the target {visit}.",
-            "Stop the cube on the target {visit} by pressing the button.",
-        ),
-        test=(
-            "Push the button so that the cube stops on the target {visit}.",
-            "Halt the cube on the target {visit} by pushing the button.",
-            "Push the button to make the cube stop on the target {visit}.",
-        ),
-    ),
-)
+def _too_early(interval: int, visit: int) -> Rule:
+    """Return the rule against stopping the cube before the pass of a visit begins."""
+    last_step = interval * (visit - 1) - 1
+    stop = OccurrenceCount((STOPPED,), least=1, until=last_step)
+    return Rule(stop, "stopped the cube on an earlier visit", "wrong_time")
+
 
 TASK = Task(
     name="StopCube",
@@ -151,6 +172,5 @@ TASK = Task(
     sample=sample,
     goals=goals,
     stages=stages,
-    commands=COMMANDS,
     words="StopCube.toml",
 )

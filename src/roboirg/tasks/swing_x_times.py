@@ -13,19 +13,26 @@ import numpy as np
 
 from roboirg.core.conditions import Fact, OccurrenceCount, Rule
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
-from roboirg.core.footprints import Circle, Region
-from roboirg.core.motions import Glow
+from roboirg.core.footprints import Obstacle, Region
+from roboirg.core.motions import Glow, Motion
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     Bounds,
     counted_goals,
+    disc_area,
     draw_button_and_cubes,
     draw_number,
     draw_target,
     marker_over,
 )
-from roboirg.tasks.shared.stages import PRESSED, pick_stage, press_stage
-from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.tasks.shared.stages import (
+    PRESSED,
+    facts_of_others,
+    pick_stage,
+    press_stage,
+    put_down_stage,
+)
+from roboirg.tasks.task import SceneAndGoal, Task
 from roboirg.util.random_draws import draw
 
 CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
@@ -50,18 +57,36 @@ LINGER = 20
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, cubes and a target on either side; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
-    button, cubes, obstacles = draw_button_and_cubes(
-        rng, BUTTON_REGION, CUBES[difficulty], CUBE_REGION, CUBE_GAP
+    placed = draw_button_and_cubes(
+        rng,
+        button_region=BUTTON_REGION,
+        count=CUBES[difficulty],
+        region=CUBE_REGION,
+        gap=CUBE_GAP,
     )
+    targets = _draw_targets(rng, placed.obstacles)
+    chosen = draw(rng, placed.cubes)
+    scene = make_scene(placed.button, placed.cubes, targets, chosen.name)
+    return scene, Goal.of(color=str(chosen.color), repeats=repeats)
+
+
+def _draw_targets(rng: np.random.Generator, obstacles: Sequence[Obstacle]) -> list[SceneObject]:
+    """Draw the target on each side, in the order of `SIDES`."""
+    taken = list(obstacles)
     targets: list[SceneObject] = []
     for side, region in SIDES.items():
-        name = f"target_{side}"
-        target = draw_target(rng, name, TARGET_RADIUS, region, TARGET_GAP, obstacles, TARGET_RGB)
+        target = draw_target(
+            rng,
+            name=f"target_{side}",
+            radius=TARGET_RADIUS,
+            region=region,
+            gap=TARGET_GAP,
+            obstacles=taken,
+            rgb=TARGET_RGB,
+        )
         targets.append(target)
-        obstacles.append(Circle(target.position.x, target.position.y, TARGET_RADIUS))
-    chosen = draw(rng, cubes)
-    goal = Goal.of(color=str(chosen.color), repeats=repeats)
-    return make_scene(button, cubes, targets, chosen.name), goal
+        taken.append(disc_area(target))
+    return targets
 
 
 def make_scene(
@@ -69,85 +94,64 @@ def make_scene(
 ) -> Scene:
     """Return the scene in which each target lights up while the cube of the goal is over it.
 
-    `targets` are in the order of `SIDES`.
+    A target lights up as a marker, a disc over it, appears. `targets` are in the order of `SIDES`;
+    `cube` is the name of the goal's.
     """
-    markers = [
-        marker_over(target, f"marker_{side}") for side, target in zip(SIDES, targets, strict=True)
-    ]
-    motions = tuple(
-        Glow(marker.name, Fact("over", cube, target.name), LINGER)
-        for marker, target in zip(markers, targets, strict=True)
+    markers: list[SceneObject] = []
+    motions: list[Motion] = []
+    for side, target in zip(SIDES, targets, strict=True):
+        marker = marker_over(target, f"marker_{side}")
+        is_over = Fact("over", cube, target.name)
+        markers.append(marker)
+        motions.append(Glow(marker.name, is_over, LINGER))
+    return Scene(
+        objects=(button, *cubes, *targets, *markers),
+        motions=tuple(motions),
     )
-    return Scene((button, *cubes, *targets, *markers), motions)
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Return 2 N + 3 stages: pick, N times over the right and left target, put down, press."""
-    color, repeats = goal.text("color"), goal.number("repeats")
+    """Return 2 N + 3 stages: pick, N times over the right and left target, put down, press.
+
+    Every stage forbids to pick another cube and to swing too often; all but the last, to press.
+    """
+    color = goal.text("color")
+    repeats = goal.number("repeats")
     cube = f"cube_{color}"
-    visits = tuple(Fact("over", cube, f"target_{side}") for side in SIDES)
-    # Visits in a wrong order complete no stage but count, so they also violate this rule.
-    too_often = Rule(
-        OccurrenceCount(visits, least=2 * repeats + 1), "moved the cube over a target too often"
+    wrong_picks = facts_of_others("picked", scene.of_kind("cube"), cube)
+    too_often = _too_often(cube, len(SIDES) * repeats)
+    forbidden: tuple[Fact | Rule, ...] = (*wrong_picks, PRESSED, too_often)
+
+    plan = [pick_stage(cube, f"pick up the {color} cube {{at}}", forbidden)]
+    for ordinal in ORDINALS[:repeats]:
+        plan += [_swing(cube, side, ordinal, forbidden) for side in SIDES]
+    put_down = put_down_stage(
+        Primitive("put_down", cube), f"put the {color} cube on the table", forbidden
     )
-    wrong_cubes = [Fact("picked", item.name) for item in scene.of_kind("cube") if item.name != cube]
-    wrong: tuple[Fact | Rule, ...] = (*wrong_cubes, PRESSED, too_often)
-    pick = pick_stage(cube, f"pick up the {color} cube {{at}}", wrong)
-    swings = [
-        _swing(cube, side, ordinal, wrong) for ordinal in ORDINALS[:repeats] for side in SIDES
-    ]
-    put_down = Stage(
-        expects=Fact("lying", cube),
-        forbids=wrong,
-        primitive=Primitive("put_down", cube),
-        subgoal=f"put the {color} cube on the table",
-    )
-    return (pick, *swings, put_down, press_stage(forbids=(*wrong_cubes, too_often)))
+    return (*plan, put_down, press_stage(forbids=(*wrong_picks, too_often)))
 
 
-def _swing(cube: str, side: str, ordinal: str, wrong: tuple[Fact | Rule, ...]) -> Stage:
+def _too_often(cube: str, visits: int) -> Rule:
+    """Return the rule against more visits of the targets than the goal's.
+
+    Visits in a wrong order complete no stage but count, so they also violate this rule.
+    """
+    over = tuple(Fact("over", cube, f"target_{side}") for side in SIDES)
+    limit = OccurrenceCount(over, least=visits + 1)
+    return Rule(limit, "moved the cube over a target too often")
+
+
+def _swing(cube: str, side: str, ordinal: str, forbidden: tuple[Fact | Rule, ...]) -> Stage:
+    """Return the stage in which the cube is carried over the target on a side."""
     target = f"target_{side}"
     return Stage(
         expects=Fact("over", cube, target),
-        forbids=wrong,
+        forbids=forbidden,
         primitive=Primitive("move_over", cube, target),
         subgoal=f"move to the top of the {side}-side target {{at}} for the {ordinal} time",
         points_at=target,
     )
 
-
-COMMANDS = Commands(
-    wordings=command_pools(
-        train=(
-            (
-                "Swing {color} from your right to your left target {repeats}, put it "
-                "down and press the button."
-            ),
-            (
-                "Move {color} from your right to your left target {repeats}, put "
-                "it down and press the button."
-            ),
-            (
-                "Bring {color} from your right to your left target {repeats}, "
-                "set it down and press the button."
-            ),
-        ),
-        test=(
-            (
-                "Carry {color} from your right to your left target "
-                "{repeats}, set it down and push the button."
-            ),
-            (
-                "Grab {color}, swing it from your right to your left target {repeats}, "
-                "put it down and press the button."
-            ),
-            (
-                "Swing {color} from your right to your left target {repeats}, "
-                "put it down and push the button."
-            ),
-        ),
-    ),
-)
 
 TASK = Task(
     name="SwingXtimes",
@@ -157,6 +161,5 @@ TASK = Task(
     sample=sample,
     goals=partial(counted_goals, kind="cube", most=MAX_REPEATS),
     stages=stages,
-    commands=COMMANDS,
     words="color_and_number.toml",
 )

@@ -10,58 +10,47 @@ import numpy as np
 
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
+from roboirg.core.goal_slots import MOMENTS
 from roboirg.tasks.shared import video_place
 from roboirg.tasks.shared.stages import PRESSED
-from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.tasks.task import SceneAndGoal, Task
 from roboirg.util.random_draws import draw
 
 DISCS: dict[Difficulty, int] = {"easy": 3, "medium": 4, "hard": 4}
 SITE_RADIUS = 0.06
-RELATIONS = ("before", "after")
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
-    """Draw a scene in which the cube goes to ``target_0``, then to ``target_1`` after the press."""
+    """Draw a scene in which the cube goes to ``target_0``, then to ``target_1`` after the press.
+
+    The goal is the cube of the video, on the disc before or after the press.
+    """
     cubes = video_place.CUBES[difficulty]
-    table, cube = video_place.draw_table(rng, cubes, DISCS[difficulty], SITE_RADIUS)
-    discs = table.of_kind("target")
-    before, after = (Fact("placed", cube.name, disc.name) for disc in discs[:2])
+    table = video_place.draw_table(rng, cubes, DISCS[difficulty], SITE_RADIUS)
+    cube = table.cube
+    before = Fact("placed", cube.name, "target_0")
+    after = Fact("placed", cube.name, "target_1")
     past = (before, PRESSED, after)
-    swaps = (video_place.draw_swap(rng, discs, past),) if difficulty == "hard" else ()
-    relation = draw(rng, RELATIONS)
-    return Scene(table.objects, swaps, past), Goal.of(color=str(cube.color), relation=relation)
+    scene = video_place.draw_scene(rng, difficulty, table, past)
+    goal = Goal.of(color=str(cube.color), relation=draw(rng, MOMENTS))
+    return scene, goal
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
     """Return a goal for every cube and the disc used before or after the press."""
-    return tuple(
-        Goal.of(color=color, relation=relation)
-        for color in video_place.colors_of(scene)
-        for relation in RELATIONS
-    )
+    goals: list[Goal] = []
+    for color in video_place.colors_of(scene):
+        goals += [Goal.of(color=color, relation=relation) for relation in MOMENTS]
+    return tuple(goals)
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     """Return the stages: pick the cube, and place it on the disc before or after the press."""
-    step = -1 if goal.text("relation") == "before" else 1
-    placing = scene.past[scene.past.index(PRESSED) + step]
+    press = scene.past.index(PRESSED)
+    is_before = goal.text("relation") == "before"
+    placing = scene.past[press - 1 if is_before else press + 1]
     return video_place.place_stages(scene, goal.text("color"), str(placing.place))
 
-
-COMMANDS = Commands(
-    wordings=command_pools(
-        train=(
-            "Think back to the video and put {color} on {relation}.",
-            "You saw the video, so put {color} on {relation}.",
-            "Going by the video, place {color} on {relation}.",
-        ),
-        test=(
-            "Going by what you saw, set {color} on {relation}.",
-            "Keep the video in mind and place {color} on {relation}.",
-            "You watched the video, so set {color} on {relation}.",
-        ),
-    ),
-)
 
 TASK = Task(
     name="VideoPlaceButton",
@@ -71,6 +60,6 @@ TASK = Task(
     sample=sample,
     goals=goals,
     stages=stages,
-    commands=COMMANDS,
     demonstration=video_place.demonstration,
+    words="VideoPlaceButton.toml",
 )

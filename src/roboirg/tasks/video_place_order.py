@@ -14,7 +14,9 @@ from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.tasks.shared import video_place
 from roboirg.tasks.shared.fixtures import draw_number
 from roboirg.tasks.shared.stages import PRESSED
-from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.tasks.shared.video_place import PlaceTable
+from roboirg.tasks.task import SceneAndGoal, Task
+from roboirg.util.random_draws import shuffled
 
 DISCS = 4
 PLACEMENTS = (2, 4)
@@ -23,27 +25,35 @@ SITE_RADIUS = 0.1
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
-    """Draw the visited discs, their order, the goal's disc and the time of the press."""
+    """Draw the visited discs, their order, the goal's disc and the time of the press.
+
+    The press comes after the first placing at the earliest, and after the last at the latest.
+    """
     cubes = video_place.CUBES[difficulty]
-    table, cube = video_place.draw_table(rng, cubes, DISCS, SITE_RADIUS)
-    discs = table.of_kind("target")
-    placements = draw_number(rng, PLACEMENTS)
-    order = rng.permutation(DISCS)[:placements]
-    shown = [Fact("placed", cube.name, discs[index].name) for index in order]
-    placement = int(rng.integers(1, placements + 1))
-    pressed_after = int(rng.integers(1, placements + 1))
+    table = video_place.draw_table(rng, cubes, DISCS, SITE_RADIUS)
+    shown = _draw_placings(rng, table)
+    placement = draw_number(rng, (1, len(shown)))
+    pressed_after = draw_number(rng, (1, len(shown)))
     past = (*shown[:pressed_after], PRESSED, *shown[pressed_after:])
-    swaps = (video_place.draw_swap(rng, discs, past),) if difficulty == "hard" else ()
-    return Scene(table.objects, swaps, past), Goal.of(color=str(cube.color), placement=placement)
+    scene = video_place.draw_scene(rng, difficulty, table, past)
+    goal = Goal.of(color=str(table.cube.color), placement=placement)
+    return scene, goal
+
+
+def _draw_placings(rng: np.random.Generator, table: PlaceTable) -> list[Fact]:
+    """Draw on how many discs, and on which ones in turn, the video shows the cube placed."""
+    placements = draw_number(rng, PLACEMENTS)
+    discs = shuffled(rng, table.discs)[:placements]
+    return [Fact("placed", table.cube.name, disc.name) for disc in discs]
 
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
     """Return a goal for every cube and every disc that was visited."""
-    return tuple(
-        Goal.of(color=color, placement=placement)
-        for color in video_place.colors_of(scene)
-        for placement in range(1, len(video_place.visited(scene)) + 1)
-    )
+    placements = range(1, len(video_place.visited(scene)) + 1)
+    goals: list[Goal] = []
+    for color in video_place.colors_of(scene):
+        goals += [Goal.of(color=color, placement=placement) for placement in placements]
+    return tuple(goals)
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
@@ -51,21 +61,6 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     answer = video_place.visited(scene)[goal.number("placement") - 1]
     return video_place.place_stages(scene, goal.text("color"), answer)
 
-
-COMMANDS = Commands(
-    wordings=command_pools(
-        train=(
-            "Think back to the video and put {color} on {placement}.",
-            "You saw the video, so put {color} on {placement}.",
-            "Going by the video, place {color} on {placement}.",
-        ),
-        test=(
-            "Going by what you saw, set {color} on {placement}.",
-            "Keep the video in mind and place {color} on {placement}.",
-            "You watched the video, so set {color} on {placement}.",
-        ),
-    ),
-)
 
 TASK = Task(
     name="VideoPlaceOrder",
@@ -75,6 +70,6 @@ TASK = Task(
     sample=sample,
     goals=goals,
     stages=stages,
-    commands=COMMANDS,
     demonstration=video_place.demonstration,
+    words="VideoPlaceOrder.toml",
 )

@@ -7,7 +7,7 @@ Facts: RoboMME.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from roboirg.core.motions import Swap
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     Bounds,
+    CubePlan,
     button_keep_out,
     draw_button,
     draw_cubes,
@@ -26,14 +27,16 @@ from roboirg.tasks.shared.fixtures import (
 from roboirg.tasks.shared.layouts import layout_points
 from roboirg.tasks.shared.stages import (
     PRESSED,
+    facts_of_others,
     go_home,
     hold_still,
     pick_stage,
     press_stage,
+    put_down_stage,
     retreat,
 )
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS, plan_swaps
-from roboirg.tasks.task import Commands, SceneAndGoal, Task, command_pools
+from roboirg.tasks.task import SceneAndGoal, Task
 from roboirg.util.random_draws import draw, shuffled
 
 REPEATS = (1, 3)
@@ -52,22 +55,28 @@ SWAP_LANE = 0.07
 SWAP_STAGE = 3
 """Index of the demonstration's stage with which the swaps start: the first hold."""
 
-SHOWN_RELEASE, OWN_RELEASE = 0.03, 0.01
-"""Tool heights at which the oracle releases the cube in the video and afterwards, m."""
+SHOWN_RELEASE = 0.03
+"""Tool height at which the oracle releases the cube in the video, m."""
+OWN_RELEASE = 0.01
+"""The same in the policy's turn."""
 
 EARLY_PRESS = (50, 500)
 """A premature press fails only within these control steps of its timer."""
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
-    """Draw button and cubes; the cube of the video and the number of repeats are uniform."""
+    """Draw button and cubes; the cube of the video and the number of repeats are uniform.
+
+    In hard episodes many cubes of all colors lie about, and none moves; in the others, three of one
+    color change places.
+    """
     repeats = draw_number(rng, REPEATS)
     swaps = draw_number(rng, SWAPS[difficulty])
     button = draw_button(rng, BUTTON_REGION)
     cubes = _draw_clutter(rng, button) if difficulty == "hard" else _draw_layout(rng, button)
     # The cube of the video starts the first swap, the others follow in any order.
-    target, *others = (cube.name for cube in shuffled(rng, cubes))
-    scene = make_scene(button, cubes, target, (target, *others)[:swaps])
+    order = [cube.name for cube in shuffled(rng, cubes)]
+    scene = make_scene(button, cubes, order[0], order[:swaps])
     return scene, Goal.of(repeats=repeats)
 
 
@@ -98,37 +107,37 @@ def make_scene(
 def _draw_layout(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
     """Draw three cubes of one color, each near its point of a layout."""
     color = draw(rng, COLORS)
-    cubes = (
-        (f"cube_{color}_{number}", color, Region(*point, LAYOUT_HALF, LAYOUT_HALF))
-        for number, point in enumerate(layout_points(rng, LAYOUT_CUBES))
-    )
-    return draw_cubes(rng, cubes, GAP, [button_keep_out(button)])
+    plans: list[CubePlan] = []
+    for number, point in enumerate(layout_points(rng, LAYOUT_CUBES)):
+        name = f"cube_{color}_{number}"
+        region = Region(*point, half_x=LAYOUT_HALF, half_y=LAYOUT_HALF)
+        plans.append(CubePlan(name, color, region))
+    return draw_cubes(rng, plans, GAP, [button_keep_out(button)])
 
 
 def _draw_clutter(rng: np.random.Generator, button: SceneObject) -> list[SceneObject]:
     """Draw five cubes of each color; in each round one of each, in any order."""
-    # The colors of a round are drawn after the cubes of the one before.
-    cubes = (
-        (f"cube_{color}_{number}", color, CLUTTER_REGION)
-        for number in range(CLUTTER_ROUNDS)
-        for color in shuffled(rng, COLORS)
-    )
-    return draw_cubes(rng, cubes, GAP, [button_keep_out(button)])
+    return draw_cubes(rng, _clutter_plans(rng), GAP, [button_keep_out(button)])
+
+
+def _clutter_plans(rng: np.random.Generator) -> Iterator[CubePlan]:
+    """Yield the cubes of each round; its colors are drawn after the cubes of the one before."""
+    for number in range(CLUTTER_ROUNDS):
+        for color in shuffled(rng, COLORS):
+            yield CubePlan(f"cube_{color}_{number}", color, CLUTTER_REGION)
 
 
 def demonstration(scene: Scene) -> tuple[Stage, ...]:
     """Return the video's stages: pick up the cube, put it down, wait while cubes change places."""
     target = scene.past[0].subject
-    put_down = Stage(
-        expects=Fact("lying", target),
-        forbids=(),
-        primitive=Primitive("put_down", target, height=SHOWN_RELEASE),
-        subgoal="drop the cube on the table",
-    )
+    release = Primitive("put_down", target, height=SHOWN_RELEASE)
+    put_down = put_down_stage(release, "drop the cube on the table")
+    plan = [pick_stage(target), put_down]
     swaps = scene.motions_of(Swap)
-    waiting = [retreat()] if swaps else []
-    waiting += [hold_still(SWAP_STEPS) for _ in swaps]
-    return (pick_stage(target), put_down, *waiting, go_home())
+    if swaps:
+        plan.append(retreat())
+    plan += [hold_still(SWAP_STEPS)] * len(swaps)
+    return (*plan, go_home())
 
 
 def goals(_scene: Scene) -> tuple[Goal, ...]:
@@ -138,61 +147,38 @@ def goals(_scene: Scene) -> tuple[Goal, ...]:
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Return 2 N + 1 stages: N times pick up and put down, then press."""
-    target = scene.past[0].subject
-    cubes = tuple(item.name for item in scene.of_kind("cube"))
-    wrong = tuple(Fact("picked", other) for other in cubes if other != target)
+    """Return 2 N + 1 stages: N times pick up and put down, then press.
+
+    Timers start with the first stage that has them, so those of a premature press do not start
+    again with each repeat.
+    """
+    target = scene.past[0].subject  # the cube that the video shows picked up
+    cubes = scene.of_kind("cube")
+    wrong_picks = facts_of_others("picked", cubes, target)
     plan: list[Stage] = []
     for ordinal in ORDINALS[: goal.number("repeats")]:
         pick = pick_stage(
             target,
             f"pick up the correct cube {{at}} for the {ordinal} time",
-            (*wrong, _early_press("pick")),
+            (*wrong_picks, _early_press("pick")),
             timer="pick",
         )
-        put_down = Stage(
-            expects=Fact("lying", target),
-            forbids=(*wrong, _early_press("put down")),
-            primitive=Primitive("put_down", target, height=OWN_RELEASE),
-            subgoal="put it down",
+        put_down = put_down_stage(
+            Primitive("put_down", target, height=OWN_RELEASE),
+            "put it down",
+            (*wrong_picks, _early_press("put down")),
             timer="put down",
         )
         plan += [pick, put_down]
-    picks = tuple(Fact("picked", cube) for cube in cubes)
-    return (*plan, press_stage("press the button {at} to finish", picks))
+    all_picks = tuple(Fact("picked", cube.name) for cube in cubes)
+    return (*plan, press_stage("press the button {at} to finish", all_picks))
 
 
 def _early_press(timer: str) -> Rule:
     """Return the rule against a premature press, given the name of its timer."""
-    return Rule(All((PRESSED, Elapsed(*EARLY_PRESS, timer=timer))), "pressed the button too early")
+    is_early = Elapsed(*EARLY_PRESS, timer=timer)
+    return Rule(All((PRESSED, is_early)), "pressed the button too early")
 
-
-COMMANDS = Commands(
-    wordings=command_pools(
-        train=(
-            (
-                "Take the cube picked up in the video, lift it and put it down {repeats}, then "
-                "press the button."
-            ),
-            (
-                "Find the cube lifted in the video and repeat the action {repeats}, then press "
-                "the button."
-            ),
-            "As in the video, lift the same cube and put it down {repeats}, then press the button.",
-        ),
-        test=(
-            (
-                "Grab the cube raised in the video and repeat the action {repeats}, then push "
-                "the button."
-            ),
-            (
-                "Take the cube held in the video, raise it and put it back "
-                "{repeats}, then push the button."
-            ),
-            "Raise the cube lifted in the video and put it back {repeats}, then push the button.",
-        ),
-    ),
-)
 
 TASK = Task(
     name="VideoRepick",
@@ -202,6 +188,6 @@ TASK = Task(
     sample=sample,
     goals=goals,
     stages=stages,
-    commands=COMMANDS,
     demonstration=demonstration,
+    words="VideoRepick.toml",
 )

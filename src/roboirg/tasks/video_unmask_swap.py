@@ -6,8 +6,6 @@ movement in the video shows where a cube has gone. Facts: RoboMME.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from roboirg.core.episode import Difficulty, Scene, Stage
@@ -15,7 +13,7 @@ from roboirg.tasks.shared import unmask, unmask_swap
 from roboirg.tasks.shared.layouts import layout_points
 from roboirg.tasks.shared.stages import hold_still
 from roboirg.tasks.shared.swapping import last_step
-from roboirg.tasks.task import SceneAndGoal, Task, command_pools
+from roboirg.tasks.task import SceneAndGoal, Task
 
 
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
@@ -29,31 +27,6 @@ def demonstration(scene: Scene) -> tuple[Stage, ...]:
     return (hold_still(last_step(scene.motions)),)
 
 
-COMMANDS = replace(
-    unmask.container_commands(
-        command_pools(
-            train=(
-                "Think back to the video and lift {colors.0}.",
-                "Going by the video, lift {colors.0}.",
-                "Remember the video and lift {colors.0}.",
-                "Lift {colors.0}, set it down, then lift {colors.1}.",
-                "Lift {colors.0}, put it down, and then lift {colors.1}.",
-                "First lift {colors.0}, put it down, then lift {colors.1}.",
-            ),
-            test=(
-                "Keep the video in mind and raise {colors.0}.",
-                "Going by what you saw, raise {colors.0}.",
-                "Watch the video and pick up {colors.0}.",
-                "Raise {colors.0}, put it back, then raise {colors.1}.",
-                "Pick up {colors.0}, put it back, then pick up {colors.1}.",
-                "First raise {colors.0}, set it back, then raise {colors.1}.",
-            ),
-        )
-    ),
-    by_place="the container that started {place}",
-    things_at="the container that started {place}",
-)
-
 TASK = Task(
     name="VideoUnmaskSwap",
     suite="permanence",
@@ -62,7 +35,7 @@ TASK = Task(
     sample=sample,
     goals=unmask.goals,
     stages=unmask.pick_stages,
-    commands=COMMANDS,
+    things=unmask.CONTAINER_THINGS,
     demonstration=demonstration,
     words="containers.toml",
 )

@@ -15,7 +15,7 @@ import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.util.atomic_write import PART, replacing
@@ -33,10 +33,24 @@ _SHARES: dict[Kind, float] = {"actions": 1 / 16, "frames": 14 / 16, "meshes": 1 
 
 _MAGIC = b"roboirg1"
 _HEAD_SIZE = len(_MAGIC) + hashlib.sha256().digest_size
-_ABANDONED = 600.0
+_ABANDONED_S = 600.0
 """Seconds after which an unfinished entry must belong to a dead process."""
 
 _log = logging.getLogger(__name__)
+
+
+class _Entry(NamedTuple):
+    """An entry of a cache; those that were used longest ago are first in order.
+
+    Attributes:
+        used_at: when it was last read or written, ns.
+        size: bytes of its file.
+        path: of its file.
+    """
+
+    used_at: int
+    size: int
+    path: Path
 
 
 class Cache:
@@ -68,7 +82,7 @@ class Cache:
                 _log.warning("The cache entry %s is damaged and will be rebuilt.", path)
                 path.unlink(missing_ok=True)
                 return None
-            os.utime(path)
+            os.utime(path)  # it was used now: `_make_room` removes the oldest
         except FileNotFoundError:
             return None
         except OSError as error:
@@ -84,7 +98,8 @@ class Cache:
         try:
             with replacing(self._folder / key) as part:
                 with part.open("xb") as file:
-                    file.writelines((_head(key, content), content))
+                    file.write(_head(key, content))
+                    file.write(content)
                 self._make_room(size)
         except (OSError, InvalidValueError) as error:
             _warn_once(error)
@@ -92,21 +107,21 @@ class Cache:
     def _make_room(self, size: int) -> None:
         """Remove the least recently used entries until `size` bytes more fit in."""
         entries = sorted(self._entries())
-        total = size + sum(entry_size for _, entry_size, _ in entries)
-        for _, entry_size, path in entries:
+        total = size + sum(entry.size for entry in entries)
+        for entry in entries:
             if total <= self._limit:
                 return
-            path.unlink(missing_ok=True)
-            total -= entry_size
+            entry.path.unlink(missing_ok=True)
+            total -= entry.size
 
-    def _entries(self) -> Iterator[tuple[int, int, Path]]:
-        """Yield time of last use (ns), size and path of each entry; remove abandoned ones."""
+    def _entries(self) -> Iterator[_Entry]:
+        """Yield the entries; remove files that were begun long ago and never completed."""
         for path in Path(self._folder or "").iterdir():
             try:
                 state = path.stat()
                 if not path.name.endswith(PART):
-                    yield state.st_mtime_ns, state.st_size, path
-                elif time.time() - state.st_mtime > _ABANDONED:
+                    yield _Entry(state.st_mtime_ns, state.st_size, path)
+                elif time.time() - state.st_mtime > _ABANDONED_S:
                     path.unlink(missing_ok=True)
             except FileNotFoundError:
                 continue  # another process removed it
@@ -131,12 +146,12 @@ def _size() -> float:
     """Return the size limit of all caches together, bytes."""
     text = os.environ.get(SIZE_VARIABLE) or str(DEFAULT_GIB)
     try:
-        number = float(text)
+        size_gib = float(text)
     except ValueError:
-        number = 0.0
-    if not 0.0 < number < float("inf"):
+        size_gib = 0.0
+    if not 0.0 < size_gib < float("inf"):
         raise InvalidValueError(f"{SIZE_VARIABLE} is {text!r}; it must be a positive number.")
-    return number * _GIB
+    return size_gib * _GIB
 
 
 def _head(key: str, content: bytes | memoryview) -> bytes:

@@ -22,6 +22,7 @@ from roboirg.util.process_guard import begin
 
 GRACE_S = 30.0
 """How long a child may take to exit once its channel is closed: seconds on a busy machine."""
+_MANY_FILES = 65_536
 _SAFE_PATH = "PYTHONSAFEPATH"
 """Variable that keeps the working directory, where a policy may lie, from the import path."""
 _starting = threading.Lock()
@@ -58,7 +59,8 @@ class ChildProcess:
     """
 
     def __init__(self, process: BaseProcess, connection: Connection) -> None:
-        self._process, self.connection = process, connection
+        self._process = process
+        self.connection = connection
 
     @classmethod
     def spawn(cls, work: Callable[..., None], *args: Any) -> Self:  # noqa: ANN401
@@ -71,9 +73,7 @@ class ChildProcess:
         Raises:
             RoboIRGError: there is no room for another process or its files.
         """
-        # 1,024 open files are usual, and few for many workers with policies.
-        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-        resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, min(hard, 65_536)), hard))
+        _allow_many_files()
         # Spawned, not forked: a forked Vulkan driver or thread pool is undefined behavior.
         context = multiprocessing.get_context("spawn")
         try:
@@ -142,13 +142,24 @@ class ChildProcess:
         self.close()
 
     def _end_group(self) -> None:
+        """End what the child has started."""
         # Not SIGKILL: Python's resource trackers are among them, and have to clean up.
         with contextlib.suppress(OSError):
             os.killpg(self.pid, signal.SIGTERM)
 
 
+def _allow_many_files() -> None:
+    """Let this process open more files than the usual 1,024, few for workers with policies."""
+    limit, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = max(limit, min(most, _MANY_FILES))
+    resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
+
+
 def serve(connection: Connection, answer: Callable[[Any], Any]) -> None:
-    """Answer every message until the channel closes; runs in a child."""
+    """Answer every message until the channel closes; runs in a child.
+
+    The channel closes when the parent hangs up or dies, before a message or before the reply.
+    """
     while True:
         try:
             message = connection.recv()
@@ -173,7 +184,11 @@ def without_interrupts() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _safe_path() -> Iterator[None]:
-    """Let a process start without the working directory on its path, until it gets ours."""
+    """Let a process start without the working directory on its path.
+
+    A file there, such as ``random.py``, would be imported in place of the library's. The variable
+    is one of the whole process, so one process is started at a time.
+    """
     with _starting:
         before = os.environ.get(_SAFE_PATH)
         os.environ[_SAFE_PATH] = "1"
@@ -187,6 +202,7 @@ def _safe_path() -> Iterator[None]:
 def _begin_work(
     parent: int, work: Callable[..., None], connection: Connection, args: tuple[Any, ...]
 ) -> None:
+    """Do the work of a child, under the supervision of its parent; runs in the child."""
     os.environ.pop(_SAFE_PATH, None)
     begin(parent)
     work(connection, *args)

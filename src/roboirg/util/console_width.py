@@ -14,11 +14,18 @@ _ANY_WIDTH = 10_000
 
 def line_width(console: Console) -> int:
     """Return the characters of a line: the terminal's; in a file at least `LINE_WIDTH`."""
-    return console.width if console.is_terminal else max(console.width, LINE_WIDTH)
+    if console.is_terminal:
+        return console.width
+    return max(console.width, LINE_WIDTH)
 
 
 def widen(console: Console, *tables: RenderableType) -> None:
-    """Widen a console that is no terminal, so that tables in files are neither cut nor folded."""
+    """Widen a console that writes to a file, so that tables in it are neither cut nor folded.
+
+    Args:
+        console: left as it is if it is a terminal.
+        *tables: that have to fit.
+    """
     if console.is_terminal:
         return
     unlimited = console.options.update(max_width=_ANY_WIDTH)
@@ -29,4 +36,6 @@ def widen(console: Console, *tables: RenderableType) -> None:
 def progress_console(*, stderr: bool = False) -> Console:
     """Return a console that moves its cursor on a terminal only, whatever FORCE_COLOR says."""
     stream = sys.stderr if stderr else sys.stdout
-    return Console(stderr=stderr, force_terminal=None if stream.isatty() else False)
+    if stream.isatty():
+        return Console(stderr=stderr)
+    return Console(stderr=stderr, force_terminal=False)

@@ -19,11 +19,15 @@ def csv_text(rows: Iterable[Mapping[str, object]]) -> str:
     table = list(rows)
     if not table:
         return ""
-    return csv_lines([table[0], *(row.values() for row in table)])
+    head = table[0].keys()
+    return csv_lines([head, *(row.values() for row in table)])
 
 
 def csv_lines(rows: Iterable[Iterable[object]]) -> str:
-    """Return rows as lines; an apostrophe keeps spreadsheets from computing a stranger's text."""
+    """Return rows as lines of CSV.
+
+    A text that a spreadsheet would compute, such as ``=1+1``, gets an apostrophe in front.
+    """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     for row in rows:
@@ -32,6 +36,7 @@ def csv_lines(rows: Iterable[Iterable[object]]) -> str:
 
 
 def _cell(value: object) -> object:
+    """Return a value; a text that spreadsheets would compute begins with an apostrophe."""
     if isinstance(value, str) and _FORMULA.match(value):
         return f"'{value}"
     return value

@@ -38,13 +38,18 @@ def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str)
         Ours in the order of the modules' names, then those of other packages in the order of the
         entry points' names.
     """
-    found = discover_in_modules(package, attribute, kind)
-    taken = {one.name: "roboirg" for one in found}
+    things = discover_in_modules(package, attribute, kind)
+    owners = {thing.name: "roboirg" for thing in things}
     for entry in entry_points_of(group):
         thing = _thing(entry, attribute, kind)
-        _take_name(taken, thing, entry, group)
-        found.append(thing)
-    return found
+        if thing.name in owners:
+            raise InvalidValueError(
+                f"{_distribution(entry)} adds {thing.name!r} in the group {group!r}, a name that "
+                f"{owners[thing.name]} has; choose another one."
+            )
+        owners[thing.name] = _distribution(entry)
+        things.append(thing)
+    return things
 
 
 def entry_names(group: str, packages: Collection[str] | None = None) -> tuple[str, ...]:
@@ -52,12 +57,12 @@ def entry_names(group: str, packages: Collection[str] | None = None) -> tuple[st
 
     With packages, only of those that name something in one of them.
     """
-    entries = entry_points_of(group)
-    return tuple(
-        entry.name
-        for entry in entries
-        if packages is None or entry.module.partition(".")[0] in packages
-    )
+    names = []
+    for entry in entry_points_of(group):
+        package = entry.module.partition(".")[0]
+        if packages is None or package in packages:
+            names.append(entry.name)
+    return tuple(names)
 
 
 def find_entry(name: str, attribute: str, kind: type[Thing], group: str) -> Thing | None:
@@ -65,15 +70,21 @@ def find_entry(name: str, attribute: str, kind: type[Thing], group: str) -> Thin
 
     Imports that one only. The other arguments are those of `discover`.
     """
-    chosen = [entry for entry in entry_points_of(group) if entry.name == name]
-    return next((_thing(entry, attribute, kind) for entry in chosen), None)
+    for entry in entry_points_of(group):
+        if entry.name == name:
+            return _thing(entry, attribute, kind)
+    return None
 
 
 def discover_in_modules(package: ModuleType, attribute: str, kind: type[Thing]) -> list[Thing]:
     """Return what the modules of a package define, in the order of their names."""
-    names = (f"{package.__name__}.{info.name}" for info in pkgutil.iter_modules(package.__path__))
-    things = (getattr(importlib.import_module(name), attribute, None) for name in names)
-    return [thing for thing in things if isinstance(thing, kind)]
+    things = []
+    for info in pkgutil.iter_modules(package.__path__):
+        module = importlib.import_module(f"{package.__name__}.{info.name}")
+        thing = getattr(module, attribute, None)
+        if isinstance(thing, kind):
+            things.append(thing)
+    return things
 
 
 def load_entry(entry: importlib.metadata.EntryPoint) -> Any:  # noqa: ANN401 - a stranger's
@@ -89,11 +100,18 @@ def load_entry(entry: importlib.metadata.EntryPoint) -> Any:  # noqa: ANN401 - a
 
 
 def _where(entry: importlib.metadata.EntryPoint) -> str:
-    of = f"({entry.value}) of {_distribution(entry)} in the group {entry.group!r}"
-    return f"The entry point {entry.name!r} {of}"
+    """Return an entry point in words, with what it names and whose it is."""
+    return (
+        f"The entry point {entry.name!r} ({entry.value}) of {_distribution(entry)} in the group "
+        f"{entry.group!r}"
+    )
 
 
 def _thing(entry: importlib.metadata.EntryPoint, attribute: str, kind: type[Thing]) -> Thing:
+    """Return what an entry point names: the object, or in a module the attribute of that name.
+
+    The arguments are those of `discover`.
+    """
     thing = load_entry(entry)
     if isinstance(thing, ModuleType):
         thing = getattr(thing, attribute, None)
@@ -105,20 +123,13 @@ def _thing(entry: importlib.metadata.EntryPoint, attribute: str, kind: type[Thin
     return thing
 
 
-def _take_name(
-    taken: dict[str, str], thing: Named, entry: importlib.metadata.EntryPoint, group: str
-) -> None:
-    if thing.name in taken:
-        raise InvalidValueError(
-            f"{_distribution(entry)} adds {thing.name!r} in the group {group!r}, a name that "
-            f"{taken[thing.name]} has; choose another one."
-        )
-    taken[thing.name] = _distribution(entry)
-
-
 def entry_points_of(group: str) -> list[importlib.metadata.EntryPoint]:
-    return sorted(importlib.metadata.entry_points(group=group), key=lambda one: one.name)
+    """Return the installed entry points of a group, sorted by name."""
+    return sorted(importlib.metadata.entry_points(group=group), key=lambda entry: entry.name)
 
 
 def _distribution(entry: importlib.metadata.EntryPoint) -> str:
-    return entry.dist.name if entry.dist is not None else "an unknown package"
+    """Return the name of the package that an entry point belongs to."""
+    if entry.dist is None:
+        return "an unknown package"
+    return entry.dist.name

@@ -22,7 +22,9 @@ def keep_freed_memory() -> None:
     what is on them. Blocks of 8 MiB or more, and what exceeds 32 MiB, are returned as before. Does
     nothing where the C library is not glibc.
     """
-    mallopt = None if sys.platform == "win32" else getattr(ctypes.CDLL(None), "mallopt", None)
+    if sys.platform == "win32":
+        return
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:
         mallopt(_MMAP_THRESHOLD, _LARGEST_BLOCK)
         mallopt(_TRIM_THRESHOLD, _MOST_KEPT)

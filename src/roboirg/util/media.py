@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import io
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -25,6 +26,10 @@ QUALITY = 23
 JPEG_QUALITY = 90
 SHEET_SIDE = 4
 """Frames in a row, and rows, of a sheet."""
+_LABEL_X = 4
+_LABEL_Y = 14
+_LABEL_SCALE = 0.45
+"""Place and size of a frame's label, as in `draw_text`."""
 PICTURE_SIZE = 256
 """Width and height of the pictures in observations, pixels."""
 
@@ -59,7 +64,9 @@ class Clip:
 
 def sample_evenly(frames: Pixels, most: int) -> Pixels:
     """Return at most `most` frames, evenly spaced, including the first and the last."""
-    return frames if len(frames) <= most else frames[evenly_spaced(len(frames), most)]
+    if len(frames) <= most:
+        return frames
+    return frames[evenly_spaced(len(frames), most)]
 
 
 def evenly_spaced(count: int, most: int) -> NDArray[np.intp]:
@@ -73,7 +80,8 @@ def scaled_square(picture: NDArray[Any], size: int = PICTURE_SIZE) -> NDArray[An
 
     height, width = picture.shape[:2]
     side = min(height, width)
-    top, left = (height - side) // 2, (width - side) // 2
+    top = (height - side) // 2
+    left = (width - side) // 2
     square = picture[top : top + side, left : left + side]
     return np.asarray(cv2.resize(square, (size, size), interpolation=cv2.INTER_AREA))
 
@@ -85,19 +93,24 @@ def contact_sheets(frames: Pixels, labels: Sequence[str]) -> Iterator[Pixels]:
         frames: uint8 (T, height, width, 3).
         labels: T short texts.
     """
-    small = np.ascontiguousarray(frames[:, ::2, ::2])
+    small = np.ascontiguousarray(frames[:, ::2, ::2])  # every second row and column, as a copy
     for frame, label in zip(small, labels, strict=True):
-        draw_text(frame, label, 4, 14, 0.45, (0, 0, 0), thickness=3)
-        draw_text(frame, label, 4, 14, 0.45, (255, 255, 255))
-    columns = SHEET_SIDE
-    for start in range(0, len(small), columns**2):
-        part = small[start : start + columns**2]
-        count = -(-len(part) // columns) * columns
-        tiles = np.zeros((count, *part.shape[1:]), np.uint8)
-        tiles[: len(part)] = part
-        height, width = part.shape[1:3]
-        grid = tiles.reshape(-1, columns, height, width, 3).swapaxes(1, 2)
-        yield grid.reshape(-1, columns * width, 3)
+        # White with a black edge.
+        draw_text(frame, label, _LABEL_X, _LABEL_Y, _LABEL_SCALE, (0, 0, 0), thickness=3)
+        draw_text(frame, label, _LABEL_X, _LABEL_Y, _LABEL_SCALE, (255, 255, 255))
+    for start in range(0, len(small), SHEET_SIDE**2):
+        yield _sheet(small[start : start + SHEET_SIDE**2])
+
+
+def _sheet(frames: Pixels) -> Pixels:
+    """Return frames in rows of `SHEET_SIDE`; what is missing in the last row is black."""
+    count, height, width, _ = frames.shape
+    rows = math.ceil(count / SHEET_SIDE)
+    places = np.zeros((rows * SHEET_SIDE, height, width, 3), np.uint8)
+    places[:count] = frames
+    # From (row, column, y, x) to (row, y, column, x), which is one picture.
+    grid = places.reshape(rows, SHEET_SIDE, height, width, 3).swapaxes(1, 2)
+    return grid.reshape(rows * height, SHEET_SIDE * width, 3)
 
 
 def encode_png(picture: Picture) -> bytes:
@@ -105,13 +118,14 @@ def encode_png(picture: Picture) -> bytes:
     _check_pyav()
     import av
 
-    height, width = picture.pixels.shape[:2]
     codec = av.CodecContext.create("png", "w")
-    codec.width, codec.height, codec.pix_fmt = width, height, "rgb24"
+    codec.height, codec.width = picture.pixels.shape[:2]
+    codec.pix_fmt = "rgb24"
     codec.time_base = Fraction(1)
     frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture.pixels), format="rgb24")
     frame.pts = 0
-    return b"".join(bytes(packet) for packet in (*codec.encode(frame), *codec.encode(None)))
+    packets = [*codec.encode(frame), *codec.encode(None)]
+    return b"".join(bytes(packet) for packet in packets)
 
 
 def decode_png(content: bytes) -> Pixels:
@@ -157,6 +171,7 @@ def encode_mp4(clip: Clip) -> bytes:
 
 
 def _check_pyav() -> None:
+    """Raise if PyAV is not installed, with what to run."""
     with extra_needed("Pictures for a model need PyAV", "sim"):
         import av  # noqa: F401 - an extra, and slow to import
 
@@ -188,14 +203,24 @@ def draw_text(
 
 
 def wrap_text(text: str, width: int, scale: float) -> list[str]:
-    """Split a text into lines of at most `width` pixels; a longer word gets a line of its own."""
-    import cv2
+    """Split a text into lines of at most `width` pixels; a longer word gets a line of its own.
 
+    Each word goes to the end of the last line if it fits there.
+    """
     lines: list[str] = []
     for word in text.split():
-        longer = f"{lines[-1]} {word}" if lines else word
-        if lines and cv2.getTextSize(longer, _FONT, scale, 1)[0][0] <= width:
-            lines[-1] = longer
-        else:
-            lines.append(word)
+        if lines:
+            longer = f"{lines[-1]} {word}"
+            if _text_width(longer, scale) <= width:
+                lines[-1] = longer
+                continue
+        lines.append(word)
     return lines
+
+
+def _text_width(text: str, scale: float) -> int:
+    """Return the width of a line of text, pixels."""
+    import cv2
+
+    (width, _), _ = cv2.getTextSize(text, _FONT, scale, 1)
+    return width

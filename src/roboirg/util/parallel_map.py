@@ -8,7 +8,7 @@ import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing.connection import Connection, wait
-from typing import TypeVar, cast
+from typing import Any, Generic, NamedTuple, TypeVar, cast
 
 from roboirg.core.errors import RoboIRGError
 from roboirg.util.child_process import ChildExit, ChildProcess, serve
@@ -18,6 +18,20 @@ Outcome = TypeVar("Outcome")
 
 MOST_SHOWN = 120
 """Characters of the item at which a process died; a scene has thousands."""
+
+
+class _Assigned(NamedTuple, Generic[Item]):
+    """A child, and the item with which it calls the function."""
+
+    child: ChildProcess
+    item: Item
+
+
+class _Reply(NamedTuple):
+    """What a call came to: its outcome, or the error that it raised."""
+
+    outcome: Any
+    error: Exception | None = None
 
 
 def parallel_map(
@@ -31,14 +45,16 @@ def parallel_map(
         workers: number of processes; 0 runs all calls in this process.
     """
     if workers == 0:
-        yield from ((item, work(item)) for item in items)
+        for item in items:
+            yield item, work(item)
         return
     waiting = deque(items)
-    busy: dict[Connection, tuple[ChildProcess, Item]] = {}
+    busy: dict[Connection, _Assigned[Item]] = {}
 
     def assign(child: ChildProcess) -> None:
+        """Send the next item to a process."""
         item = waiting.popleft()
-        busy[child.connection] = child, item
+        busy[child.connection] = _Assigned(child, item)
         child.send(item)
 
     with contextlib.ExitStack() as stack:
@@ -49,25 +65,36 @@ def parallel_map(
         while busy:
             for connection in cast("list[Connection]", wait(list(busy))):
                 child, item = busy.pop(connection)
-                reply = child.receive()
-                if isinstance(reply, ChildExit):
-                    shown = repr(item)[:MOST_SHOWN]
-                    raise RoboIRGError(f"A worker process died at {shown}: {reply}.")
-                outcome, error = reply
-                if error is not None:
-                    raise error
+                outcome = _result(child, item)
                 if waiting:
                     assign(child)
                 yield item, outcome
 
 
+def _result(child: ChildProcess, item: object) -> Any:  # noqa: ANN401 - of the function
+    """Return the result of a call that has ended; raise what it raised.
+
+    Raises:
+        RoboIRGError: the process died.
+    """
+    reply = child.receive()
+    if isinstance(reply, ChildExit):
+        shown = repr(item)[:MOST_SHOWN]
+        raise RoboIRGError(f"A worker process died at {shown}: {reply}.")
+    if reply.error is not None:
+        raise reply.error
+    return reply.outcome
+
+
 def _work(connection: Connection, work: Callable[[Item], Outcome]) -> None:
+    """Call the function with every item that comes; runs in a child."""
     serve(connection, functools.partial(_call, work))
 
 
-def _call(work: Callable[[Item], Outcome], item: Item) -> tuple[Outcome | None, Exception | None]:
+def _call(work: Callable[[Item], Outcome], item: Item) -> _Reply:
+    """Call the function with an item."""
     try:
-        return work(item), None
+        return _Reply(work(item))
     except Exception as error:  # noqa: BLE001 - raised again by the parent
         error.add_note(traceback.format_exc())
-        return None, error
+        return _Reply(None, error)

@@ -17,7 +17,13 @@ from roboirg.util.freed_memory import keep_freed_memory
 
 _TERM_S = 0.5
 """How long what an interpreter has started may take to exit before it is killed."""
-_PR_SET_PDEATHSIG, _PR_SET_CHILD_SUBREAPER = 1, 36
+_TERM_PAUSE_S = 0.01
+_KILL_PAUSE_S = 0.001
+"""How long to wait between two rounds of signals."""
+_PR_SET_PDEATHSIG = 1
+_PR_SET_CHILD_SUBREAPER = 36
+"""Of Linux: the signal that a process gets when its parent dies; and that it becomes the parent of
+what its descendants leave behind."""
 
 
 def run_main() -> None:
@@ -25,11 +31,12 @@ def run_main() -> None:
 
     The command line holds the descriptor of a socket, the parent's process id and the module.
     """
-    number, parent, module = sys.argv[1:]
-    sys.argv[1:] = []
+    descriptor, parent, module = sys.argv[1:]
+    sys.argv[1:] = []  # the module may read its own
     begin(int(parent))
-    _guard(int(number))
-    importlib.import_module(module).main(socket.socket(fileno=int(number)))
+    _guard(int(descriptor))
+    line = socket.socket(fileno=int(descriptor))
+    importlib.import_module(module).main(line)
 
 
 def begin(parent: int) -> None:
@@ -46,47 +53,58 @@ def begin(parent: int) -> None:
 
 
 def _prctl(option: int, value: int) -> None:
+    """Set a property of this process, where the system is Linux."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(option, value)
 
 
-def _guard(number: int) -> None:
-    """Fork: the child returns; this process ends all that comes of it, and then ends as it has.
+def _guard(line: int) -> None:
+    """Fork: only the child returns, and this process becomes its guard.
 
-    Where there are no subreapers and no ``/proc``, as on macOS, that is the child's process group.
+    The guard waits for the child, ends everything that the child has started, and then ends as the
+    child did: with its exit code or of its signal. Where there are no subreapers and no ``/proc``,
+    as on macOS, only the child's process group is ended.
 
     Args:
-        number: descriptor of the socket, which is the child's alone.
+        line: descriptor of the socket, which is the child's alone.
     """
-    waited = {signal.SIGCHLD, signal.SIGTERM}
-    signal.pthread_sigmask(signal.SIG_BLOCK, waited)
+    awaited = {signal.SIGCHLD, signal.SIGTERM}
+    signal.pthread_sigmask(signal.SIG_BLOCK, awaited)
     _prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)  # what loses its parent gets this one
-    guard, child = os.getpid(), os.fork()
+    guard = os.getpid()
+    child = os.fork()
     if child == 0:
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, waited)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, awaited)
         begin(guard)
         return
+
+    # The guard lets go of the line and the terminal, which would else stay open with it.
     nothing = os.open(os.devnull, os.O_RDWR)
-    for descriptor in (0, 1, 2, number):
+    for descriptor in (0, 1, 2, line):
         os.dup2(nothing, descriptor)
     code = None
     while code is None:
-        if signal.sigwait(waited) == signal.SIGTERM:
+        if signal.sigwait(awaited) == signal.SIGTERM:
             os.kill(child, signal.SIGKILL)
         code = _reap(child)
     _end_descendants(child)
     if code < 0:
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        with contextlib.suppress(OSError):  # SIGKILL has no handler
-            signal.signal(-code, signal.SIG_DFL)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {-code})
-        os.kill(guard, -code)
+        _die_of(-code)
     os._exit(code)
 
 
+def _die_of(number: int) -> None:
+    """End this process by a signal, so that its parent sees how the child ended; no core dump."""
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    with contextlib.suppress(OSError):  # SIGKILL has no handler
+        signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {number})
+    os.kill(os.getpid(), number)
+
+
 def _reap(child: int) -> int | None:
-    """Take leave of dead children; return how one of them ended, None if it has not.
+    """Collect the exit codes of dead children; return that of one of them, None while it lives.
 
     Raises:
         ChildProcessError: there is no child any more, dead or alive.
@@ -100,9 +118,14 @@ def _reap(child: int) -> int | None:
 
 
 def _end_descendants(child: int) -> None:
-    """End all that a dead child has started, until nothing is left."""
-    # First SIGTERM: Python's resource trackers are among them, and have to clean up.
-    number, pause_s, until = signal.SIGTERM, 0.01, time.monotonic() + _TERM_S
+    """End all that a dead child has started, until nothing is left.
+
+    It gets SIGTERM at first, and SIGKILL after `_TERM_S`.
+    """
+    # Python's resource trackers are among them, and have to clean up, which SIGKILL prevents.
+    number = signal.SIGTERM
+    pause_s = _TERM_PAUSE_S
+    until = time.monotonic() + _TERM_S
     with contextlib.suppress(OSError):
         os.killpg(child, number)
     # What loses its parent becomes a child of this process: without children nothing is left.
@@ -114,7 +137,8 @@ def _end_descendants(child: int) -> None:
             time.sleep(pause_s)
             _reap(child)
             if time.monotonic() > until:
-                number, pause_s = signal.SIGKILL, 0.001
+                number = signal.SIGKILL
+                pause_s = _KILL_PAUSE_S
 
 
 def descendants(pid: int) -> list[int]:
@@ -123,9 +147,10 @@ def descendants(pid: int) -> list[int]:
     The kernel lists the children of each, so nothing is read that a process could have written, and
     it is fast enough for a chain of processes, each of which starts the next one and exits.
     """
-    found = [pid]
-    for process in found:
+    family = [pid]
+    for process in family:  # which grows meanwhile
         with contextlib.suppress(OSError):  # it has ended meanwhile
             for thread in Path(f"/proc/{process}/task").iterdir():
-                found += map(int, (thread / "children").read_bytes().split())
-    return found[1:]
+                children = (thread / "children").read_bytes().split()
+                family += map(int, children)
+    return family[1:]

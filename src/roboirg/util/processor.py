@@ -7,7 +7,7 @@ import functools
 import math
 import os
 import platform
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from roboirg.core.errors import InvalidValueError
@@ -34,33 +34,46 @@ def processor_family() -> str:
     Processors of one family round alike: the physics engine uses approximate reciprocals and roots,
     in which makers differ.
     """
-    fields = _fields()
-    told = [fields[name] for name in _FAMILY if name in fields] or [platform.processor()]
-    return " ".join([platform.machine(), *told]).strip()
+    described = _described_by(_FAMILY)
+    return " ".join([platform.machine(), *described]).strip()
 
 
 def processor_features() -> str:
     """Return model and instruction sets, which decide the last bits of sines and cosines."""
+    return "\n".join(_described_by(("model name", "flags", "Features")))
+
+
+def _described_by(names: Sequence[str]) -> list[str]:
+    """Return the fields of these names that Linux has; Python's name of the processor without any.
+
+    Args:
+        names: of fields of ``/proc/cpuinfo``.
+    """
     fields = _fields()
-    told = [fields[name] for name in ("model name", "flags", "Features") if name in fields]
-    return "\n".join(told or [platform.processor()])
+    values = [fields[name] for name in names if name in fields]
+    return values or [platform.processor()]
 
 
 @functools.cache
 def _fields() -> dict[str, str]:
     """Return what Linux says of the first processor; empty elsewhere."""
     try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
     except OSError:
         return {}
-    return {line.partition(":")[0].strip(): line.partition(":")[2].strip() for line in lines[::-1]}
+    fields: dict[str, str] = {}
+    for line in text.splitlines():
+        name, _, value = line.partition(":")
+        fields.setdefault(name.strip(), value.strip())
+    return fields
 
 
 def core_count() -> int:
     """Return how many cores this process may use, within the limit of its container."""
-    if hasattr(os, "sched_getaffinity"):
-        return max(1, math.ceil(min([len(os.sched_getaffinity(0)), *_quotas()])))
-    return os.cpu_count() or 1
+    if not hasattr(os, "sched_getaffinity"):
+        return os.cpu_count() or 1
+    limits = [len(os.sched_getaffinity(0)), *_quotas()]
+    return max(1, math.ceil(min(limits)))
 
 
 def worker_advice() -> str:
@@ -74,12 +87,17 @@ def worker_advice() -> str:
 
 
 def _quotas() -> Iterator[float]:
-    """Yield the limit of a container's processor time, in cores, in both versions of cgroups."""
+    """Yield the limit of a container's processor time in cores, as each version of cgroups has it.
+
+    A quota of 150000 in a period of 100000 microseconds are 1.5 cores.
+    """
     for names in _CPU_QUOTAS:
         with contextlib.suppress(OSError, ValueError, ZeroDivisionError):  # no file, or no numbers
-            quota, period = " ".join(Path(name).read_text() for name in names).split()
-            # Without a limit, the quota is "max", or -1.
-            yield float(quota) / float(period) if float(quota) > 0 else math.inf
+            texts = [Path(name).read_text() for name in names]
+            quota, period = " ".join(texts).split()
+            # Without a limit, the quota is "max", which is no number, or -1.
+            if float(quota) > 0:
+                yield float(quota) / float(period)
 
 
 def worker_count(typed: int | None = None) -> int:

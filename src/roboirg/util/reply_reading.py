@@ -127,6 +127,8 @@ def json_object(text: str) -> dict[str, Any]:
 def last_json(text: str) -> Any:  # noqa: ANN401 - JSON
     """Return the last JSON object in a reply, or the last list of objects; None without any.
 
+    ``Not {"a": 1}, but {"a": 2}.`` gives ``{"a": 2}``.
+
     Raises:
         UnparsableReplyError: a brace belongs to no well-formed object, so that none is sure to be
             last.
@@ -154,10 +156,11 @@ def _distinct_fields(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def chosen_letter(text: str, letters: str) -> str:
-    """Return the letter that a reply chooses, in upper case.
+    """Return the letter that a reply chooses, in upper case: ``The answer is b.`` chooses ``B``.
 
-    The fields of a JSON object decide, else the letters alone on their lines, after *answer* and in
-    boxes, else those that begin a line or are set in bold.
+    If the reply has a JSON object with the field ``choice`` or ``answer``, only that is read.
+    Letters alone on a line, after *answer* and in boxes decide; only without any do those that
+    begin a line or are set in bold.
 
     Raises:
         UnparsableReplyError: it names none of the letters from A to D, several different ones, one
@@ -168,25 +171,31 @@ def chosen_letter(text: str, letters: str) -> str:
     if isinstance(found, dict):
         fields = [str(found[name]) for name in ("choice", "answer") if name in found]
         answer = "\n".join(fields) or answer
-    for pattern in (_DECISIVE, _SUGGESTED):
-        named = {_sure_letter(match) for match in pattern.finditer(answer)}
-        if named:
-            break
+    named = _sure_letters(_DECISIVE, answer) or _sure_letters(_SUGGESTED, answer)
     if len(named) != 1 or not named <= set(letters):
         raise UnparsableReplyError("The reply has to name one of the letters.")
     return named.pop()
 
 
-def _sure_letter(named: re.Match[str]) -> str:
+def _sure_letters(pattern: re.Pattern[str], answer: str) -> set[str]:
+    """Return the letters that a pattern finds in an answer, `_UNSURE` for those in doubt."""
+    return {_sure_letter(found) for found in pattern.finditer(answer)}
+
+
+def _sure_letter(found: re.Match[str]) -> str:
     """Return the letter of a match in upper case; `_UNSURE` if words around it cast doubt on it.
 
-    The words are those of its clause, and the rest of its line.
+    The words are those of its clause, and the rest of its line: in *not B*, B is unsure.
     """
-    letter = named["letter"].upper()
-    begin, end = named.span("letter")
-    before = _CLAUSE_ENDS.split(named.string[max(0, begin - _WINDOW) : begin])[-1]
-    after = named.string[end : end + _WINDOW].split("\n")[0]
-    doubts = set(_DOUBTS.findall(f"{before} {after}"))
+    answer = found.string
+    letter = found["letter"].upper()
+    begin, end = found.span("letter")
+    text_before = answer[max(0, begin - _WINDOW) : begin]
+    text_after = answer[end : end + _WINDOW]
+    clause = _CLAUSE_ENDS.split(text_before)[-1]
+    rest_of_line = text_after.split("\n")[0]
+    doubts = set(_DOUBTS.findall(f"{clause} {rest_of_line}"))
+    # Another letter is a doubt, too; the same one again is none.
     return _UNSURE if doubts - {letter} else letter
 
 

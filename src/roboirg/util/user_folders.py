@@ -26,21 +26,30 @@ def user_folder(kind: Literal["cache", "data"], variable: str = "", *, below: st
         MissingDependencyError: the platform's folders are not known; the doctor runs without them.
     """
     chosen = os.environ.get(variable)
-    try:
-        if chosen:
+    if chosen:
+        try:
             return Path(chosen).expanduser()
-        import platformdirs
-
-        found: Path = getattr(platformdirs, f"user_{kind}_path")(_NAME)
-    except ImportError as error:
-        raise MissingDependencyError(f"platformdirs is not installed ({error})") from error
-    except RuntimeError as error:
-        if chosen:
+        except RuntimeError as error:
             raise InvalidValueError(
                 f"{variable} is {chosen!r}, but there is no such home; write the whole path."
             ) from error
-        found = Path("~")  # as older versions return it
-    return (found if found.is_absolute() else temporary_folder()) / below
+    folder = _platform_folder(kind)
+    if not folder.is_absolute():  # there is no home
+        folder = temporary_folder()
+    return folder / below
+
+
+def _platform_folder(kind: Literal["cache", "data"]) -> Path:
+    """Return the folder of this user by the customs of the platform; ``~`` without a home."""
+    try:
+        import platformdirs
+
+        folder: Path = getattr(platformdirs, f"user_{kind}_path")(_NAME)
+    except ImportError as error:
+        raise MissingDependencyError(f"platformdirs is not installed ({error})") from error
+    except RuntimeError:
+        return Path("~")  # without a home, as older versions of platformdirs return it
+    return folder
 
 
 def temporary_folder() -> Path:

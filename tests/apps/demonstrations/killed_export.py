@@ -1,7 +1,12 @@
-"""An export of synthetic trajectories, to be killed: ``python killed_export.py OUT WORKERS``."""
+"""An export of synthetic trajectories, killed before a file appears: ``killed_export.py OUT LAST``.
 
+LAST is the number of the file, from 1 on; an export of fewer files ends.
+"""
+
+import itertools
+import os
+import signal
 import sys
-import time
 from pathlib import Path
 
 import synthetic_trajectories
@@ -18,28 +23,19 @@ PLAN = ExportPlan(
 )
 
 
-def say(word):
-    sys.stdout.write(f"{word}\n")
-    sys.stdout.flush()
+def main(out, last):
+    replace, files = Path.replace, itertools.count(1)
 
+    def killed(part, path):
+        if next(files) == last:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return replace(part, path)
 
-def slowly(function):
-    """Give a kill time to hit in the middle."""
-
-    def call(*args, **options):
-        time.sleep(0.05)
-        return function(*args, **options)
-
-    return call
-
-
-def main():
-    export_run.record_trajectory = slowly(synthetic_trajectories.record)
+    Path.replace = killed
+    export_run.record_trajectory = synthetic_trajectories.record
     export_run.choose_policy = lambda job: None
-    say("started")
-    export_run.run_export(PLAN, Path(sys.argv[1]), 0, lambda *_: None)
-    say("finished")
+    export_run.run_export(PLAN, out, 0, lambda *_: None)
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]), int(sys.argv[2]))

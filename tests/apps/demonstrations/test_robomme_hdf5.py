@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import synthetic_trajectories as synthetic
 
-from roboirg.apps.demonstrations.dataset_reading import read_dataset
 from roboirg.language import instruct
 from roboirg.tasks.splits.splits import get_episode
 
@@ -30,93 +29,62 @@ SHAPES = {
     "info/is_subgoal_boundary": ("bool", ()),
     "info/is_completed": ("bool", ()),
 }
-TEXTS = ("simple_subgoal", "simple_subgoal_online", "grounded_subgoal", "grounded_subgoal_online")
 
 
-def read_like_mme_vla(path):
-    """Yield the samples of each episode: those of its execution frames."""
-    with h5py.File(path, "r") as file:
-        for name in sorted(file, key=lambda one: int(one.split("_")[1])):
-            episode = file[name]
-            steps = sorted(
-                (one for one in episode if one.startswith("timestep_")),
-                key=lambda one: int(one.split("_")[1]),
-            )
-            assert steps[0] == "timestep_0"
-            goal = [one.decode() for one in episode["setup/task_goal"][()]]
-            frames = []
-            for step in steps:
-                obs, action, info = (episode[step][kind] for kind in ("obs", "action", "info"))
-                frames.append(
-                    {
-                        "image": obs["front_rgb"][()],
-                        "wrist_image": obs["wrist_rgb"][()],
-                        "state": np.append(obs["joint_state"][()], obs["gripper_state"][()][0]),
-                        "action": action["joint_action"][()],
-                        "is_demo": bool(info["is_video_demo"][()]),
-                        "subgoals": {text: info[text][()].decode() for text in TEXTS},
-                        "is_boundary": bool(info["is_subgoal_boundary"][()]),
-                        "is_closed": bool(obs["is_gripper_close"][()]),
-                    }
-                )
-            yield int(episode["setup/seed"][()]), goal, frames
+def time_steps(file, name):
+    """Return the time steps of an episode in their order, as MME-VLA's builder finds them."""
+    steps = [step for step in file[name] if step.startswith("timestep_")]
+    return [file[name][step] for step in sorted(steps, key=lambda step: int(step[9:]))]
 
 
-def test_time_steps_have_robommes_fields_and_a_builder_reads_what_was_recorded(export):
+def test_time_steps_have_robommes_fields(export):
     root = export(format="robomme-hdf5", video=True, settings=("explicit",))
     with h5py.File(root / "record_dataset_VideoUnmask.h5", "r") as file:
         assert sorted(file) == ["episode_0", "episode_2"]
-        for step in file["episode_0"]:
-            if step == "setup":
-                continue
-            for name, (kind, shape) in SHAPES.items():
-                found = file["episode_0"][step][name]
-                assert (found.dtype, found.shape) == (np.dtype(kind), shape), name
-            choice = json.loads(file["episode_0"][step]["action/choice_action"][()])
-            assert choice == {"choice": "", "point": []}
+        step = file["episode_0/timestep_0"]
+        for name, (kind, shape) in SHAPES.items():
+            assert (step[name].dtype, step[name].shape) == (np.dtype(kind), shape), name
+        assert json.loads(step["action/choice_action"][()]) == {"choice": "", "point": []}
         setup = file["episode_0/setup"]
         episode = get_episode("VideoUnmask", "train", 0)
         assert setup["difficulty"][()].decode() == episode.difficulty
         assert setup["front_camera_intrinsic"].shape == (3, 3)
-    for task, video in (("PickXtimes", 0), ("VideoUnmask", 4)):
-        found = list(read_like_mme_vla(root / f"record_dataset_{task}.h5"))
-        assert len(found) == 2
-        for index, (seed, goal, frames) in zip((0, 2), found, strict=True):
-            episode = get_episode(task, "train", index)
-            assert (seed, goal) == (episode.seed, [instruct(episode).text])
-            rows = video + 1 + synthetic.STEPS
-            expected = synthetic.arrays_of(episode, rows, video, has_depth=True)
-            # The policy's first observation, which follows the way home, is no time step.
-            kept = [row for row in range(rows) if row != video]
-            assert len(frames) == len(kept)
-            for row, frame in zip(kept, frames, strict=True):
-                assert np.array_equal(frame["image"], synthetic.picture("front", episode.seed, row))
-                assert np.array_equal(
-                    frame["wrist_image"], synthetic.picture("wrist", episode.seed, row)
-                )
-                assert np.array_equal(frame["action"], expected["actions"][row])
-                assert np.array_equal(frame["state"][:7], expected["joint_positions"][row])
-                assert frame["is_demo"] == (row < video)
-                assert frame["is_closed"] == (expected["gripper"][row].min() < 0.03)
-                assert frame["subgoals"]["grounded_subgoal"] == expected["grounded_subgoals"][row]
-            labels = [(frame["is_demo"], frame["subgoals"]["simple_subgoal"]) for frame in frames]
-            changes = [i == 0 or labels[i] != labels[i - 1] for i in range(len(labels))]
-            assert [frame["is_boundary"] for frame in frames] == changes
 
 
-def test_several_settings_share_their_time_steps_and_actions_are_found_by_seed(export):
+@pytest.mark.parametrize(("task", "video"), [("PickXtimes", 0), ("VideoUnmask", 4)])
+def test_a_builder_reads_what_was_recorded(export, task, video):
+    root = export(format="robomme-hdf5", video=True, settings=("explicit",))
+    episode, rows = get_episode(task, "train", 2), video + 1 + synthetic.STEPS
+    expected = synthetic.arrays_of(episode, rows, video, has_depth=True)
+    # The policy's first observation, which follows the way home, is no time step.
+    kept = [row for row in range(rows) if row != video]
+    before = None
+    with h5py.File(root / f"record_dataset_{task}.h5", "r") as file:
+        setup = file["episode_2/setup"]
+        assert setup["seed"][()] == episode.seed
+        assert [text.decode() for text in setup["task_goal"][()]] == [instruct(episode).text]
+        for row, step in zip(kept, time_steps(file, "episode_2"), strict=True):
+            obs, info = step["obs"], step["info"]
+            for camera in ("front", "wrist"):
+                shown = synthetic.picture(camera, episode.seed, row)
+                assert np.array_equal(obs[f"{camera}_rgb"][()], shown)
+            assert np.array_equal(obs["joint_state"][()], expected["joint_positions"][row])
+            assert obs["is_gripper_close"][()] == (expected["gripper"][row].min() < 0.03)
+            assert np.array_equal(step["action/joint_action"][()], expected["actions"][row])
+            assert info["is_video_demo"][()] == (row < video)
+            assert info["grounded_subgoal"][()].decode() == expected["grounded_subgoals"][row]
+            label = (row < video, info["simple_subgoal"][()])
+            assert info["is_subgoal_boundary"][()] == (label != before)
+            before = label
+
+
+def test_several_settings_share_their_time_steps(export):
     root = export(format="robomme-hdf5", video=True)
-    goals = []
+    goals = set()
     for folder in ("explicit-implicit", "direct-implicit"):
         path = root / folder / "record_dataset_PickXtimes.h5"
         assert path.stat().st_size < 200_000
-        found = list(read_like_mme_vla(path))
-        assert [len(frames) for *_, frames in found] == [synthetic.STEPS] * 2
-        goals.append(found[0][1])
-    assert goals[0] != goals[1]
-    recorded = [one for one in read_dataset(root) if one.task == "VideoUnmask"]
-    episode, other = (get_episode("VideoUnmask", "train", index) for index in (0, 2))
-    assert [one.seed for one in recorded] == [episode.seed, other.seed]
-    expected = synthetic.arrays_of(episode, 4 + 1 + synthetic.STEPS, 4, has_depth=True)
-    assert np.array_equal(recorded[0].actions, expected["actions"][5:])
-    assert np.array_equal(recorded[0].states[:, :7], expected["joint_positions"][5:])
+        with h5py.File(path, "r") as file:
+            assert len(time_steps(file, "episode_0")) == synthetic.STEPS
+            goals.add(file["episode_0/setup/task_goal"][0])
+    assert len(goals) == 2

@@ -14,10 +14,10 @@ import numpy as np
 import roboirg
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.evaluation.play.rollout import EpisodeRunner
-from roboirg.evaluation.records.record import Job
 from roboirg.policies import make_policy
 from roboirg.policies.by_name.finding import read_policy
+from roboirg.records.record import Job
+from roboirg.runs.play.rollout import EpisodeRunner
 
 TASKS = ("VideoUnmask", "ButtonUnmask", "VideoUnmaskSwap", "StopCube", "VideoPlaceOrder")
 SETTING = "contextual"
@@ -47,7 +47,7 @@ def key_of(picture, instruction):
     return hashlib.sha256(content).hexdigest()
 
 
-def record_table(path: Path) -> None:
+def record_table(path):
     """Record the oracle in the episodes of `cases` and write the table of their keys."""
     recorded = [_record(*case) for case in cases()]
     table = {}

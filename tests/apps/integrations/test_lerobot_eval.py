@@ -2,14 +2,11 @@
 
 import json
 
-import numpy as np
 import pytest
 
 pytest.importorskip("lerobot", reason="LeRobot is not installed here; run `make integrations`")
 pytest.importorskip("lerobot_env_roboirg", reason="the plugin is not installed here")
 
-from lerobot.envs.configs import EnvConfig
-from lerobot.envs.utils import preprocess_observation
 from page_commands import check_versions, run_page
 from replay_table import (
     MANY,
@@ -21,8 +18,6 @@ from replay_table import (
     TASKS,
     own_outcomes,
 )
-
-import roboirg
 
 pytestmark = pytest.mark.sim
 
@@ -67,46 +62,3 @@ def test_the_page_s_commands_have_the_outcomes_of_our_runner(
 
 def test_the_page_names_the_version_that_is_played():
     check_versions("LeRobot")
-
-
-def make_batch(n_envs, **options):
-    config = EnvConfig.get_choice_class("roboirg")(task=TASK, setting=SETTING, **options)
-    ((task,),) = [group.values() for group in config.create_envs(n_envs, False).values()]
-    return task
-
-
-def test_the_video_is_played_through_the_observations():
-    env = make_batch(1, video=True, meshes=MESHES)
-    observation, info = env.reset(seed=[1001])
-    video = roboirg.make(TASK, setting=SETTING, episode=1, meshes=MESHES)
-    seen, shown = video.reset()
-    pictures = shown["demonstration"]["front_rgb"]
-    action = np.append(seen["joint_positions"], 1.0).astype(np.float32)[None]
-    for picture in pictures:
-        assert info["is_video_demo"].tolist() == [True]
-        assert np.array_equal(observation["pixels"]["front"][0], picture)
-        observation, _, terminated, truncated, info = env.step(action)
-        assert not (terminated | truncated).any()
-    assert info["is_video_demo"].tolist() == [False]
-    assert np.array_equal(observation["pixels"]["front"][0], seen["front_rgb"])
-    assert env.call("task_description") == (seen["instruction"],)
-    env.close()
-
-
-def test_lerobot_preprocesses_a_batch():
-    env = make_batch(2, cameras="front", meshes=MESHES)
-    observation, _ = env.reset(seed=[1000, 1001])
-    batch = preprocess_observation(observation)
-    assert batch["observation.images.front"].shape == (2, 3, 256, 256)
-    assert batch["observation.state"].shape == (2, 8)
-    env.close()
-
-
-def test_what_reaches_a_policy_tells_neither_goal_nor_setting_nor_seed():
-    env = make_batch(1, cameras="front", meshes=MESHES)
-    observation, info = env.reset(seed=[1002])
-    assert set(observation) == {"pixels", "agent_pos"}
-    assert set(info) <= {"is_success", "_is_success", "is_video_demo", "_is_video_demo"}
-    words = roboirg.make(TASK, setting=SETTING, episode=2).instruction.text
-    assert env.call("task_description") == env.call("task") == (words,)
-    env.close()

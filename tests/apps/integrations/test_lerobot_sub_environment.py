@@ -5,6 +5,7 @@ import pytest
 
 import roboirg
 from roboirg.apps.integrations.lerobot.sub_environment import NEW_ROLLOUT, LeRobotSubEnvironment
+from roboirg.apps.integrations.lerobot.vector import make_batch
 from roboirg.language import instruct
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.tasks.splits.splits import get_episode
@@ -24,6 +25,7 @@ def reset(**options):
 
 def test_the_video_comes_first_and_the_end_is_repeated():
     env, first, info = reset(video=True)
+    assert set(first) == {"pixels", "agent_pos"}
     hold = np.append(first["agent_pos"][:7], 1.0)
     played = [(first, 0.0, False, False, info)]
     while played[-1][4]["is_video_demo"]:
@@ -49,3 +51,16 @@ def test_an_action_that_is_none_ends_the_episode_until_a_reset_is_meant():
     assert env.task == instruct(get_episode("VideoUnmask", "test", 1)).text
     env.reset(options={NEW_ROLLOUT: True})
     assert env.step(HOME_ACTION) is not ended
+
+
+def test_batches_report_the_end_where_lerobot_looks_for_it():
+    """LeRobot 0.4 reads successes from `final_info` alone."""
+    env = make_batch("StopCube", 2, False, {"cameras": ("front",), "size": SIZE, "max_steps": 1})
+    env.reset(seed=[1000, 1001])
+    actions = np.tile(HOME_ACTION, (2, 1)).astype(np.float32)
+    *_, truncated, infos = env.step(actions)
+    assert truncated.all()
+    assert infos["final_info"]["is_success"].tolist() == [False, False]
+    texts = [instruct(get_episode("StopCube", "test", index)).text for index in (0, 1)]
+    assert list(env.call("task_description")) == texts
+    env.close()

@@ -4,7 +4,6 @@
 """
 
 import json
-import re
 import shutil
 
 import numpy as np
@@ -23,8 +22,8 @@ from page_commands import check_versions, run_page
 
 from roboirg.apps.integrations.lerobot.env_config import RoboIRGEnvConfig
 from roboirg.envs.factory import make
-from roboirg.evaluation.records.store import read_records
 from roboirg.policies import make_policy, play
+from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim
 
@@ -133,9 +132,3 @@ def draw_the_same(kind, monkeypatch):
         return answer(self, *args, **options)
 
     monkeypatch.setattr(kind, "predict_action_chunk", predict_action_chunk)
-
-
-def test_the_card_s_lines_are_the_page_s(folder):
-    card = (folder / "data/pick/README.md").read_text()
-    told = set(re.findall(r"--[\w.]+=?(?:null|false)?", card.split("## Training")[1]))
-    assert {"--policy.pretrained_backbone_weights=null", "--policy.push_to_hub=false"} <= told

@@ -1,11 +1,8 @@
 """`roboirg language ...` and `roboirg export ...`."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re
-from pathlib import Path
 
 import pytest
 import rate_words
@@ -16,54 +13,46 @@ from typer.testing import CliRunner
 from roboirg import main as cli
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 
-TIMES = {2: "second", 3: "third", 4: "4th", 5: "5th"}
-WORDINGS = 'name = "test"\ntasks = ["StopCube"]\n' + "".join(
-    f'[[literal]]\ntask = "StopCube"\nwhen.visit = {visit}\n'
-    f'text = "press the button when the cube reaches the target for the {time} time"\n'
-    for visit, time in TIMES.items()
-)
+WORDINGS = """name = "test"
+tasks = ["StopCube"]
+[commands]
+all = ["Press the button when the cube reaches the target {visit}."]
+"""
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_instructions_in_words_from_outside(tmp_path: Path):
+def test_instructions_in_words_from_outside(tmp_path):
     file, out = tmp_path / "test.toml", tmp_path / "rows.jsonl"
     file.write_text(WORDINGS)
-    assert "press the button when" in call("show", "StopCube", "0", "--words", "--wordings", file)
+    assert "Press the button when" in call("show", "StopCube", "0", "--words", "--wordings", file)
     words = plan_file(wordings=str(file), forms="implicit")
     call("export", "instructions", "--out", out, "--plan", words)
     rows = [json.loads(line) for line in out.read_text().splitlines()]
     assert {row["task"] for row in rows} == {"StopCube"}  # all of the file
     assert {row["wordings"].partition("@")[0] for row in rows} == {"test"}
-    for row in rows:
-        own = row["text"] if row["setting"] == "explicit" else "own"
-        assert row["command_template"] == own
+    assert {row["whole_sentence"] for row in rows} == {"own"}
     with pytest.raises(InvalidValueError, match="has no words of BinFill"):
         call("show", "BinFill", "0", "--words", "--wordings", file)
 
 
-def test_the_same_bytes_every_time_and_only_what_is_asked_for(tmp_path: Path):
+def test_the_same_bytes_every_time_and_only_what_is_asked_for(tmp_path):
     files = [tmp_path / "one.jsonl", tmp_path / "two.jsonl"]
+    plan = plan_file(stages=[1, 2, 3, 5], distractor="competing", frame="camera", forms="implicit")
+    words = ("--tasks", "ButtonUnmask,StopCube", "--split", "val", "--plan", plan)
     for file in files:
-        words = ("--tasks", "VideoUnmask,StopCube", "--settings", "spatial,direct")
-        call("export", "instructions", "--out", file, *words, "--plan", plan_file(forms="implicit"))
+        settings = ("--settings", "spatial,direct,contextual")
+        call("export", "instructions", "--out", file, *words, *settings)
     assert files[0].read_bytes() == files[1].read_bytes()
+    assert sorted(tmp_path.iterdir()) == files
     rows = [json.loads(line) for line in files[0].read_text().splitlines()]
-    assert len(rows) == 50 * 3
-    assert {row["setting"] for row in rows if row["task"] == "StopCube"} == {"direct"}
-    assert [path.name for path in sorted(tmp_path.iterdir())] == ["one.jsonl", "two.jsonl"]
-
-
-def test_options_of_the_words_are_passed_on(tmp_path: Path):
-    out = tmp_path / "rows.jsonl"
-    words = plan_file(stages=[1, 2, 3, 5], distractor="competing", frame="camera")
-    told = ("--tasks", "ButtonUnmask", "--split", "val", "--plan", words)
-    call("export", "instructions", "--out", out, *told)
-    rows = [json.loads(line) for line in out.read_text().splitlines()]
+    said = {(row["task"], row["setting"]) for row in rows}
+    assert len(said) == 5
+    assert ("StopCube", "spatial") not in said
+    assert {row["split"] for row in rows} == {"val"}
+    assert {row["frame"] for row in rows} == {None, "camera"}
     contextual = next(row for row in rows if row["setting"] == "contextual")
     assert [turn["stage"] for turn in contextual["turns"]][1:3] == ["reinforcement", "distractor"]
     assert contextual["distractor"] == "competing"
-    assert {row["frame"] for row in rows} == {None, "camera"}
-    assert {row["split"] for row in rows} == {"val"}
 
 
 @pytest.mark.parametrize(
@@ -77,7 +66,7 @@ def test_options_of_the_words_are_passed_on(tmp_path: Path):
         ("nowhere/o.jsonl", (), InvalidValueError, "is not a file in an existing folder"),
     ],
 )
-def test_what_is_wrong_is_one_sentence(tmp_path: Path, out, words, kind, sentence):
+def test_what_is_wrong_is_one_sentence(tmp_path, out, words, kind, sentence):
     with pytest.raises(kind, match=sentence):
         call("export", "instructions", "--out", tmp_path / out, *words)
     assert not list(tmp_path.iterdir())
@@ -96,7 +85,7 @@ def test_stats_of_all_splits_leave_out_empty_tables():
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_an_author_sees_texts_and_the_broken_rule_in_each_task(tmp_path: Path, snapshot):
+def test_an_author_sees_texts_and_the_broken_rule_in_each_task(tmp_path, snapshot):
     file = tmp_path / "mine.toml"
     file.write_text(
         'tasks = ["PickXtimes", "SwingXtimes"]\n'
@@ -113,24 +102,21 @@ def test_an_author_sees_texts_and_the_broken_rule_in_each_task(tmp_path: Path, s
 
 
 @pytest.mark.usefixtures("in_this_process")
-def test_raters_get_the_texts_of_the_key_in_other_orders_and_their_table(tmp_path: Path):
+def test_raters_get_the_texts_of_the_key_in_other_orders_and_their_table(tmp_path):
     out, tasks = tmp_path / "rating", "PickXtimes,SwingXtimes"  # which share frames
-    settings = ("--settings", "direct,reasoning", "--anchors", "3")
+    settings = ("--settings", "direct,reasoning")
     call("language", "sample", "--out", out, "--tasks", tasks, *settings)
     read = [list(csv.reader(path.open())) for path in sorted(out.glob("sheet-*.csv"))]
     key = list(csv.DictReader((out / "key.csv").open()))
     for rows in read:
         assert {row[0]: row[1] for row in rows[1:]} == {row["number"]: row["text"] for row in key}
     assert len({tuple(row[0] for row in rows) for rows in read}) == len(read) == 3
-    frames = [(row["setting"], row["frame"]) for row in key if row["language"] == "4"]
-    assert len(set(frames)) == len(frames) == len(key) - 3
-    ratings = {row["number"]: 2.0 + int(row["language"]) / 2 for row in key}
+    frames = {(row["setting"], row["frame"]) for row in key}
+    assert len(frames) == len(key)
     by_number = {row["number"]: row for row in key}
-    (*rows, last) = rate_words.rows(by_number, [ratings, ratings])
-    for row in rows[:2]:
+    ratings = dict.fromkeys(by_number, 4.0)
+    for row in rate_words.rows(by_number, [ratings, ratings]):
         low, high = re.search(r"\| 4.0 \| (.*?) to (.*?) \|", row).groups()
         assert float(low) < 4.0 < float(high), "frames that are all alike leave room for others"
-    assert "language 3" in last
-    assert "| 3.5 |" in last
     with pytest.raises(SystemExit, match=r"rates text \d+ ''; it must be a number"):
         rate_words.read_ratings(out / "sheet-1.csv", by_number)

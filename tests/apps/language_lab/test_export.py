@@ -2,7 +2,7 @@
 
 import functools
 import io
-import json
+from pathlib import Path
 
 import pytest
 from language_variants import TASKS
@@ -15,35 +15,12 @@ from roboirg.language.instruction_row import row
 from roboirg.language.variants import instructions
 from roboirg.tasks.splits.splits import get_episode
 
-LISTS = {
-    "patterns": str,
-    "references": str,
-    "landmarks": str,
-    "templates": str,
-    "landmark_classes": int,
-    "stages": int,
-}
-
 
 @functools.cache
 def rows():
     """Four episodes of each task in all settings and forms."""
     episodes = [get_episode(task, "test", index) for task in TASKS for index in range(4)]
     return tuple(row(*one) for one in instructions(episodes, plain_settings(), FORMS))
-
-
-def test_every_row_has_the_same_columns_and_types():
-    columns = list(rows()[0])
-    kinds: dict[str, set[type]] = {}
-    for one in rows():
-        assert list(one) == columns
-        for name, value in one.items():
-            kinds.setdefault(name, set()).add(type(value))
-            assert name not in LISTS or all(type(item) is LISTS[name] for item in value)
-        for nested in ("turns", "mentions"):
-            assert len({tuple(item) for item in one[nested]}) <= 1
-    for name, found in kinds.items():
-        assert len(found - {type(None)}) == 1, name
 
 
 def test_ids_are_unique_and_say_what_the_row_is(snapshot):
@@ -56,28 +33,16 @@ def test_ids_are_unique_and_say_what_the_row_is(snapshot):
 
 def test_spans_count_in_the_whole_prompt():
     for one in rows():
-        for turn in one["turns"]:
-            assert one["text"][turn["start"] :].startswith(turn["text"])
-        assert " ".join(turn["text"] for turn in one["turns"]) == one["text"]
-        assert one["turns"][-1] == {
-            "stage": "command",
-            "start": len(one["text"]) - len(one["command"]),
-            "text": one["command"],
-        }
+        text, turns = one["text"], one["turns"]
+        assert " ".join(turn["text"] for turn in turns) == text
+        assert (turns[-1]["stage"], turns[-1]["text"]) == ("command", one["command"])
+        for turn in turns:
+            assert text[turn["start"] :].startswith(turn["text"])
         for mention in one["mentions"]:
-            assert one["text"][mention["start"] : mention["end"]] == mention["text"]
-            turn = one["turns"][mention["turn"]]
-            assert turn["start"] <= mention["start"] < mention["end"]
-            assert mention["end"] <= turn["start"] + len(turn["text"])
-
-
-def test_goals_are_the_episodes():
-    for one in rows():
-        goal = get_episode(one["task"], one["split"], one["episode"]).goal
-        expected = {
-            slot: list(value) if isinstance(value, tuple) else value for slot, value in goal.slots
-        }
-        assert json.loads(one["goal"]) == expected
+            start, end = mention["start"], mention["end"]
+            assert text[start:end] == mention["text"] != ""
+            turn = turns[mention["turn"]]
+            assert turn["start"] <= start < end <= turn["start"] + len(turn["text"])
 
 
 def test_arrow_reads_json_lines_and_parquet_alike():
@@ -96,12 +61,11 @@ def test_arrow_reads_json_lines_and_parquet_alike():
         assert mine.type == theirs.type, mine.name
 
 
-@pytest.mark.parametrize("settings", [plain_settings(), ("explicit",)])
-def test_parquet_has_its_types_whatever_is_in_it(settings):
+def test_parquet_has_its_types_where_columns_are_empty():
     pytest.importorskip("pyarrow")
     from pyarrow import parquet
 
-    few = [one for one in rows() if one["setting"] in settings]
+    few = [one for one in rows() if one["setting"] == "explicit"]
     schema = parquet.read_schema(io.BytesIO(instruction_export.encode(few, "parquet")))
     assert str(schema.field("landmark_classes").type) == "list<element: int64>"
     assert str(schema.field("pattern").type) == "string"
@@ -111,6 +75,6 @@ def test_parquet_has_its_types_whatever_is_in_it(settings):
 def test_without_pyarrow_one_sentence_says_what_to_do(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
-    instruction_export.check_export_support("jsonl")
+    instruction_export.format_of(Path("rows.jsonl"))
     with pytest.raises(MissingDependencyError, match=r"\[export\]"):
-        instruction_export.check_export_support("parquet")
+        instruction_export.format_of(Path("rows.parquet"))

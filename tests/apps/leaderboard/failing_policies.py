@@ -1,7 +1,5 @@
 """Policies that fail in every way and at every moment, honestly."""
 
-from __future__ import annotations
-
 import os
 import time
 
@@ -14,11 +12,11 @@ class Failing:
     cameras = ()
     when, at = "act", 1
 
-    def __init__(self, seed: int = 0) -> None:
+    def __init__(self, seed=0):
         self.calls = 0
         self._maybe("init")
 
-    def _maybe(self, phase: str):
+    def _maybe(self, phase):
         if phase == self.when:
             self.calls += 1
             if self.calls == self.at:
@@ -60,31 +58,6 @@ def _exit(self):
     raise SystemExit(3)
 
 
-def _nan(self):
-    return np.full(8, np.nan)
-
-
-def _narrow(self):
-    return np.zeros((2, 3))
-
-
-def _text(self):
-    return "left"
-
-
-def _empty(self):
-    return np.zeros((0, 8))
-
-
-def _beyond(self):
-    return np.full(8, 1e9)
-
-
-def _half(self):
-    """Four good rows and one that cannot be executed."""
-    return np.vstack([np.zeros((4, 8)), np.full((1, 8), np.inf)])
-
-
 def _die(self):
     os._exit(7)
 
@@ -102,14 +75,22 @@ def _failing(name, **fields):
     return name
 
 
-IN_PROCESS = [
-    _failing(f"Raises_{when}_{at}", when=when, at=at)
-    for when, at in (("init", 1), ("reset", 1), ("act", 1), ("act", 2), ("hear", 1), ("usage", 1),
-                     ("close", 1))
-] + [
-    _failing(f"{fail.__name__.strip('_').title()}_{at}", fail=fail, at=at)
-    for fail in (_exit, _nan, _narrow, _text, _empty, _beyond, _half) for at in (1, 2)
-] + ["Posing"]  # fmt: skip
+BAD_ANSWERS = {
+    "Nan": np.full(8, np.nan),
+    "Narrow": np.zeros((2, 3)),
+    "Text": "left",
+    "Empty": np.zeros((0, 8)),
+    "Beyond": np.full(8, 1e9),
+    "Half": np.vstack([np.zeros((4, 8)), np.full((1, 8), np.inf)]),  # four good rows
+}
+IN_PROCESS = ["Posing", _failing("Exits", fail=_exit)]
+for _when, _at in (("init", 1), ("reset", 1), ("act", 1), ("act", 2), ("hear", 1), ("usage", 1),
+                   ("close", 1)):  # fmt: skip
+    IN_PROCESS.append(_failing(f"Raises_{_when}_{_at}", when=_when, at=_at))
+for _name, _answer in BAD_ANSWERS.items():
+    for _at in (1, 2):
+        answer = lambda self, answer=_answer: answer  # noqa: E731
+        IN_PROCESS.append(_failing(f"{_name}_{_at}", fail=answer, at=_at))
 HOSTED = [
     _failing(f"{fail.__name__.strip('_').title()}_{when}", fail=fail, when=when)
     for fail in (_die, _kill, _sleep) for when in ("reset", "act")

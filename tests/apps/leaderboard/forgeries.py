@@ -1,37 +1,29 @@
 """Ways to alter a run, and what `verify` says of each."""
 
-from __future__ import annotations
-
 import json
 import random
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
-from roboirg.evaluation.records.action_log import (
+from roboirg.records.action_log import (
     ActionLog,
     action_path,
     read_actions,
     write_actions,
 )
-from roboirg.evaluation.records.store import RECORDS_FILE
-
-Lines = list[dict[str, Any]]
-Forgery = Callable[[Lines, Path, random.Random], Lines]
+from roboirg.records.store import RECORDS_FILE
 
 
-def forge(folder: Path, forgery: Forgery, rng: random.Random) -> None:
+def forge(folder, forgery, seed=0):
     """Change a run in place."""
     path = folder / RECORDS_FILE
     lines = [json.loads(line) for line in path.read_text().splitlines()]
-    forged = forgery(lines, folder, rng)
+    forged = forgery(lines, folder, random.Random(seed))
     path.write_text("".join(json.dumps(line) + "\n" for line in forged))
 
 
-def _changes(of_outcome: str | None = None, /, **changes: Any) -> Forgery:
+def _changes(of_outcome=None, /, **changes):
     """Change a record at random, or one with an outcome."""
 
-    def forgery(lines: Lines, _folder: Path, rng: random.Random) -> Lines:
+    def forgery(lines, _folder, rng):
         of_kind = [line for line in lines if of_outcome in (None, line["outcome"])]
         rng.choice(of_kind).update(changes)
         return lines
@@ -39,14 +31,14 @@ def _changes(of_outcome: str | None = None, /, **changes: Any) -> Forgery:
     return forgery
 
 
-def _other_actions(lines: Lines, _folder: Path, rng: random.Random) -> Lines:
+def _other_actions(lines, _folder, rng):
     one, other = rng.sample(lines, 2)
     one.update(action_log=other["action_log"])
     return lines
 
 
-def _relog(change: Callable[[ActionLog], ActionLog]) -> Forgery:
-    def forgery(lines: Lines, folder: Path, rng: random.Random) -> Lines:
+def _relog(change):
+    def forgery(lines, folder, rng):
         one = rng.choice(lines)
         log = read_actions(folder, one["action_log"])
         one.update(action_log=write_actions(change(log), folder))
@@ -55,45 +47,48 @@ def _relog(change: Callable[[ActionLog], ActionLog]) -> Forgery:
     return forgery
 
 
-def _nudge(log: ActionLog) -> ActionLog:
+def _nudge(log):
     rows = log.rows.copy()
     rows[len(rows) // 2 :] += 0.001
     return ActionLog(log.space, rows, log.requests, log.end_state)
 
 
-def _go_on(log: ActionLog) -> ActionLog:
+def _go_on(log):
     rows = log.rows[[*range(len(log.rows)), -1, -1]]
     return ActionLog(log.space, rows, log.requests, log.end_state)
 
 
-def _cut(log: ActionLog) -> ActionLog:
+def _cut(log):
     return ActionLog(log.space, log.rows[:-1], log.requests, log.end_state)
 
 
-def _lose_actions(lines: Lines, folder: Path, rng: random.Random) -> Lines:
+def _lose_actions(lines, folder, rng):
     action_path(folder, rng.choice(lines)["action_log"]).unlink()
     return lines
 
 
-def _swap_files(lines: Lines, folder: Path, rng: random.Random) -> Lines:
+def _swap_files(lines, folder, rng):
     """Put the actions of one episode into the file of another."""
     one, other = (action_path(folder, line["action_log"]) for line in rng.sample(lines, 2))
     one.write_bytes(other.read_bytes())
     return lines
 
 
-def _other_stage(lines: Lines, _folder: Path, rng: random.Random) -> Lines:
+def _other_stage(lines, _folder, rng):
     rng.choice(lines)["instruction"][0]["stage"] = "cue"
+    return lines
+
+
+def _other_word(lines, _folder, rng):
+    rng.choice(lines)["instruction"][-1]["text"] += " Please."
     return lines
 
 
 LATE = "timeout: the policy took more than 600 s"
 
 OTHER = {"kind": "execution", "failure": "unreachable", "sentence": "Could not."}
-UNWATCHED = _changes("failure", attribution=OTHER, attempts=None)
-"""No forgery: a record from before attempts were watched for, attributed by other rules."""
 
-FORGERIES: dict[str, tuple[Forgery, str]] = {
+FORGERIES = {
     "failure to success": (
         _changes("failure", outcome="success", cause=None, attribution=None),
         "outcome: the record says 'success'; it should be 'failure'.",
@@ -108,6 +103,7 @@ FORGERIES: dict[str, tuple[Forgery, str]] = {
     ),
     "why it failed": (_changes("failure", attribution=OTHER), "attribution: the record says"),
     "attempts": (_changes(attempts=[]), "attempts: the record says ()"),
+    "no attempts": (_changes(attempts=None), "attempts: the record says None"),
     "steps": (_changes(steps=1), "steps: the record says 1; it should be"),
     "events": (_changes("success", events=[]), "events: the record says ()"),
     "end state": (_changes(end_state="0" * 64), "end_state: when played again"),
@@ -123,6 +119,7 @@ FORGERIES: dict[str, tuple[Forgery, str]] = {
     "version of the world": (_changes(environment_version=0), "environment_version: the record"),
     "version of the words": (_changes(language_version="0.9.0"), "language_version: the record"),
     "other stage": (_other_stage, "instruction: the record says"),
+    "another word": (_other_word, "instruction: the record says"),
     "no such episode": (_changes(episode=5_000), "There is no episode 5000"),
 }
 """By name: the change, and a part of the sentence about it."""

@@ -1,30 +1,28 @@
 """Honest runs of policies that fail, at once or later, hold."""
 
-from pathlib import Path
-
 import failing_policies
 import pytest
 from failing_policies import HOSTED, IN_PROCESS
 
 from roboirg.apps.leaderboard.run_verification import verify_run
-from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.records.store import read_records
-from roboirg.evaluation.run.executor import InProcess, LocalProcesses
-from roboirg.evaluation.run.runner import episode_runner, run_plan
+from roboirg.records.store import read_records
+from roboirg.runs.plan.plan import Plan
+from roboirg.runs.run.executor import InProcess, LocalProcesses
+from roboirg.runs.run.runner import episode_runner, run_plan
 
 pytestmark = pytest.mark.sim
 
 
-def play(folder: Path, names: list[str], executor: object, **options: object) -> None:
+def play(folder, names, executor, **options):
     specs = [f"failing_policies:{name}" for name in names]
     chosen = {"tasks": "StopCube", "settings": "contextual", "delivery": "turns", "max_steps": 6,
               "episodes": "1", "tries": 1}  # fmt: skip
     # Not opened: some fail when they are made.
     plan = Plan.model_validate({"policies": specs, **chosen, **options})
-    run_plan(plan, folder, episode_runner(plan, folder), executor)  # type: ignore[arg-type]
+    run_plan(plan, folder, episode_runner(plan, folder), executor)
 
 
-def test_runs_of_policies_that_fail_in_this_process_hold(tmp_path: Path) -> None:
+def test_runs_of_policies_that_fail_in_this_process_hold(tmp_path):
     assert failing_policies.Failing
     play(tmp_path, IN_PROCESS, InProcess(), policy_process="shared")
     records = {one.policy.partition(":")[2]: one for one in read_records(tmp_path)}
@@ -38,7 +36,7 @@ def test_runs_of_policies_that_fail_in_this_process_hold(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-def test_runs_of_policies_whose_process_ends_hold(tmp_path: Path) -> None:
+def test_runs_of_policies_whose_process_ends_hold(tmp_path):
     play(tmp_path, HOSTED, LocalProcesses(1), policy_timeout_s=30.0)
     records = read_records(tmp_path)
     assert {one.error for one in records} == {"policy", "infrastructure", "timeout"}

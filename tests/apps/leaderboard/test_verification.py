@@ -1,62 +1,65 @@
 """Honest runs hold; altered ones do not."""
 
-from __future__ import annotations
-
 import json
-import random
 import shutil
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from forgeries import FORGERIES, UNWATCHED, Forgery, Lines, forge
+from forgeries import FORGERIES, forge
 from selection import slow_but
 from typer.testing import CliRunner
 
 from roboirg.apps.leaderboard import commands
 from roboirg.apps.leaderboard.record_check import RecordCheck
 from roboirg.apps.leaderboard.run_verification import Verification, verify_run
-from roboirg.evaluation.plan.plan_maker import make_plan
-from roboirg.evaluation.play.rollout import EpisodeRunner
-from roboirg.evaluation.records.action_log import read_actions, write_actions
-from roboirg.evaluation.records.merging import merge_runs
-from roboirg.evaluation.records.run_files import PLAN_FILE
-from roboirg.evaluation.records.store import read_records
-from roboirg.evaluation.run.executor import InProcess
-from roboirg.evaluation.run.runner import run_plan
-from roboirg.language import LANGUAGE_VERSIONS
 from roboirg.main import app
+from roboirg.records.action_log import read_actions, write_actions
+from roboirg.records.merging import merge_runs
+from roboirg.records.run_files import PLAN_FILE
+from roboirg.records.store import read_records
+from roboirg.runs.plan.plan_maker import make_plan
+from roboirg.runs.plan.stored_plans import read_plans
+from roboirg.runs.play.rollout import EpisodeRunner
+from roboirg.runs.run.executor import InProcess
+from roboirg.runs.run.runner import run_plan
 
 pytestmark = pytest.mark.sim
 
 
-def play(folder: Path, policies: list[str], **options: object) -> Path:
-    plan = make_plan(policies, **options)  # type: ignore[arg-type]
+def play(folder, policies, **options):
+    plan = make_plan(policies, **options)
     run_plan(plan, folder, EpisodeRunner(folder, plan=plan.fingerprint), InProcess())
     return folder
 
 
 @pytest.fixture(scope="module")
-def honest(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def honest(tmp_path_factory):
     """Successes and failures in the shortest episodes that there are."""
     return play(
         tmp_path_factory.mktemp("honest"),
         ["listener", "forgetful"],
         tasks="StopCube",
         settings="contextual",
-        episodes="1,",
+        episodes="2,",
         delivery="turns",
     )
 
 
-def test_an_honest_run_holds(honest: Path) -> None:
+def test_an_honest_run_holds(honest):
     found = verify_run(honest)
     assert found.holds, found
     assert found.verdicts == {"exact": found.records}
     assert not found.notes
     outcomes = {one.outcome for one in read_records(honest)}
     assert outcomes == {"success", "failure"}
+
+
+@pytest.fixture
+def forged(honest, tmp_path):
+    """A copy of the honest run, to be altered."""
+    return Path(shutil.copytree(honest, tmp_path / "forged"))
 
 
 QUICK = (
@@ -72,96 +75,95 @@ QUICK = (
 
 
 @pytest.mark.parametrize("name", slow_but(QUICK, FORGERIES))
-def test_what_was_altered_does_not_hold(name: str, honest: Path, tmp_path: Path) -> None:
-    forged = tmp_path / "forged"
-    shutil.copytree(honest, forged)
+def test_what_was_altered_does_not_hold(name, forged):
     forgery, words = FORGERIES[name]
-    forge(forged, forgery, random.Random(name))
+    forge(forged, forgery, seed=name)
     (found, *_) = verify_run(forged).checks
     assert words in "\n".join(found.findings)
 
 
-def in_words(words: str) -> Forgery:
-    """Return a change that makes records of language 4 of them, with a name of words."""
+def with_all(**fields):
+    """Return a change of the same fields of all records."""
 
-    def change(lines: Lines, _folder: Path, _rng: random.Random) -> Lines:
+    def change(lines, _folder, _rng):
         for line in lines:
-            line["options"]["language"] = 4
-            line.update(language_version=LANGUAGE_VERSIONS[4], words=words)
+            line.update(fields)
         return lines
 
     return change
 
 
-def test_words_that_are_not_installed_are_not_checked_and_the_verdict_is(
-    honest: Path, tmp_path: Path
-) -> None:
-    folder = tmp_path / "other"
-    shutil.copytree(honest, folder)
-    (folder / PLAN_FILE).unlink()
-    forge(folder, in_words("StopCube/test@0a0a0a0a0a0a"), random.Random(0))
-    found = verify_run(folder)
-    assert (found.holds, found.verdicts) == (True, {"exact": found.records})
-    note = f"were not checked in {found.records} of the records: this roboirg has other words."
-    assert found.notes[-1] == f"Words, and why episodes failed, {note}"
-    printed = CliRunner().invoke(app, ["leaderboard", "verify", str(folder)]).output
-    assert printed.endswith("All that was checked holds.\n")
-    forge(folder, FORGERIES["failure to success"][0], random.Random(0))
-    assert not verify_run(folder).holds
+def test_records_in_other_words_of_the_same_pool_are_checked_but_for_their_words(
+    forged,
+):
+    words = "StopCube/test@0a0a0a0a0a0a"
+    plan = json.loads((forged / PLAN_FILE).read_bytes()) | {"words": [words]}
+    (forged / PLAN_FILE).write_text(json.dumps(plan), "utf-8")
+    (planned,) = read_plans(forged)
+
+    def in_other_words(lines, folder, rng):
+        for line in lines:
+            line |= {"words": words, "plan": planned.fingerprint}
+            line["metadata"]["words"] = words
+        return lines
+
+    forge(forged, in_other_words)
+    found = verify_run(forged, sample=0.0)
+    assert found.holds, (found.faults, found.checks)
+    assert "in 2 of the records: this roboirg has other words" in "".join(found.notes)
+
+    def heard_later(lines, folder, rng):
+        lines[0]["instruction"][0]["step"] = 7
+        return lines
+
+    forge(forged, heard_later)
+    assert "instruction: the record says" in str(verify_run(forged).checks)
+    forge(forged, FORGERIES["failure to success"][0])
+    assert "outcome: the record says 'success'" in str(verify_run(forged).checks)
+
+
+def test_a_record_has_the_words_of_its_plan_and_of_its_metadata(forged):
+    def reworded(lines, folder, rng):
+        lines[0]["words"] = "StopCube/test@0a0a0a0a0a0a"
+        return lines
+
+    forge(forged, reworded)
+    found = verify_run(forged, sample=0.0)
+    assert found.faults[0] == "1 record in words that the plan does not name."
+    assert found.faults[1].startswith("The records have several words of StopCube/test: ")
+    assert "its metadata name different ones" in str(found.checks)
 
 
 @pytest.mark.parametrize("words", ["StopCube/train@0a0a0a0a0a0a", "anything", "none"])
-def test_words_of_another_pool_or_of_no_name_do_not_excuse_from_checking(
-    honest: Path, tmp_path: Path, words: str
-) -> None:
-    shutil.copytree(honest, tmp_path / "forged")
-    (tmp_path / "forged" / PLAN_FILE).unlink()
-    forge(tmp_path / "forged", in_words(words), random.Random(0))
-    found = verify_run(tmp_path / "forged")
+def test_words_of_another_pool_or_of_no_name_do_not_excuse_from_checking(forged, words):
+    forge(forged, with_all(words=words))
+    found = verify_run(forged)
     assert not found.holds
     assert f"words: the record says '{words}', which are no words of" in str(found.checks)
 
 
-@pytest.mark.parametrize("words", ["StopCube/test@0a0a0a0a0a0a", "@0a0a0a0a0a0a"])
-def test_a_record_of_language_3_with_words_of_another_does_not_hold(
-    honest: Path, tmp_path: Path, words: str
-) -> None:
-    def with_words(lines: Lines, _folder: Path, _rng: random.Random) -> Lines:
-        return [{**line, "words": words} for line in lines]
-
-    shutil.copytree(honest, tmp_path / "forged")
-    forge(tmp_path / "forged", with_words, random.Random(0))
-    (check, _) = verify_run(tmp_path / "forged", sample=0.0).checks
-    assert check.findings[0].startswith(f"words: the record says {words!r}")
-
-
-def test_a_record_from_before_attempts_were_watched_for_holds(honest: Path, tmp_path: Path) -> None:
-    shutil.copytree(honest, tmp_path / "older")
-    forge(tmp_path / "older", UNWATCHED, random.Random(0))
-    assert verify_run(tmp_path / "older").holds
-
-
-def test_an_episode_of_the_plan_that_was_left_out_is_named(honest: Path, tmp_path: Path) -> None:
-    shorter = tmp_path / "shorter"
-    shutil.copytree(honest, shorter)
-    lines = (shorter / "records.jsonl").read_bytes().splitlines(keepends=True)
-    (shorter / "records.jsonl").write_bytes(b"".join(lines[1:]))
-    found = verify_run(shorter, sample=0.0)
+def test_an_episode_of_the_plan_that_was_left_out_is_named(honest, forged):
+    lines = (forged / "records.jsonl").read_bytes().splitlines(keepends=True)
+    (forged / "records.jsonl").write_bytes(b"".join(lines[1:]))
+    found = verify_run(forged, sample=0.0)
     assert found.missing == (read_records(honest)[0].slug,)
     assert not found.holds
-    (shorter / "plan.json").unlink()
-    found = verify_run(shorter, sample=0.0)
-    assert found.holds
-    assert found.notes == ("From no plan that is kept: 1 record.",)
+    plan = json.loads((forged / PLAN_FILE).read_bytes()) | {"video": "all"}
+    (forged / PLAN_FILE).write_text(json.dumps(plan), "utf-8")
+    assert verify_run(forged, sample=0.0).faults == ("1 record from no plan that is kept.",)
+    (forged / PLAN_FILE).unlink()
+    found = verify_run(forged, sample=0.0)
+    assert found.faults == ("1 record from no plan that is kept.",)
+    assert not found.holds
     # Words that were said in another part of the discourse are other words, played or not.
-    forge(shorter, FORGERIES["other stage"][0], random.Random(0))
-    (check,) = verify_run(shorter, sample=0.0).checks
+    forge(forged, FORGERIES["other stage"][0])
+    (check,) = verify_run(forged, sample=0.0).checks
     assert FORGERIES["other stage"][1] in check.findings[0]
 
 
-def test_only_other_processors_may_end_a_little_elsewhere(honest: Path, tmp_path: Path) -> None:
-    def shift(by: float, end_state: str = "0" * 64, **changes: object) -> Forgery:
-        def forgery(lines: Lines, folder: Path, rng: random.Random) -> Lines:
+def test_only_other_processors_may_end_a_little_elsewhere(honest, tmp_path):
+    def shift(by, end_state="0" * 64, **changes):
+        def forgery(lines, folder, rng):
             for place, one in enumerate(lines, start=1):  # the first is farthest
                 log = read_actions(folder, one["action_log"])
                 moved = replace(log, end_state=log.end_state + by / place)
@@ -182,7 +184,7 @@ def test_only_other_processors_may_end_a_little_elsewhere(honest: Path, tmp_path
     ):
         folder = tmp_path / "-".join([str(by), *changes])
         shutil.copytree(honest, folder)
-        forge(folder, shift(by, **changes), random.Random(0))
+        forge(folder, shift(by, **changes))
         found = verify_run(folder)
         assert found.holds is holds
         assert [one.slug for one in found.checks] == sorted(one.slug for one in found.checks)
@@ -191,20 +193,22 @@ def test_only_other_processors_may_end_a_little_elsewhere(honest: Path, tmp_path
         assert any("another kind of processor" in note for note in found.notes) is excused
 
 
-def test_a_merged_run_holds_by_the_plans_of_its_parts(honest: Path, tmp_path: Path) -> None:
+def test_a_merged_run_holds_by_the_plans_of_its_parts(honest, tmp_path):
     """By all plans: each of these has the episodes of one policy only."""
     parts = [tmp_path / policy for policy in ("listener", "forgetful")]
     for part in parts:
         shutil.copytree(honest, part)
         plan = json.loads((part / PLAN_FILE).read_bytes()) | {"policies": [part.name]}
         (part / PLAN_FILE).write_text(json.dumps(plan), "utf-8")
+        (read,) = read_plans(part)
+        forge(part, with_all(plan=read.fingerprint))
     merge_runs(parts, tmp_path / "merged")
     found = verify_run(tmp_path / "merged")
     assert found.holds, found
     assert not found.notes
 
 
-def test_a_sample_is_drawn_again_from_its_seed(honest: Path) -> None:
+def test_a_sample_is_drawn_again_from_its_seed(honest):
     told: list[tuple[int, int]] = []
     found = verify_run(honest, sample=0.5, seed=3, progress=lambda *now: told.append(now))
     assert told == [(1, 2), (2, 2)]
@@ -212,9 +216,7 @@ def test_a_sample_is_drawn_again_from_its_seed(honest: Path) -> None:
     assert found.holds
 
 
-def test_what_is_printed_of_a_verification(
-    capsys: pytest.CaptureFixture[str], snapshot: object
-) -> None:
+def test_what_is_printed_of_a_verification(capsys, snapshot):
     """At most twenty of each kind, and how many there are besides."""
     checks = tuple(RecordCheck(f"check-{n}", ("one.", "two.")) for n in range(23))
     verdicts = Counter({"exact": 30, "tolerant": 4})
@@ -225,25 +227,20 @@ def test_what_is_printed_of_a_verification(
     assert capsys.readouterr().out == snapshot
 
 
-@pytest.fixture
-def cli() -> CliRunner:
-    return CliRunner()
-
-
 @pytest.mark.usefixtures("in_this_process")
-def test_the_command_tells_what_does_not_hold(honest: Path, tmp_path: Path, cli: CliRunner) -> None:
+def test_the_command_tells_what_does_not_hold(honest, forged):
+    def verify(run, share):
+        words = ["leaderboard", "verify", str(run), "--sample", share]
+        return CliRunner().invoke(app, words)
+
     for share, played in (("10%", "1 was"), ("1.0", "2 were")):
-        good = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", share])
+        good = verify(honest, share)
         assert good.exit_code == 0, good.output
         assert f"2 records; {played} played again" in good.output
-    forged = tmp_path / "forged"
-    shutil.copytree(honest, forged)
-    forge(forged, FORGERIES["failure to success"][0], random.Random(0))
-    bad = cli.invoke(app, ["leaderboard", "verify", str(forged)])
+    forge(forged, FORGERIES["failure to success"][0])
+    bad = verify(forged, "100%")
     assert bad.exit_code == 2
     assert "outcome: the record says 'success'; it should be 'failure'" in bad.output
     assert "1 thing does not hold." in bad.output
     for share in ("many", "5", "0%", "101%", "nan"):
-        wrong = cli.invoke(app, ["leaderboard", "verify", str(honest), "--sample", share])
-        assert wrong.exit_code != 0
-        assert f"{share!r}; give one such as 5%" in str(wrong.exception)
+        assert f"{share!r}; give one such as 5%" in str(verify(honest, share).exception)

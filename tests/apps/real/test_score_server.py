@@ -1,7 +1,6 @@
 """The operator's page over real sockets, in a real browser, and killed in between."""
 
 import re
-import signal
 import subprocess
 import sys
 import threading
@@ -14,29 +13,10 @@ import pytest
 from roboirg.apps.real.pages.score_page import render_trial
 from roboirg.apps.real.pages.score_server import ScoreServer
 from roboirg.apps.real.study.trial_log import TrialLog, trial_metadata
-from roboirg.evaluation.records.store import read_records
+from roboirg.records.store import read_records
 
 NARROW = {"width": 400, "height": 800}
 CLI = "import sys; from roboirg.apps.real.commands import real_app; real_app(sys.argv[1:])"
-
-
-@pytest.fixture
-def start():
-    """Start a command of ``roboirg real`` in a process of its own, which ends with the test."""
-    started = []
-
-    def call(*words):
-        process = subprocess.Popen(
-            [sys.executable, "-u", "-c", CLI, *map(str, words)],
-            text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-        )  # fmt: skip
-        started.append(process)
-        return process
-
-    yield call
-    for process in started:
-        process.kill()
-        process.wait(timeout=600)
 
 
 @pytest.fixture
@@ -72,21 +52,9 @@ def ask(server, path, form=None, *, key=None, host=None, origin=None):
         return answer.status, answer.headers, answer.read().decode()
 
 
-def fetch(browser, url, form=None):
-    """Return the text of a page of a server in another process."""
-    data = None if form is None else urllib.parse.urlencode(form).encode()
-    with browser.open(url, data, timeout=600) as answer:
-        return answer.read().decode()
-
-
 def form_of(server, trial, choice, **more):
     revision = server.read_trial_log().revision(trial.name)
-    return {
-        "trial": trial.name,
-        "revision": revision,
-        "choice": choice,
-        **more,
-    }
+    return {"trial": trial.name, "revision": revision, "choice": choice, **more}
 
 
 def test_only_pages_of_this_server_are_answered(served):
@@ -94,20 +62,19 @@ def test_only_pages_of_this_server_are_answered(served):
     port = served.port
     assert served.socket.getsockname()[0] == "127.0.0.1"
     form = form_of(served, trial, "success")
+    here, elsewhere = f"http://127.0.0.1:{port}", "http://evil.example"
     refused = [
-        ask(served, "/", key=""),
         ask(served, "/?key=wrong", key=""),
         ask(served, f"/?key={served.key}", host="evil.example"),
         ask(served, "/score", form, key="wrong"),
         ask(served, "/score", form, key=""),
         ask(served, "/score", form, host=f"evil.example:{port}"),
-        ask(served, "/score", form, origin="http://evil.example"),
+        ask(served, "/score", form, origin=elsewhere),
     ]
     assert {status for status, _, _ in refused} == {403}
     assert not any(served.key in f"{headers}{text}" for _, headers, text in refused)
     assert not (served.folder / "records.jsonl").exists()
-    status, headers, _ = ask(served, "/score", form, origin=f"http://127.0.0.1:{port}")
-    assert status == 303
+    assert ask(served, "/score", form, origin=here)[0] == 303
     assert len(read_records(served.folder)) == 1
     status, headers, _ = ask(served, "/")
     assert status == 200
@@ -154,21 +121,24 @@ def test_what_an_operator_types_is_text(served):
     assert served.read_trial_log().newest(trial.name).video == "films/a.mp4"
 
 
-def test_a_kill_between_two_clicks_costs_nothing(small, start):
+def test_a_kill_between_two_clicks_costs_nothing(small):
     plan, folder = small
+    command = [sys.executable, "-u", "-c", CLI, "score", str(folder), "--operator", "ann"]
     for number, trial in enumerate(plan.trials[:2]):
-        process = start("score", folder, "--operator", "ann")
-        url = re.search(r"http\S+", process.stdout.readline())[0]
-        browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
-        page = fetch(browser, url)
-        assert f"{number} of 4 scored" in page
-        assert f"<h1>{number + 1}. {trial.name}</h1>" in page
-        form = {"trial": trial.name, "revision": "0", "choice": "success"}
-        address = url.partition("/?")[0] + "/score"
-        fetch(browser, address, form)
-        process.send_signal(signal.SIGKILL)
-        process.wait(timeout=600)
-    assert [one.outcome for one in read_records(folder)] == ["success"] * 2
+        process = subprocess.Popen(command, text=True, stdout=subprocess.PIPE)
+        try:
+            url = re.search(r"http\S+", process.stdout.readline())[0]
+            browser = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+            page = browser.open(url, timeout=600).read().decode()
+            assert f"{number} of 4 scored" in page
+            assert f"<h1>{number + 1}. {trial.name}</h1>" in page
+            form = {"trial": trial.name, "revision": "0", "choice": "success"}
+            address = url.partition("/?")[0] + "/score"
+            browser.open(address, urllib.parse.urlencode(form).encode(), timeout=600)
+        finally:
+            process.kill()
+            process.wait(timeout=600)
+    assert [record.outcome for record in read_records(folder)] == ["success"] * 2
 
 
 # In a browser.
@@ -204,22 +174,21 @@ def test_notes_and_corrections_by_keyboard(browser, served, wait_s):
 
 @pytest.mark.browser
 def test_the_page_fits_narrow_screens_and_says_what_it_shows(browser, served, wait_s):
-    for scheme in ("dark",):
-        page = browser.new_page(viewport=NARROW, color_scheme=scheme)
-        page.set_default_timeout(1000 * wait_s)
-        page.goto(served.url)
-        assert page.evaluate("document.documentElement.scrollWidth") <= NARROW["width"]
-        assert page.locator("svg[role=img] title").count() == 1
-        assert page.locator("fieldset legend").count() == 5
-        for button in page.locator("main button").all():
-            assert button.get_attribute("aria-keyshortcuts")
-            assert button.bounding_box()["height"] >= 40
-        for field in page.locator("input[type=text]").all():
-            assert field.evaluate("field => field.labels.length") == 1
-        # By tabs alone too.
-        page.keyboard.press("Tab")
-        assert page.evaluate("document.activeElement.tagName") == "BUTTON"
-        page.close()
+    page = browser.new_page(viewport=NARROW)
+    page.set_default_timeout(1000 * wait_s)
+    page.goto(served.url)
+    assert page.evaluate("document.documentElement.scrollWidth") <= NARROW["width"]
+    assert page.locator("svg[role=img] title").count() == 1
+    assert page.locator("fieldset legend").count() == 5
+    for button in page.locator("main button").all():
+        assert button.get_attribute("aria-keyshortcuts")
+        assert button.bounding_box()["height"] >= 40
+    for field in page.locator("input[type=text]").all():
+        assert field.evaluate("field => field.labels.length") == 1
+    # By tabs alone too.
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.tagName") == "BUTTON"
+    page.close()
 
 
 def test_the_page_says_what_is_meant_and_what_was_scored(small, snapshot):

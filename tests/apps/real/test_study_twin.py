@@ -4,8 +4,8 @@ import pytest
 from typer.testing import CliRunner
 
 from roboirg.apps.real.study.study_plan import read_study
-from roboirg.evaluation.records.store import read_records
 from roboirg.main import app
+from roboirg.records.store import read_records
 
 pytestmark = pytest.mark.sim
 

@@ -1,8 +1,13 @@
-"""A small network that finds the objects of a picture."""
+"""A small network that finds the objects of a picture.
+
+A picture is divided into a grid of cells. The network says which object has its center in a cell,
+and how far from the cell's corner, the offset.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -57,20 +62,24 @@ class DetectorNet(nn.Module):
     def find(self, pictures: Sequence[NDArray[np.uint8]]) -> list[SeenObjects]:
         """Return the objects of each picture: cells that are surer than all their neighbors."""
         logits, offsets = self(torch.from_numpy(np.stack(pictures)))
-        scores, kinds = logits.softmax(dim=1)[:, 1:].max(dim=1)
+        scores, kinds = logits.softmax(dim=1)[:, 1:].max(dim=1)  # without background
         peaks = functional.max_pool2d(scores[:, None], 3, stride=1, padding=1)[:, 0]
-        sure = (scores >= peaks) & (scores > MIN_SCORE)
-        found = []
-        for place in range(len(pictures)):
-            rows, columns = torch.nonzero(sure[place], as_tuple=True)
-            best = scores[place, rows, columns].argsort(descending=True)[:MAX_OBJECTS]
-            rows, columns = rows[best], columns[best]
-            shift = offsets[place, :, rows, columns]
-            centers = torch.stack([columns + shift[0], rows + shift[1]], dim=1) / GRID
-            found.append(
-                SeenObjects(kinds[place, rows, columns].numpy(), centers.numpy().astype(np.float32))
-            )
-        return found
+        is_object = (scores >= peaks) & (scores > MIN_SCORE)
+        return [
+            _objects_at(is_object[number], scores[number], kinds[number], offsets[number])
+            for number in range(len(pictures))
+        ]
+
+
+def _objects_at(is_object: Tensor, scores: Tensor, kinds: Tensor, offsets: Tensor) -> SeenObjects:
+    """Return the objects of one picture, given what the network says of its cells."""
+    rows, columns = torch.nonzero(is_object, as_tuple=True)
+    surest = scores[rows, columns].argsort(descending=True)[:MAX_OBJECTS]
+    rows = rows[surest]
+    columns = columns[surest]
+    shift = offsets[:, rows, columns]
+    centers = torch.stack([columns + shift[0], rows + shift[1]], dim=1) / GRID
+    return SeenObjects(kinds[rows, columns].numpy(), centers.numpy().astype(np.float32))
 
 
 def block(
@@ -86,17 +95,39 @@ def block(
 
 def detector_loss(net: DetectorNet, views: Sequence[LabeledView], classes: Sequence[str]) -> Tensor:
     """Return the loss of a batch: the class of each cell, and where in its cell a center is."""
-    numbers = {name: number for number, name in enumerate(classes, start=1)}
-    kinds = torch.zeros(len(views), GRID, GRID, dtype=torch.long)
-    shifts = torch.zeros(len(views), 2, GRID, GRID)
-    for place, view in enumerate(views):
-        for name, (column, row) in zip(view.names, view.centers / CELL, strict=True):
-            cell = int(row), int(column)
-            kinds[place, *cell] = numbers[name]
-            shifts[place, :, *cell] = torch.tensor([column - cell[1], row - cell[0]])
+    labels = _cell_labels(views, classes)
     logits, offsets = net(torch.from_numpy(np.stack([view.picture for view in views])))
     weights = torch.ones(len(classes) + 1)
     weights[0] = BACKGROUND_WEIGHT
-    there = (kinds > 0)[:, None]
-    misplaced = (functional.l1_loss(offsets, shifts, reduction="none") * there).sum()
-    return functional.cross_entropy(logits, kinds, weights) + misplaced / there.sum().clamp(min=1)
+    wrong_kinds = functional.cross_entropy(logits, labels.kinds, weights)
+
+    has_object = (labels.kinds > 0)[:, None]
+    distances = functional.l1_loss(offsets, labels.offsets, reduction="none")
+    misplaced = (distances * has_object).sum()
+    return wrong_kinds + misplaced / has_object.sum().clamp(min=1)
+
+
+class CellLabels(NamedTuple):
+    """What is in the cells of n pictures.
+
+    Attributes:
+        kinds: (n, GRID, GRID) numbers of classes from 1; 0 for background.
+        offsets: (n, 2, GRID, GRID) of the center in its cell, column and row, in cells.
+    """
+
+    kinds: Tensor
+    offsets: Tensor
+
+
+def _cell_labels(views: Sequence[LabeledView], classes: Sequence[str]) -> CellLabels:
+    """Return the labels of pictures by cell; in a cell with two objects the later one counts."""
+    numbers = {name: number for number, name in enumerate(classes, start=1)}
+    kinds = torch.zeros(len(views), GRID, GRID, dtype=torch.long)
+    offsets = torch.zeros(len(views), 2, GRID, GRID)
+    for place, view in enumerate(views):
+        for name, (x, y) in zip(view.names, view.centers / CELL, strict=True):
+            row = int(y)
+            column = int(x)
+            kinds[place, row, column] = numbers[name]
+            offsets[place, :, row, column] = torch.tensor([x - column, y - row])
+    return CellLabels(kinds, offsets)

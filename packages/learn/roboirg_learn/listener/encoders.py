@@ -1,6 +1,7 @@
 """Encoders: what makes tokens for the reader from the words or the pictures of an instruction.
 
-An encoder of your own is one class with a name in `ENCODERS`.
+A token is a row of `WIDTH` numbers that stands for one word or one object. An encoder of your own
+is one class with a name in `ENCODERS`.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import torch
+from numpy.typing import NDArray
 from torch import Tensor, nn
+from torch.nn.utils.rnn import pad_sequence
 
 from roboirg.extension.commands import InvalidValueError, known_name
 from roboirg_learn.listener.object_relations import VIEWS, relation_count
@@ -54,15 +57,15 @@ class WordEncoder(TokenEncoder):
         self.order = nn.Parameter(torch.randn(MAX_WORDS, WIDTH) * 0.02)
 
     def forward(self, inputs: Sequence[ListenerInput]) -> InputTokens:
-        # The command stands at the end.
-        rows = [
-            [self._numbers.get(word, UNKNOWN) for word in split_words(one.text)[-MAX_WORDS:]]
-            for one in inputs
-        ]
-        longest = max(map(len, rows))
-        padded = [[*row, *[PADDING] * (longest - len(row))] for row in rows]
-        words = torch.tensor(padded, dtype=torch.long)  # also where nothing is said
-        return InputTokens(self.words(words) + self.order[:longest], words != PADDING)
+        rows = [torch.tensor(self._row(given.text), dtype=torch.long) for given in inputs]
+        numbers = pad_sequence(rows, batch_first=True, padding_value=PADDING)
+        order = self.order[: numbers.shape[1]]
+        return InputTokens(self.words(numbers) + order, numbers != PADDING)
+
+    def _row(self, text: str) -> list[int]:
+        """Return the numbers of the last words; the command stands at the end."""
+        words = split_words(text)[-MAX_WORDS:]
+        return [self._numbers.get(word, UNKNOWN) for word in words]
 
 
 class ObjectEncoder(TokenEncoder):
@@ -77,19 +80,20 @@ class ObjectEncoder(TokenEncoder):
         self.relations = nn.Linear(relation_count(classes), WIDTH, bias=False)
 
     def forward(self, inputs: Sequence[ListenerInput]) -> InputTokens:
-        counts = [len(one.seen.kinds) for one in inputs]
-        shape = len(inputs), max(counts)
-        kinds, views = (torch.zeros(shape, dtype=torch.long) for _ in range(2))
-        places = torch.zeros(*shape, 2)
-        relations = torch.zeros(*shape, self.relations.in_features)
-        for number, (one, count) in enumerate(zip(inputs, counts, strict=True)):
-            kinds[number, :count] = torch.from_numpy(one.seen.kinds)
-            views[number, :count] = torch.from_numpy(one.seen.views)
-            places[number, :count] = torch.from_numpy(one.seen.positions) / METERS
-            relations[number, :count] = torch.from_numpy(one.seen.relations)
-        there = torch.arange(shape[1]) < torch.tensor(counts)[:, None]
-        encoded = self.kinds(kinds) + self.views(views) + self.places(waves(places, WAVES))
-        return InputTokens(encoded + self.relations(relations), there)
+        kinds = _padded([given.seen.kinds for given in inputs])
+        views = _padded([given.seen.views for given in inputs])
+        places = _padded([given.seen.positions for given in inputs]) / METERS
+        relations = _padded([given.seen.relations for given in inputs]).float()
+        values = self.kinds(kinds) + self.views(views) + self.places(waves(places, WAVES))
+
+        counts = torch.tensor([len(given.seen.kinds) for given in inputs])
+        is_object = torch.arange(kinds.shape[1]) < counts[:, None]
+        return InputTokens(values + self.relations(relations), is_object)
+
+
+def _padded(arrays: Sequence[NDArray[Any]]) -> Tensor:
+    """Return arrays of objects in one, each filled up with zeros to the longest."""
+    return pad_sequence([torch.from_numpy(array) for array in arrays], batch_first=True)
 
 
 ENCODERS: dict[str, type[TokenEncoder]] = {"words": WordEncoder, "objects": ObjectEncoder}
@@ -105,17 +109,20 @@ def make_encoders(
         InvalidValueError: one does not take its settings.
     """
     found = nn.ModuleDict()
-    for name, own in settings.items():
+    for name, chosen in settings.items():
         encoder = ENCODERS[known_name("encoder", name, tuple(ENCODERS))]
         try:
-            found[name] = encoder(vocabulary, **own)
+            found[name] = encoder(vocabulary, **chosen)
         except (TypeError, ValueError) as error:
-            raise InvalidValueError(f"Encoder {name!r} with {own}: {error}.") from error
+            raise InvalidValueError(f"Encoder {name!r} with {chosen}: {error}.") from error
     return found
 
 
 def waves(places: Tensor, count: int) -> Tensor:
-    """Return places (..., 2) with sines and cosines of `count` rising frequencies."""
+    """Return places (..., 2) with sines and cosines of `count` rising frequencies.
+
+    A network tells places near each other apart by the fast ones, and far ones by the slow.
+    """
     scales = math.pi * 2.0 ** torch.arange(count)
     angles = (places[..., None] * scales).flatten(-2)
     return torch.cat([places, angles.sin(), angles.cos()], -1)

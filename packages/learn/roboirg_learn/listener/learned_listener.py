@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from roboirg.extension.episodes import Goal, goals_of
 from roboirg.extension.policies import Demonstration, RoboIRGEnv, ScriptedPolicy
 from roboirg_learn.labeled_views import pictures_to_see
-from roboirg_learn.learn_support import check_learn_support, file_version
+from roboirg_learn.learn_support import check_learn_support
 
 if TYPE_CHECKING:
     from roboirg_learn.listener.learned_model import LearnedModel
@@ -32,9 +32,9 @@ class LearnedListener(ScriptedPolicy):
         check_learn_support()
         from roboirg_learn.listener.learned_model import load_model
 
-        self.version = file_version(path, "listener")
         self.understood: Goal | None = None
         self._model: LearnedModel = load_model(path)
+        self.version = self._model.version
         self.trained_tasks = self._model.vocabulary.tasks
         self._demonstration: Demonstration = {}
 
@@ -47,7 +47,8 @@ class LearnedListener(ScriptedPolicy):
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Understand the instruction, or first hear the rest of it."""
-        self._demonstration, self.understood = demonstration, None
+        self._demonstration = demonstration
+        self.understood = None
         super().reset(instruction, demonstration)
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:

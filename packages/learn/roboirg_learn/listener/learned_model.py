@@ -1,12 +1,13 @@
-"""What a listener has learned: a detector and a reader, in one file of plain tensors."""
+"""What a listener has learned: a detector and a reader, in one file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
 import torch
+from torch import nn
 
 from roboirg.extension.commands import InvalidValueError
 from roboirg.extension.episodes import Goal, goal_schema
@@ -19,9 +20,8 @@ from roboirg_learn.listener.object_relations import (
     relate,
 )
 from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary
-from roboirg_learn.trained_file import load_nets, load_trained, save_trained
+from roboirg_learn.trained_file import TrainedFile, load_trained, save_trained
 
-FORMAT = "roboirg-listener-3"
 Without = Literal["none", "pictures", "video", "words"]
 WITHOUTS: tuple[Without, ...] = get_args(Without)
 """What a variant does not get; the words are then empty.
@@ -40,6 +40,7 @@ class LearnedModel(NamedTuple):
         reader: scores goals.
         without: what it does not get.
         about: how it was trained, for records.
+        version: fingerprint of its file; empty if it comes from none.
     """
 
     vocabulary: Vocabulary
@@ -48,6 +49,12 @@ class LearnedModel(NamedTuple):
     reader: ListenerNet
     without: Without
     about: dict[str, Any]
+    version: str = ""
+
+    @property
+    def nets(self) -> nn.ModuleDict:
+        """Its networks by the names that they have in its file."""
+        return nn.ModuleDict({"detector": self.detector, "reader": self.reader})
 
     def understand(self, task: str, text: str, pictures: Sequence[Pixels]) -> Goal:
         """Return the best goal of a task for an instruction.
@@ -70,9 +77,10 @@ class LearnedModel(NamedTuple):
                 f"This listener was not trained on {given.task}, but on "
                 f"{', '.join(self.vocabulary.tasks)}."
             )
+        goals = list(goal_schema(given.task).goals.values())
         with torch.no_grad():
             (scores,) = self.reader([hide(given, self.without)])
-        return list(goal_schema(given.task).goals.values())[int(scores.argmax())]
+        return goals[int(scores.argmax())]
 
     def see(self, pictures: Sequence[Pixels]) -> ListenerInput:
         """Return what is seen in pictures, without task and words."""
@@ -82,9 +90,12 @@ class LearnedModel(NamedTuple):
 
 def hide(given: ListenerInput, without: Without) -> ListenerInput:
     """Return an input without pictures, video or words."""
-    if without == "pictures" or (without == "video" and given.seen.looks > 1):
+    has_video = given.seen.looks > 1
+    if without == "pictures" or (without == "video" and has_video):
         return given._replace(seen=nothing_of(given.seen), pictures=())
-    return given._replace(text="") if without == "words" else given
+    if without == "words":
+        return given._replace(text="")
+    return given
 
 
 def save_model(model: LearnedModel, path: Path) -> None:
@@ -93,17 +104,12 @@ def save_model(model: LearnedModel, path: Path) -> None:
     Raises:
         InvalidValueError: the file cannot be written.
     """
-    content = {
-        "format": FORMAT,
-        "vocabulary": model.vocabulary.content,
-        "detector": model.detector.state_dict(),
-        "plane": {name: torch.from_numpy(one) for name, one in model.plane._asdict().items()},
-        "encoders": model.reader.settings,
-        "reader": model.reader.state_dict(),
-        "without": model.without,
-        "about": model.about,
+    about = {"plan": model.about, "vocabulary": model.vocabulary._asdict()}
+    plane = {
+        "matrix": torch.from_numpy(model.plane.matrix),
+        "corners": torch.from_numpy(model.plane.corners),
     }
-    save_trained(content, path)
+    save_trained("listener", about, model.nets, plane, path)
 
 
 def load_model(path: Path) -> LearnedModel:
@@ -112,13 +118,21 @@ def load_model(path: Path) -> LearnedModel:
     Raises:
         InvalidValueError: the file is none.
     """
-    return load_trained(path, "listener", FORMAT, _read)
+    return load_trained(path, "listener", _read)
 
 
-def _read(content: Mapping[str, Any]) -> LearnedModel:
-    vocabulary = Vocabulary.of(content["vocabulary"])
-    plane = TablePlane(**{name: one.numpy() for name, one in content["plane"].items()})
-    detector = DetectorNet(len(vocabulary.classes))
-    reader = ListenerNet(vocabulary, content["encoders"])
-    load_nets({"detector": detector, "reader": reader}, content)
-    return LearnedModel(vocabulary, detector, plane, reader, content["without"], content["about"])
+def _read(file: TrainedFile) -> LearnedModel:
+    plan = file.about["plan"]
+    vocabulary = Vocabulary.of(file.about["vocabulary"])
+    plane = TablePlane(file.tensors["matrix"].numpy(), file.tensors["corners"].numpy())
+    model = LearnedModel(
+        vocabulary=vocabulary,
+        detector=DetectorNet(len(vocabulary.classes)),
+        plane=plane,
+        reader=ListenerNet(vocabulary, plan["encoders"]),
+        without=plan["without"],
+        about=plan,
+        version=file.version,
+    )
+    file.load(model.nets)
+    return model

@@ -1,8 +1,11 @@
-"""A small transformer that reads words and the objects of the pictures, and scores goals."""
+"""A small transformer that reads words and the objects of the pictures, and scores goals.
+
+It scores the parts of answers, such as ``color=red``; a goal's score is the sum of its parts'.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import torch
@@ -17,7 +20,8 @@ from roboirg_learn.listener.vocabulary import (
     parts_of,
 )
 
-HEADS, LAYERS = 4, 3
+HEADS = 4
+LAYERS = 3
 
 
 class ListenerNet(nn.Module):
@@ -32,29 +36,28 @@ class ListenerNet(nn.Module):
         self, vocabulary: Vocabulary, settings: Mapping[str, Mapping[str, Any]] = USUAL_ENCODERS
     ) -> None:
         super().__init__()
-        self.settings = {name: dict(own) for name, own in settings.items()}
         self.encoders = make_encoders(vocabulary, settings)
         self._tasks = {task: place for place, task in enumerate(vocabulary.tasks)}
         self.tasks = nn.Embedding(len(vocabulary.tasks), WIDTH)
         self.encoder = transformer(WIDTH, HEADS, LAYERS)
         self.answer = nn.Linear(WIDTH, len(vocabulary.parts))
-        numbers = {part: place for place, part in enumerate(vocabulary.parts)}
-        self.goals = {
-            task: torch.stack(
-                [_marked(parts_of(answer), numbers) for answer in goal_schema(task).goals]
-            )
-            for task in vocabulary.tasks
-        }
+        self.goals = {task: _goal_parts(task, vocabulary.parts) for task in vocabulary.tasks}
 
     def forward(self, inputs: Sequence[ListenerInput]) -> list[Tensor]:
         """Return for each input the scores of its task's goals, in the order of the schema."""
-        tasks = self.tasks(torch.tensor([self._tasks[one.task] for one in inputs]))[:, None]
-        tokens = [encoder(inputs) for encoder in self.encoders.values()]
-        values = torch.cat([tasks, *(one.values for one in tokens)], 1)
-        there = torch.ones(len(inputs), 1, dtype=torch.bool)
-        hidden = ~torch.cat([there, *(one.there for one in tokens)], 1)
-        parts = self.answer(self.encoder(values, src_key_padding_mask=hidden)[:, 0])
-        return [self.goals[one.task] @ own for one, own in zip(inputs, parts, strict=True)]
+        numbers = torch.tensor([self._tasks[given.task] for given in inputs])
+        values = [self.tasks(numbers)[:, None]]
+        is_there = [torch.ones(len(inputs), 1, dtype=torch.bool)]
+        for encoder in self.encoders.values():
+            tokens = encoder(inputs)
+            values.append(tokens.values)
+            is_there.append(tokens.there)
+
+        is_padding = ~torch.cat(is_there, 1)
+        encoded = self.encoder(torch.cat(values, 1), src_key_padding_mask=is_padding)
+        parts = self.answer(encoded[:, 0])  # of the token of the task
+        goals = [self.goals[given.task] for given in inputs]
+        return [goal @ row for goal, row in zip(goals, parts, strict=True)]
 
 
 def transformer(width: int, heads: int, layers: int) -> nn.TransformerEncoder:
@@ -65,7 +68,11 @@ def transformer(width: int, heads: int, layers: int) -> nn.TransformerEncoder:
     return nn.TransformerEncoder(layer, layers, enable_nested_tensor=False)
 
 
-def _marked(parts: Iterable[str], numbers: dict[str, int]) -> Tensor:
-    found = torch.zeros(len(numbers))
-    found[[numbers[part] for part in parts]] = 1.0
+def _goal_parts(task: str, parts: Sequence[str]) -> Tensor:
+    """Return for each goal of a task 1 at each of its parts, else 0: (goals, parts)."""
+    answers = list(goal_schema(task).goals)
+    found = torch.zeros(len(answers), len(parts))
+    for row, answer in zip(found, answers, strict=True):
+        for part in parts_of(answer):
+            row[parts.index(part)] = 1.0
     return found

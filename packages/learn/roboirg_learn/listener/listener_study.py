@@ -1,9 +1,14 @@
-"""Train several listeners on the same scenes, and let each understand the test split."""
+"""Train several listeners on the same scenes, and let each understand the test split.
+
+The listeners of a study differ in what they hear or see. Words are spoken from two pools: the one
+that all were trained on, and one that is held out. A rival is an object that the words could be
+mistaken to mean.
+"""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,16 +23,17 @@ from roboirg.extension.episodes import (
     spoken,
 )
 from roboirg_learn.labeled_views import Pixels, draw_missing, look_as_played, read_views
-from roboirg_learn.listener.vocabulary import WORD_POOLS
+from roboirg_learn.listener.vocabulary import WORD_POOLS, WordPool
 
 if TYPE_CHECKING:
-    from roboirg_learn.listener.learned_model import LearnedModel
-    from roboirg_learn.listener.listener_training import TrainingPlan
+    from roboirg_learn.listener.learned_model import LearnedModel, Without
+    from roboirg_learn.listener.listener_training import SeenEpisodes, TrainingPlan
+    from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.trainer import Progress
 
 WORK = "listener-work"
 """Folder next to trained listeners for pictures, detectors and readers on the way."""
-HELD_OUT = "test"
+HELD_OUT: WordPool = "test"
 """The pool of words that no listener was trained on."""
 RIVAL = "direct-rival"
 """The setting that introduces a rival."""
@@ -39,29 +45,32 @@ class StudyVariant(NamedTuple):
     Attributes:
         name: of its file.
         title: of its row.
-        changes: of the common plan.
+        settings: that it hears; None for those of the common plan.
+        without: what it does not get.
         hears: harder settings that it hears, too, if it hears the plain ones.
     """
 
     name: str
     title: str
-    changes: Mapping[str, Any]
+    settings: tuple[str, ...] | None = None
+    without: Without = "none"
     hears: tuple[str, ...] = ()
 
     def plan(self, common: TrainingPlan) -> TrainingPlan:
         """Return how it is trained."""
-        known, changed = all_settings(), common._replace(**self.changes)
-        added = (name for name in self.hears if known[name].plain in changed.settings)
-        return changed._replace(settings=(*changed.settings, *added))
+        settings = self.settings or common.reader.settings
+        added = [name for name in self.hears if all_settings()[name].plain in settings]
+        reader = common.reader._replace(settings=(*settings, *added))
+        return common._replace(reader=reader, without=self.without)
 
 
 VARIANTS = (
-    StudyVariant("all", "all settings", {}),
-    StudyVariant("explicit", "explicit only", {"settings": ("explicit",)}),
-    StudyVariant("rivals", "all settings, rivals too", {}, (RIVAL,)),
-    StudyVariant("no-video", "without video", {"without": "video"}),
-    StudyVariant("no-pictures", "without pictures", {"without": "pictures"}),
-    StudyVariant("no-words", "without words", {"without": "words"}),
+    StudyVariant("all", "all settings"),
+    StudyVariant("explicit", "explicit only", ("explicit",)),
+    StudyVariant("rivals", "all settings, rivals too", hears=(RIVAL,)),
+    StudyVariant("no-video", "without video", without="video"),
+    StudyVariant("no-pictures", "without pictures", without="pictures"),
+    StudyVariant("no-words", "without words", without="words"),
 )
 """Trained on all settings; on explicit words only; on rivals too; without parts of the input."""
 
@@ -82,68 +91,137 @@ class StudyAnswer(NamedTuple):
     is_right: bool
 
 
+class ShownEpisode(NamedTuple):
+    """An episode with the pictures that a listener looks at."""
+
+    episode: Episode
+    pictures: list[Pixels]
+
+
 def run_study(
     plan: TrainingPlan, folder: Path, workers: int, progress: Progress
 ) -> Iterator[StudyAnswer]:
     """Train every listener of the study with every seed, and yield what it understands.
 
     The scenes are drawn once, and all listeners of a seed have the same detector. Each listener
-    becomes a file ``NAME-SEED.pt``, and its answers ``NAME-SEED.jsonl`` next to it; those that are
-    there and were made of the same plan are used again.
+    becomes a file ``NAME-SEED.safetensors``, and its answers ``NAME-SEED.jsonl`` next to it; those
+    that are there and were made of the same plan are used again.
     """
-    from roboirg_learn.listener.learned_model import load_model, save_model
-    from roboirg_learn.listener.listener_training import see_episodes, teach
     from roboirg_learn.listener.reader_training import check_reader
-    from roboirg_learn.trainer import part_of
 
-    check_reader(plan.tasks, plan.settings, plan.encoders, plan.language)
-    work = folder / WORK
-    shown: list[tuple[Episode, list[Pixels]]] = []
-    for seed in range(plan.seed, plan.seed + plan.seeds):
-        common, scenes = plan._replace(seed=seed), None
+    check_reader(plan.reader)
+    study = _Study(folder, workers, progress)
+    first_seed = plan.reader.seed
+    for seed in range(first_seed, first_seed + plan.seeds):
+        common = plan._replace(reader=plan.reader._replace(seed=seed))
+        study.begin_seed(common)
         for variant in VARIANTS:
-            own, name = variant.plan(common), f"{variant.name}-{seed}"
-            path, answers = folder / f"{name}.pt", folder / f"{name}.jsonl"
-            model = load_model(path) if path.exists() else None
-            if model is None or model.about != own.about:
-                scenes = scenes or see_episodes(common, work, workers, progress)
-                answers.unlink(missing_ok=True)
-                model = teach(scenes, own, work / f"reader-{name}.pt", part_of(progress, name))
-                save_model(model, path)
-            if not answers.exists():
-                shown = shown or _show_all(plan.tasks, work, workers, progress)
-                found = _answers(model, variant.name, own, shown)
-                text = "".join(json.dumps(one._asdict()) + "\n" for one in found)
-                write_atomically(answers, text)
-            for line in answers.read_text("utf-8").splitlines():
-                yield StudyAnswer(**json.loads(line))
+            own_plan = variant.plan(common)
+            model = study.trained(variant, own_plan)
+            yield from study.answers(variant, own_plan.reader, model)
 
 
-def _show_all(
-    tasks: Sequence[str], work: Path, workers: int, progress: Progress
-) -> list[tuple[Episode, list[Pixels]]]:
-    """Return the episodes of the test split with the pictures that a listener looks at."""
-    episodes = episodes_of(tasks, "test")
-    draw_missing(work, episodes, look_as_played, workers, partial(progress, "test pictures"))
-    return [
-        (one, [view.picture for view in read_views(work, one, pictures=True)]) for one in episodes
-    ]
+class _Study:
+    """Trains the listeners of a study, and keeps them and their answers in its folder.
+
+    Scenes are seen and drawn when a listener first needs them, which none does if all are there.
+    """
+
+    def __init__(self, folder: Path, workers: int, progress: Progress) -> None:
+        self._folder = folder
+        self._work = folder / WORK
+        self._workers = workers
+        self._progress = progress
+        self._tested: list[ShownEpisode] = []
+
+    def begin_seed(self, common: TrainingPlan) -> None:
+        """Begin the trainings with a plan's seed."""
+        self._common = common
+        self._scenes: SeenEpisodes | None = None
+
+    def trained(self, variant: StudyVariant, plan: TrainingPlan) -> LearnedModel:
+        """Return a listener: that of its file if it has the same plan, else a new one."""
+        from roboirg_learn.listener.learned_model import load_model, save_model
+        from roboirg_learn.listener.listener_training import teach
+        from roboirg_learn.trained_file import END
+        from roboirg_learn.trainer import part_of
+
+        name = f"{variant.name}-{plan.reader.seed}"
+        path = self._folder / f"{name}{END}"
+        if path.exists():
+            found = load_model(path)
+            if found.about == plan.about:
+                return found
+
+        scenes = self._seen_scenes()
+        self._answer_file(variant, plan.reader).unlink(missing_ok=True)
+        kept = self._work / f"reader-{name}.pt"
+        model = teach(scenes, plan, kept, part_of(self._progress, name))
+        save_model(model, path)
+        return model
+
+    def answers(
+        self, variant: StudyVariant, plan: ReaderPlan, model: LearnedModel
+    ) -> Iterator[StudyAnswer]:
+        """Yield the answers of a listener, which are those of its file if there is one."""
+        path = self._answer_file(variant, plan)
+        if not path.exists():
+            found = _answers(model, variant.name, plan, self._test_episodes())
+            lines = [json.dumps(answer._asdict()) + "\n" for answer in found]
+            write_atomically(path, "".join(lines))
+        for line in path.read_text("utf-8").splitlines():
+            yield StudyAnswer(**json.loads(line))
+
+    def _answer_file(self, variant: StudyVariant, plan: ReaderPlan) -> Path:
+        return self._folder / f"{variant.name}-{plan.seed}.jsonl"
+
+    def _seen_scenes(self) -> SeenEpisodes:
+        """Return what a detector of this seed sees of the scenes of training."""
+        from roboirg_learn.listener.listener_training import see_episodes
+
+        if self._scenes is None:
+            self._scenes = see_episodes(self._common, self._work, self._workers, self._progress)
+        return self._scenes
+
+    def _test_episodes(self) -> list[ShownEpisode]:
+        """Return the episodes of the test split with the pictures that a listener looks at."""
+        if not self._tested:
+            episodes = episodes_of(self._common.reader.tasks, "test")
+            show = partial(self._progress, "test pictures")
+            draw_missing(self._work, episodes, look_as_played, self._workers, show)
+            for episode in episodes:
+                views = read_views(self._work, episode, pictures=True)
+                pictures = [view.picture for view in views]
+                self._tested.append(ShownEpisode(episode, pictures))
+        return self._tested
 
 
 def _answers(
-    model: LearnedModel,
-    name: str,
-    plan: TrainingPlan,
-    shown: Sequence[tuple[Episode, list[Pixels]]],
+    model: LearnedModel, name: str, plan: ReaderPlan, shown: Sequence[ShownEpisode]
 ) -> Iterator[StudyAnswer]:
+    """Yield what a listener understands of all instructions of the episodes."""
     # Every scene has many instructions, and is looked at once.
-    seen = {episode.key: model.see(pictures) for episode, pictures in shown}
-    episodes = [episode for episode, _ in shown]
-    asked = [(setting, pool) for setting in plain_settings() for pool in WORD_POOLS]
-    for setting, pool in (*asked, (RIVAL, HELD_OUT)):
-        for episode, text in spoken(episodes, [setting], pool, plan.language):
-            task, given = episode.task, seen[episode.key]
-            goal = model.understand_seen(given._replace(task=task, text=text))
-            slots = json.loads(goal_schema(task).answers[goal])
-            is_right = goal == episode.goal
-            yield StudyAnswer(name, plan.seed, task, episode.index, setting, pool, slots, is_right)
+    seen = {scene.episode.key: model.see(scene.pictures) for scene in shown}
+    episodes = [scene.episode for scene in shown]
+    for setting, pool in _asked():
+        for episode, text in spoken(episodes, [setting], pool):
+            task = episode.task
+            goal = model.understand_seen(seen[episode.key]._replace(task=task, text=text))
+            yield StudyAnswer(
+                listener=name,
+                seed=plan.seed,
+                task=task,
+                episode=episode.index,
+                setting=setting,
+                words=pool,
+                understood=json.loads(goal_schema(task).answers[goal]),
+                is_right=goal == episode.goal,
+            )
+
+
+def _asked() -> Iterator[tuple[str, WordPool]]:
+    """Yield each setting with the pool of words in which it is spoken."""
+    for setting in plain_settings():
+        for pool in WORD_POOLS:
+            yield setting, pool
+    yield RIVAL, HELD_OUT

@@ -1,23 +1,24 @@
-"""Train a listener: the detector on labeled pictures, then the reader on instructions."""
+"""Train a listener: the detector on labeled pictures, then the reader on instructions.
+
+A listener understands what is said. Its detector finds objects in pictures, its reader chooses the
+goal that fits words and objects. The detector learns from the train split; the reader learns also
+from random scenes, whose labels stand for what the detector would find. Episodes that are held
+back show how well the training goes, and nothing is learned from them.
+"""
 
 from __future__ import annotations
 
 import random
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from pydantic import NonNegativeInt, PositiveInt
+from pydantic import PositiveInt
 
-from roboirg.extension.episodes import (
-    ENVIRONMENT_VERSION,
-    Episode,
-    episodes_of,
-    language_label,
-)
+from roboirg.extension.episodes import ENVIRONMENT_VERSION, Episode, episodes_of
 from roboirg.extension.sight import LabeledView
 from roboirg_learn.labeled_views import draw_missing, look, read_views
 from roboirg_learn.listener.detector_net import SIZE, DetectorNet, detector_loss
@@ -29,69 +30,50 @@ from roboirg_learn.listener.object_relations import (
     fit_plane,
     relate,
 )
+from roboirg_learn.listener.reader_plan import ReaderPlan
 from roboirg_learn.listener.reader_training import (
+    Lesson,
     check_reader,
     lesson_of,
     said,
     train_reader,
 )
-from roboirg_learn.listener.vocabulary import (
-    USUAL_ENCODERS,
-    ListenerInput,
-    WordPool,
-    make_vocabulary,
+from roboirg_learn.listener.vocabulary import ListenerInput, make_vocabulary
+from roboirg_learn.trainer import (
+    Course,
+    KeptTraining,
+    Progress,
+    Training,
+    batch_count,
+    batches,
 )
-from roboirg_learn.trainer import KeptTraining, Progress, Trainer, batch_count, batches
 
-RANDOM = "random"
-"""The split of which labels stand for what a detector would find."""
 DETECTOR_RATE = 1e-2
 VALIDATED = 10
-"""Episodes of each task's val split that show how training goes."""
+"""Episodes of each task's val split that are held back."""
 
 
 class TrainingPlan(NamedTuple):
     """How a listener is trained.
 
     Attributes:
-        tasks: names of tasks.
-        settings: names of settings whose instructions it hears, harder ones where they can
-            express the episode.
-        language: version of the words.
-        words: the pool of words.
-        scenes: random scenes of each task beyond the train split.
-        goals: goals of each scene with an implicit instruction.
-            In other settings only the episode's own is.
+        reader: how its reader is; also its tasks and scenes, and the seed of its detector.
         detector_epochs: passes over all pictures of the train split.
-        reader_epochs: passes over all instructions.
         without: what it does not get.
-        seed: of initial weights and order.
         seeds: in a study, how many times each listener is trained; one more from seed to seed.
-        encoders: the settings of each encoder of the reader.
     """
 
-    tasks: tuple[str, ...]
-    settings: tuple[str, ...]
-    language: int
-    words: WordPool = "train"
-    scenes: NonNegativeInt = 300
-    goals: PositiveInt = 4
+    reader: ReaderPlan
     detector_epochs: PositiveInt = 6
-    reader_epochs: PositiveInt = 6
     without: Without = "none"
-    seed: NonNegativeInt = 0
     seeds: PositiveInt = 3
-    encoders: Mapping[str, dict[str, Any]] = USUAL_ENCODERS
 
     @property
     def about(self) -> dict[str, Any]:
         """All that a listener depends on, as plain data."""
-        about = self._asdict() | {"tasks": list(self.tasks), "settings": list(self.settings)}
-        del about["seeds"], about["language"]
-        about["language_version"] = language_label(
-            self.tasks, self.words, self.language, self.settings
-        )
-        about["environment_version"] = ENVIRONMENT_VERSION
+        about = dict(self.reader.about)
+        about["detector_epochs"] = self.detector_epochs
+        about["without"] = self.without
         return about
 
 
@@ -99,9 +81,12 @@ class SeenEpisodes(NamedTuple):
     """Scenes with what a trained detector sees of them, for any number of listeners.
 
     Attributes:
+        episodes: those that readers learn from.
         held_back: episodes that show how training goes.
         seen: what is seen of each, by its key, without task and words.
         classes: of objects, in the order of their numbers.
+        detector: that has seen them.
+        plane: of the table in the pictures.
     """
 
     episodes: tuple[Episode, ...]
@@ -112,6 +97,59 @@ class SeenEpisodes(NamedTuple):
     plane: TablePlane
 
 
+class TrainingSplits(NamedTuple):
+    """The episodes of a training: of the train split, random scenes, and those held back."""
+
+    train: tuple[Episode, ...]
+    random: tuple[Episode, ...]
+    held_back: tuple[Episode, ...]
+
+    @classmethod
+    def of(cls, plan: ReaderPlan) -> TrainingSplits:
+        """Return the episodes of a plan."""
+        return cls(
+            episodes_of(plan.tasks, "train"),
+            episodes_of(plan.tasks, "random", plan.scenes),
+            episodes_of(plan.tasks, "val", VALIDATED),
+        )
+
+    @property
+    def learned(self) -> tuple[Episode, ...]:
+        """The episodes that readers learn from."""
+        return (*self.train, *self.random)
+
+
+ViewsByKey = Mapping[str, tuple[LabeledView, ...]]
+"""The labeled pictures of episodes, by the key of each."""
+
+
+class LabeledEpisodes(NamedTuple):
+    """All pictures of a training with their labels.
+
+    Attributes:
+        train: of the train split.
+        random: of random scenes; without the pictures themselves, unless an encoder reads them.
+        held_back: of the episodes that show how training goes.
+    """
+
+    train: ViewsByKey
+    random: ViewsByKey
+    held_back: ViewsByKey
+
+    @property
+    def by_key(self) -> ViewsByKey:
+        """The views of all episodes."""
+        return {**self.train, **self.random, **self.held_back}
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """The classes of all objects, in the order of their numbers."""
+        found: set[str] = set()
+        for view in _views_in(self.by_key):
+            found.update(view.names)
+        return tuple(sorted(found))
+
+
 def train_listener(
     plan: TrainingPlan, folder: Path, name: str, workers: int, progress: Progress
 ) -> LearnedModel:
@@ -120,9 +158,9 @@ def train_listener(
     Pictures, the detector and the reader on the way stay in the folder, and are used again as far
     as they fit. The name is the listener's among those of the folder.
     """
-    check_reader(plan.tasks, plan.settings, plan.encoders, plan.language)
+    check_reader(plan.reader)
     scenes = see_episodes(plan, folder, workers, progress)
-    return teach(scenes, plan, folder / f"reader-{name}-{plan.seed}.pt", progress)
+    return teach(scenes, plan, folder / f"reader-{name}-{plan.reader.seed}.pt", progress)
 
 
 def see_episodes(
@@ -132,100 +170,147 @@ def see_episodes(
 
     Of random scenes the labels stand for what the detector would find.
     """
-    episodes = (
-        *episodes_of(plan.tasks, "train"),
-        *episodes_of(plan.tasks, "random", plan.scenes),
+    splits = TrainingSplits.of(plan.reader)
+    every_episode = (*splits.learned, *splits.held_back)
+    draw_missing(folder, every_episode, look, workers, partial(progress, "pictures"))
+
+    needs_pixels = _needs_pixels(plan)
+    labeled = LabeledEpisodes(
+        _read_each(folder, splits.train, pictures=True),
+        _read_each(folder, splits.random, pictures=needs_pixels),
+        _read_each(folder, splits.held_back, pictures=True),
     )
-    held_back = episodes_of(plan.tasks, "val", VALIDATED)
-    every = (*episodes, *held_back)
-    draw_missing(folder, every, look, workers, partial(progress, "pictures"))
-    pixels = any(ENCODERS[name].reads_pixels for name in plan.encoders)
-    views = {
-        one.key: read_views(folder, one, pictures=pixels or one.split != RANDOM) for one in every
-    }
-    labeled = [view for own in views.values() for view in own]
-    classes = tuple(sorted({name for view in labeled for name in view.names}))
-    plane = fit_plane(
-        np.concatenate([view.centers for view in labeled]) / SIZE,
-        np.concatenate([view.positions for view in labeled]),
-    )
-    shown, unseen = (
-        [view for one in own if one.split != RANDOM for view in views[one.key]]
-        for own in (episodes, held_back)
-    )
-    detector = _train_detector(shown, unseen, classes, plan, folder, progress)
+    plane = _plane_of(labeled)
+    detector = _trained_detector(labeled, plan, folder, progress)
+    seen = _see_each(labeled, detector, plane, keeps_pictures=needs_pixels)
+    return SeenEpisodes(splits.learned, splits.held_back, seen, labeled.classes, detector, plane)
+
+
+def _trained_detector(
+    labeled: LabeledEpisodes, plan: TrainingPlan, folder: Path, progress: Progress
+) -> DetectorNet:
+    """Return a detector that has learned; its file after each pass stays in the folder."""
+    course = DetectorCourse(labeled, plan)
+    kept = KeptTraining(folder / f"detector-{plan.reader.seed}.pt", course.made_of)
+    Training(course).run(partial(progress, "detector"), kept)
+    return course.net
+
+
+def _needs_pixels(plan: TrainingPlan) -> bool:
+    """Return whether an encoder of the reader reads the pictures themselves."""
+    return any(ENCODERS[name].reads_pixels for name in plan.reader.encoders)
+
+
+def _read_each(folder: Path, episodes: Iterable[Episode], *, pictures: bool) -> ViewsByKey:
+    """Return the views of episodes, or only their labels."""
+    return {episode.key: read_views(folder, episode, pictures=pictures) for episode in episodes}
+
+
+def _views_in(views_by_key: ViewsByKey) -> list[LabeledView]:
+    """Return the views of all episodes in one list."""
+    found: list[LabeledView] = []
+    for views in views_by_key.values():
+        found += views
+    return found
+
+
+def _plane_of(labeled: LabeledEpisodes) -> TablePlane:
+    """Return where on the table the points of pictures are, learned from all labels."""
+    views = _views_in(labeled.by_key)
+    centers = np.concatenate([view.centers for view in views])
+    positions = np.concatenate([view.positions for view in views])
+    return fit_plane(centers / SIZE, positions)
+
+
+def _see_each(
+    labeled: LabeledEpisodes, detector: DetectorNet, plane: TablePlane, *, keeps_pictures: bool
+) -> dict[str, ListenerInput]:
+    """Return what is seen of each episode, by its key, without task and words."""
+    classes = labeled.classes
     seen = {}
-    for one in every:
-        own, pictures = views[one.key], tuple(view.picture for view in views[one.key])
-        found = _labels(own, classes) if one.split == RANDOM else detector.find(pictures)
-        given = ListenerInput("", "", relate(found, plane, classes), pictures if pixels else ())
-        seen[one.key] = given
-    return SeenEpisodes(episodes, held_back, seen, classes, detector, plane)
+    for key, views in labeled.by_key.items():
+        pictures = tuple(view.picture for view in views)
+        found = _labels(views, classes) if key in labeled.random else detector.find(pictures)
+        objects = relate(found, plane, classes)
+        seen[key] = ListenerInput("", "", objects, pictures if keeps_pictures else ())
+    return seen
 
 
 def teach(scenes: SeenEpisodes, plan: TrainingPlan, kept: Path, progress: Progress) -> LearnedModel:
     """Return a listener that has learned to read; `kept` is its file after each pass."""
-    torch.manual_seed(plan.seed)
-    told, asked = (
-        [
-            (episode, scenes.seen[episode.key]._replace(task=episode.task, text=text))
-            for episode, text in said(
-                own, plan.settings, plan.words, goals, plan.seed, plan.language
-            )
-        ]
-        for own, goals in ((scenes.episodes, plan.goals), (scenes.held_back, 1))
-    )
-    vocabulary = make_vocabulary((given.text for _, given in told), scenes.classes, plan.tasks)
-    lessons, held_back = (
-        [lesson_of(hide(given, plan.without), episode) for episode, given in own]
-        for own in (told, asked)
-    )
+    reader_plan = plan.reader
+    torch.manual_seed(reader_plan.seed)
+    lessons = _lessons(scenes.episodes, scenes.seen, reader_plan)
+    held_back = _lessons(scenes.held_back, scenes.seen, reader_plan._replace(goals=1))
+    texts = (lesson.given.text for lesson in lessons)
+    vocabulary = make_vocabulary(texts, scenes.classes, reader_plan.tasks)
+
     reader = train_reader(
-        lessons, vocabulary, plan.reader_epochs, plan.seed, progress, plan.encoders,
-        KeptTraining(kept, plan.about), held_back,
-    )  # fmt: skip
+        _hidden(lessons, plan.without),
+        vocabulary,
+        reader_plan,
+        progress,
+        KeptTraining(kept, plan.about),
+        _hidden(held_back, plan.without),
+    )
     return LearnedModel(vocabulary, scenes.detector, scenes.plane, reader, plan.without, plan.about)
 
 
-def _labels(views: Sequence[LabeledView], classes: Sequence[str]) -> list[SeenObjects]:
+def _lessons(
+    episodes: Sequence[Episode], seen: Mapping[str, ListenerInput], plan: ReaderPlan
+) -> list[Lesson]:
+    """Return what is said of episodes, with what is seen of them and the goals that are meant."""
+    lessons = []
+    for episode, text in said(episodes, plan):
+        given = seen[episode.key]._replace(task=episode.task, text=text)
+        lessons.append(lesson_of(given, episode))
+    return lessons
+
+
+def _hidden(lessons: Iterable[Lesson], without: Without) -> list[Lesson]:
+    """Return lessons without what the listener does not get."""
+    return [lesson._replace(given=hide(lesson.given, without)) for lesson in lessons]
+
+
+def _labels(views: Iterable[LabeledView], classes: Sequence[str]) -> list[SeenObjects]:
+    """Return labels as if the detector had found them."""
     numbers = {name: number for number, name in enumerate(classes)}
-    return [
-        SeenObjects(
-            np.array([numbers[name] for name in view.names], np.int64),
-            view.centers / np.float32(SIZE),
-        )
-        for view in views
-    ]
+    found = []
+    for view in views:
+        kinds = np.array([numbers[name] for name in view.names], np.int64)
+        found.append(SeenObjects(kinds, view.centers / np.float32(SIZE)))
+    return found
 
 
-def _train_detector(
-    shown: Sequence[LabeledView],
-    held_back: Sequence[LabeledView],
-    classes: Sequence[str],
-    plan: TrainingPlan,
-    folder: Path,
-    progress: Progress,
-) -> DetectorNet:
-    torch.manual_seed(plan.seed)
-    detector, epochs = DetectorNet(len(classes)), plan.detector_epochs
-    trainer = Trainer[LabeledView](
-        detector,
-        lambda batch: detector_loss(detector, batch, classes),
-        DETECTOR_RATE,
-        epochs * batch_count(shown),
-    )
+class DetectorCourse(Course[LabeledView]):
+    """A detector learns the labels of the train split."""
 
-    def score() -> dict[str, float]:
-        groups = list(batches(held_back, random.Random(0)))
-        losses = [float(detector_loss(detector, one, classes)) for one in groups]
+    net: DetectorNet
+    rate = DETECTOR_RATE
+
+    def __init__(self, labeled: LabeledEpisodes, plan: TrainingPlan) -> None:
+        torch.manual_seed(plan.reader.seed)
+        self._plan = plan
+        self._classes = labeled.classes
+        self._learned = _views_in(labeled.train)
+        self._held_back = _views_in(labeled.held_back)
+        self.net = DetectorNet(len(self._classes))
+        self.epochs = plan.detector_epochs
+        self.steps = batch_count(self._learned)
+
+    @property
+    def made_of(self) -> list[object]:
+        """All that the detector depends on, apart from the seed."""
+        tasks = list(self._plan.reader.tasks)
+        return [tasks, list(self._classes), self.epochs, ENVIRONMENT_VERSION]
+
+    def batches(self, epoch: int) -> Iterator[list[LabeledView]]:
+        return batches(self._learned, random.Random(f"{self._plan.reader.seed}/{epoch}"))
+
+    def loss(self, batch: Sequence[LabeledView]) -> torch.Tensor:
+        return detector_loss(self.net, batch, self._classes)
+
+    def score(self) -> dict[str, float]:
+        groups = batches(self._held_back, random.Random(0))
+        losses = [float(self.loss(group)) for group in groups]
         return {"held back": sum(losses) / len(losses)}
-
-    made_of = [list(plan.tasks), list(classes), epochs, ENVIRONMENT_VERSION]
-    trainer.learn(
-        epochs,
-        lambda number: batches(shown, random.Random(f"{plan.seed}/{number}")),
-        partial(progress, "detector"),
-        KeptTraining(folder / f"detector-{plan.seed}.pt", made_of),
-        score,
-    )
-    return detector

@@ -2,6 +2,9 @@
 
 Words such as *the cube second closest to the button* name a rank. Each object has its ranks
 itself, so that a small network need not count and compare places.
+
+A landmark is what objects of a kind are ordered by: two directions, the robot, the corners of the
+area where objects stand, and every object. The first and the last few have a rank there.
 """
 
 from __future__ import annotations
@@ -19,7 +22,8 @@ VIEWS = 2
 _RANKS = 3
 """How many of the first and of the last have a rank."""
 _CODES = 2 * _RANKS
-_FIXED = 7
+"""Ranks at one landmark: of the first, then of the last."""
+_FIXED_LANDMARKS = 7
 """To the robot's left, forward, distance from the robot, and distance from each corner."""
 
 Points = NDArray[np.float64]
@@ -77,27 +81,28 @@ def fit_plane(places: NDArray[np.floating], positions: NDArray[np.floating]) -> 
 
     The least squares of the equations of a homography, whose last coefficient is 1.
     """
-    columns, ones, zeros = places.T, np.ones(len(places)), np.zeros(len(places))
-    rows = []
-    for axis in range(2):
-        own = [*columns, ones]
-        other = [zeros] * 3
-        shared = [-column * positions[:, axis] for column in columns]
-        rows.append(np.column_stack([*(own + other if axis == 0 else other + own), *shared]))
-    found = np.linalg.lstsq(np.vstack(rows), positions.T.reshape(-1), rcond=None)[0]
-    return TablePlane(np.append(found, 1.0).reshape(3, 3), corners_of(positions))
+    count = len(places)
+    columns = np.column_stack([places, np.ones(count)])
+    nothing = np.zeros_like(columns)
+    x = positions[:, :1]
+    y = positions[:, 1:]
+    of_x = np.hstack([columns, nothing, -places * x])
+    of_y = np.hstack([nothing, columns, -places * y])
+    unknowns = np.linalg.lstsq(np.vstack([of_x, of_y]), positions.T.reshape(-1), rcond=None)[0]
+    matrix = np.append(unknowns, 1.0).reshape(3, 3)
+    return TablePlane(matrix, corners_of(positions))
 
 
 def corners_of(positions: NDArray[np.floating]) -> Points:
     """Return the corners (4, 2) of the area in which positions (n, 2) lie."""
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    corners = [(x, y) for x in (low[0], high[0]) for y in (low[1], high[1])]
-    return np.array(corners, np.float64)
+    left, near = positions.min(axis=0)
+    right, far = positions.max(axis=0)
+    return np.array([(left, near), (left, far), (right, near), (right, far)], np.float64)
 
 
 def relation_count(classes: int) -> int:
     """Return the number of ranks for `classes` classes of objects."""
-    return (_FIXED + VIEWS * classes) * _CODES
+    return (_FIXED_LANDMARKS + VIEWS * classes) * _CODES
 
 
 def relate(
@@ -126,51 +131,80 @@ def rank(
         corners: (4, 2) of the area where objects stand, m.
         classes: names of classes; the first word of each is its kind.
     """
-    kinds = np.concatenate(list(views))
-    where = np.repeat(np.arange(len(views)), [len(view) for view in views])
-    relations = np.zeros((len(kinds), relation_count(len(classes))), np.uint8)
-    names = np.array([name.split()[0] for name in classes])[kinds]
-    groups = {(view, name) for view, name in zip(where, names, strict=True)}
-    for view, name in groups:
-        members = np.flatnonzero((where == view) & (names == name))
-        for landmark, others, values in _orders(members, kinds, where, positions, corners, classes):
-            _note_ranks(relations, landmark, others, values)
-    return ObjectsInView(kinds, where, positions.astype(np.float32), relations, len(views))
+    view_numbers = np.repeat(np.arange(len(views)), [len(kinds) for kinds in views])
+    scene = _Scene(np.concatenate(list(views)), view_numbers, positions, corners, len(classes))
+    relations = np.zeros((len(positions), relation_count(len(classes))), np.uint8)
+    for members in _groups(scene, classes):
+        for order in _orders(members, scene):
+            _note_ranks(relations, order)
+    stored_positions = positions.astype(np.float32)
+    return ObjectsInView(scene.kinds, view_numbers, stored_positions, relations, len(views))
 
 
 def nothing_of(seen: ObjectsInView) -> ObjectsInView:
     """Return what is seen of a scene that is not looked at."""
-    kinds, views, positions, relations, _ = seen
-    return ObjectsInView(kinds[:0], views[:0], positions[:0], relations[:0], looks=0)
+    return ObjectsInView(
+        seen.kinds[:0], seen.views[:0], seen.positions[:0], seen.relations[:0], looks=0
+    )
 
 
-def _orders(
-    members: NDArray[np.int64],
-    kinds: NDArray[np.int64],
-    where: NDArray[np.int64],
-    positions: Points,
-    corners: Points,
-    classes: Sequence[str],
-) -> Iterator[tuple[int, NDArray[np.int64], Points]]:
-    """Yield landmarks, with objects of a kind and the value by which the landmark orders them."""
-    own = positions[members]
-    points = np.vstack([np.array([ROBOT_BASE[:2]]), corners])
-    distances = np.linalg.norm(own[:, None] - points[None], axis=2)
-    for landmark, values in enumerate([-own[:, 1], own[:, 0], *distances.T]):
-        yield landmark, members, values
-    for other, (kind, view) in enumerate(zip(kinds, where, strict=True)):
+class _Scene(NamedTuple):
+    """All objects of the pictures of a scene; fields as in `ObjectsInView` and `TablePlane`."""
+
+    kinds: NDArray[np.int64]
+    views: NDArray[np.int64]
+    positions: Points
+    corners: Points
+    class_count: int
+
+
+def _groups(scene: _Scene, classes: Sequence[str]) -> Iterator[NDArray[np.int64]]:
+    """Yield the numbers of the objects of each kind in each picture.
+
+    The kind is the first word of the class: a red and a blue cube are both cubes.
+    """
+    first_words = np.array([name.split()[0] for name in classes])
+    names = first_words[scene.kinds]
+    for view in set(scene.views.tolist()):
+        is_in_view = scene.views == view
+        for name in set(names[is_in_view].tolist()):
+            yield np.flatnonzero(is_in_view & (names == name))
+
+
+class _Order(NamedTuple):
+    """Objects with the value by which a landmark, given by its number, orders them."""
+
+    landmark: int
+    objects: NDArray[np.int64]
+    values: Points
+
+
+def _orders(members: NDArray[np.int64], scene: _Scene) -> Iterator[_Order]:
+    """Yield the orders of objects of one kind at every landmark."""
+    positions = scene.positions[members]
+    yield _Order(0, members, -positions[:, 1])
+    yield _Order(1, members, positions[:, 0])
+    points = np.vstack([[ROBOT_BASE[:2]], scene.corners])
+    for number, point in enumerate(points, start=2):
+        yield _Order(number, members, _distances(positions, point))
+
+    for other, position in enumerate(scene.positions):
         rest = members[members != other]
-        landmark = _FIXED + int(view) * len(classes) + int(kind)
-        yield landmark, rest, np.linalg.norm(positions[rest] - positions[other], axis=1)
+        of_view = int(scene.views[other]) * scene.class_count
+        landmark = _FIXED_LANDMARKS + of_view + int(scene.kinds[other])
+        yield _Order(landmark, rest, _distances(scene.positions[rest], position))
 
 
-def _note_ranks(
-    relations: NDArray[np.uint8], landmark: int, others: NDArray[np.int64], values: Points
-) -> None:
-    """Mark in `relations` which objects have the least and the greatest values at a landmark."""
-    order = others[np.argsort(values, kind="stable")]
-    first = landmark * _CODES
-    for number, (least, most) in enumerate(zip(order, order[::-1], strict=True)):
-        if number == _RANKS:
-            break
-        relations[least, first + number] = relations[most, first + _RANKS + number] = 1
+def _distances(positions: Points, point: Points) -> Points:
+    """Return how far positions (n, 2) are from a point."""
+    return np.asarray(np.linalg.norm(positions - point, axis=1), np.float64)
+
+
+def _note_ranks(relations: NDArray[np.uint8], order: _Order) -> None:
+    """Mark in `relations` the objects with the least and the greatest values at a landmark."""
+    sorted_objects = order.objects[np.argsort(order.values, kind="stable")]
+    column = order.landmark * _CODES
+    for rank_number, least in enumerate(sorted_objects[:_RANKS]):
+        relations[least, column + rank_number] = 1
+    for rank_number, greatest in enumerate(sorted_objects[::-1][:_RANKS]):
+        relations[greatest, column + _RANKS + rank_number] = 1

@@ -1,11 +1,15 @@
-"""Train the reader: instructions with what is seen, and the goals that they mean."""
+"""Train the reader: instructions with what is seen, and the goals that they mean.
+
+A lesson is one instruction with what is seen and the goal that is meant. Lessons are held back to
+show how well the training goes.
+"""
 
 from __future__ import annotations
 
 import random
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import torch
 from torch.nn import functional
@@ -22,44 +26,35 @@ from roboirg.extension.episodes import (
 )
 from roboirg_learn.listener.encoders import make_encoders
 from roboirg_learn.listener.listener_net import ListenerNet
+from roboirg_learn.listener.reader_plan import ReaderPlan
 from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary, make_vocabulary
 from roboirg_learn.trainer import (
+    Course,
     KeptTraining,
     Progress,
-    Trainer,
+    Training,
     batch_count,
     even_batches,
-)  # fmt: skip
+)
 
 READER_RATE = 1e-3
 FORGOTTEN_WORDS = 0.05
 """Share of the words that are unknown in training, so that new ones do no harm."""
 
 
-def said(
-    episodes: Sequence[Episode],
-    settings: Sequence[str],
-    words: str,
-    goals: int,
-    seed: int,
-    language: int,
-) -> Iterator[tuple[Episode, str]]:
-    """Yield the instructions of episodes, and of more goals of each scene.
-
-    Args:
-        episodes: the episodes.
-        settings: names; harder ones are left out where they cannot express an episode.
-        words: the pool of words.
-        goals: of each scene with an implicit instruction, which hangs on what is there and on what
-            was said before; explicit and harder settings have the scene's own only.
-        seed: draws the goals.
-        language: version of the words.
-    """
+def said(episodes: Sequence[Episode], plan: ReaderPlan) -> Iterator[tuple[Episode, str]]:
+    """Yield the instructions of episodes, and of more goals of each scene, as a plan has them."""
     known = all_settings()
-    of_one = [name for name in settings if name == "explicit" or known[name].plain is not None]
-    of_more = [name for name in settings if name not in of_one]
-    yield from spoken(episodes, of_one, words, language)
-    yield from spoken(list(with_more_goals(episodes, goals, seed)), of_more, words, language)
+    for_own_goal = []
+    for_every_goal = []
+    for name in plan.settings:
+        if name == "explicit" or known[name].plain is not None:
+            for_own_goal.append(name)
+        else:
+            for_every_goal.append(name)
+    yield from spoken(episodes, for_own_goal, plan.words)
+    more = list(with_more_goals(episodes, plan.goals, plan.seed))
+    yield from spoken(more, for_every_goal, plan.words)
 
 
 def with_more_goals(episodes: Iterable[Episode], goals: int, seed: int) -> Iterator[Episode]:
@@ -67,27 +62,26 @@ def with_more_goals(episodes: Iterable[Episode], goals: int, seed: int) -> Itera
     rng = random.Random(seed)
     for episode in episodes:
         yield episode
-        every = goals_of(episode)
-        others = [goal for goal in every if goal != episode.goal]
-        for goal in rng.sample(others, min(goals - 1, len(others))):
+        others = [goal for goal in goals_of(episode) if goal != episode.goal]
+        count = min(goals - 1, len(others))
+        for goal in rng.sample(others, count):
             yield with_goal(episode, goal)
 
 
-def check_reader(
-    tasks: Sequence[str],
-    settings: Sequence[str],
-    encoders: Mapping[str, Mapping[str, Any]],
-    language: int,
-) -> None:
+def check_reader(plan: ReaderPlan) -> None:
     """Raise early what would else be raised after pictures are drawn, or never."""
-    plain = spoken(episodes_of(tasks, "train", 1), ["explicit"], "train", language)
-    if silent := {*tasks} - {episode.task for episode, _ in plain}:
+    tasks = plan.tasks
+    plain = spoken(episodes_of(tasks, "train", 1), ["explicit"], "train")
+    with_words = {episode.task for episode, _ in plain}
+    without_words = sorted(set(tasks) - with_words)
+    if without_words:
         raise InvalidValueError(
-            f"Language {language} has no words for {', '.join(sorted(silent))}; name other tasks."
+            f"There are no words of {', '.join(without_words)}; name other tasks."
         )
-    if settings and not any(spoken(episodes_of(tasks, "train", 10), settings, "train", language)):
-        raise InvalidValueError(f"None of these tasks has the setting {', '.join(settings)}.")
-    make_encoders(make_vocabulary(["a"], ["cube"], tasks), encoders)
+    instructions = spoken(episodes_of(tasks, "train", 10), plan.settings, "train")
+    if plan.settings and not any(instructions):
+        raise InvalidValueError(f"None of these tasks has the setting {', '.join(plan.settings)}.")
+    make_encoders(make_vocabulary(["a"], ["cube"], tasks), plan.encoders)
 
 
 class Lesson(NamedTuple):
@@ -100,16 +94,15 @@ class Lesson(NamedTuple):
 def lesson_of(given: ListenerInput, episode: Episode) -> Lesson:
     """Return an instruction with its goal, the episode's own."""
     schema = goal_schema(episode.task)
-    return Lesson(given, list(schema.goals).index(schema.answers[episode.goal]))
+    answers = list(schema.goals)
+    return Lesson(given, answers.index(schema.answers[episode.goal]))
 
 
 def train_reader(
     lessons: Sequence[Lesson],
     vocabulary: Vocabulary,
-    epochs: int,
-    seed: int,
+    plan: ReaderPlan,
     progress: Progress,
-    encoders: Mapping[str, Mapping[str, Any]],
     kept: KeptTraining,
     held_back: Sequence[Lesson] = (),
 ) -> ListenerNet:
@@ -118,52 +111,73 @@ def train_reader(
     Args:
         lessons: the instructions.
         vocabulary: what it can name.
-        epochs: passes over all of them.
-        seed: of their order.
+        plan: its passes, seed and encoders.
         progress: called after each pass.
-        encoders: by name, with their settings.
         kept: where the training is kept.
         held_back: what shows how training goes.
     """
-    reader = ListenerNet(vocabulary, encoders)
-    trainer = Trainer[Lesson](
-        reader,
-        lambda batch: _reader_loss(reader, batch),
-        READER_RATE,
-        epochs * batch_count(lessons),
-    )
-
-    def mixed(number: int) -> Iterator[list[Lesson]]:
-        rng = random.Random(f"{seed}/{number}")
-        return even_batches([_forget(one, rng) for one in lessons], rng, _length)
-
-    def score() -> dict[str, float]:
-        right = [
-            int(scores.argmax()) == one.goal
-            for batch in even_batches(held_back, random.Random(0), _length)
-            for scores, one in zip(reader([one.given for one in batch]), batch, strict=True)
-        ]
-        return {"held back right": sum(right) / len(right)} if right else {}
-
-    trainer.learn(epochs, mixed, partial(progress, "reader"), kept, score)
-    return reader
+    course = ReaderCourse(lessons, vocabulary, plan, held_back)
+    Training(course).run(partial(progress, "reader"), kept)
+    return course.net
 
 
-def _forget(lesson: Lesson, rng: random.Random) -> Lesson:
-    """Return a lesson in which some words have become unknown ones."""
-    words = lesson.given.text.split()
-    kept = ["…" if rng.random() < FORGOTTEN_WORDS else word for word in words]
-    return lesson._replace(given=lesson.given._replace(text=" ".join(kept)))
+class ReaderCourse(Course[Lesson]):
+    """A reader learns which goals instructions mean; arguments as of `train_reader`."""
+
+    net: ListenerNet
+    rate = READER_RATE
+
+    def __init__(
+        self,
+        lessons: Sequence[Lesson],
+        vocabulary: Vocabulary,
+        plan: ReaderPlan,
+        held_back: Sequence[Lesson],
+    ) -> None:
+        self._lessons = lessons
+        self._held_back = held_back
+        self._seed = plan.seed
+        self.net = ListenerNet(vocabulary, plan.encoders)
+        self.epochs = plan.reader_epochs
+        self.steps = batch_count(lessons)
+
+    def batches(self, epoch: int) -> Iterator[list[Lesson]]:
+        rng = random.Random(f"{self._seed}/{epoch}")
+        lessons = [_with_unknown_words(lesson, rng) for lesson in self._lessons]
+        return even_batches(lessons, rng, _length)
+
+    def loss(self, batch: Sequence[Lesson]) -> torch.Tensor:
+        losses = []
+        for lesson, scores in self._scored(batch):
+            goal = torch.tensor([lesson.goal])
+            losses.append(functional.cross_entropy(scores[None], goal))
+        return torch.stack(losses).mean()
+
+    def score(self) -> dict[str, float]:
+        if not self._held_back:
+            return {}
+        right = 0
+        for batch in even_batches(self._held_back, random.Random(0), _length):
+            for lesson, scores in self._scored(batch):
+                right += int(scores.argmax()) == lesson.goal
+        return {"held back right": right / len(self._held_back)}
+
+    def _scored(self, batch: Sequence[Lesson]) -> Iterator[tuple[Lesson, torch.Tensor]]:
+        """Yield each lesson with the scores of its task's goals."""
+        scores = self.net([lesson.given for lesson in batch])
+        return zip(batch, scores, strict=True)
 
 
-def _reader_loss(net: ListenerNet, batch: Sequence[Lesson]) -> torch.Tensor:
-    scores = net([one.given for one in batch])
-    losses = [
-        functional.cross_entropy(own[None], torch.tensor([one.goal]))
-        for own, one in zip(scores, batch, strict=True)
-    ]
-    return torch.stack(losses).mean()
+def _with_unknown_words(lesson: Lesson, rng: random.Random) -> Lesson:
+    """Return a lesson in which some words have become unknown ones, written "…"."""
+    words = []
+    for word in lesson.given.text.split():
+        is_forgotten = rng.random() < FORGOTTEN_WORDS
+        words.append("…" if is_forgotten else word)
+    given = lesson.given._replace(text=" ".join(words))
+    return lesson._replace(given=given)
 
 
 def _length(lesson: Lesson) -> int:
+    """Return about how many words are said, so that batches are even."""
     return lesson.given.text.count(" ")

@@ -16,12 +16,22 @@ from roboirg.extension.episodes import all_settings
 from roboirg.extension.pages import markdown_table, without_spread
 from roboirg_learn.listener.listener_study import HELD_OUT, RIVAL, VARIANTS, StudyAnswer
 
+
+class _Section(NamedTuple):
+    """A table of the page: its title, the pool of words, and whether there is a rival."""
+
+    title: str
+    pool: str
+    has_rival: bool
+
+
 _SECTIONS = (
-    ("Held-out words", HELD_OUT, False),
-    ("Words of the training pool", "train", False),
-    ("Held-out words with rivals", HELD_OUT, True),
+    _Section("Held-out words", HELD_OUT, has_rival=False),
+    _Section("Words of the training pool", "train", has_rival=False),
+    _Section("Held-out words with rivals", HELD_OUT, has_rival=True),
 )
-"""The title of each section, and its words: of which pool, and whether with a rival."""
+_NOTHING = "–"
+"""In the place of a rate that there is not."""
 _NOTE = (
     "Right answers in percent, with the 95 % interval over trainings and scenes: means over tasks "
     "and {}, implicit form, test split."
@@ -29,8 +39,16 @@ _NOTE = (
 
 Verdicts = NDArray[np.float64]
 """Of one task: 1 where an answer is right, else 0; shape (training seeds, episodes)."""
-ListenerCell = tuple[str, str, str]
-"""Listener, pool of words, setting."""
+UPPER_END = 0.975
+"""Quantile of the upper end of a 95 % interval."""
+
+
+class ListenerCell(NamedTuple):
+    """A cell of the study: a listener, a pool of words, and a setting."""
+
+    listener: str
+    pool: str
+    setting: str
 
 
 class TrainedRate(NamedTuple):
@@ -48,26 +66,53 @@ def trained_rate(tasks: Sequence[Verdicts]) -> TrainedRate:
     that between scenes within tasks. It is Student's with Satterthwaite's degrees of freedom, so
     that few trainings that differ make it long; with a single one it is over scenes only.
     """
-    by_seed = np.mean([one.mean(axis=1) for one in tasks], axis=0)
-    rate, seeds, sizes = float(by_seed.mean()), len(by_seed), [one.shape[1] for one in tasks]
-    trainings = float(by_seed.var(ddof=1)) / seeds if seeds > 1 else 0.0
-    apart = [float(one.mean(axis=0).var()) / max(1, one.shape[1] - 1) for one in tasks]
-    scenes = sum(apart) / len(tasks) ** 2
-    interval: tuple[float, float] = without_spread(rate, sum(sizes))
-    if variance := trainings + scenes:
+    by_seed = np.mean([verdicts.mean(axis=1) for verdicts in tasks], axis=0)
+    rate = float(by_seed.mean())
+    apart = _variance_of_mean(tasks, by_seed)
+    count = sum(verdicts.shape[1] for verdicts in tasks)
+    if not apart.total:
+        interval: tuple[float, float] = without_spread(rate, count)
+    else:
         from scipy import special  # SciPy's statistics take a second to import
 
-        parts = trainings**2 / max(1, seeds - 1) + scenes**2 / max(1, sum(sizes) - len(sizes))
-        half = float(special.stdtrit(variance**2 / parts, 0.975)) * math.sqrt(variance)
+        quantile = float(special.stdtrit(apart.freedom, UPPER_END))
+        half = quantile * math.sqrt(apart.total)
         interval = max(0.0, rate - half), min(1.0, rate + half)
     return TrainedRate(rate, interval, tuple(by_seed.tolist()))
+
+
+class _Variance(NamedTuple):
+    """The variance of a mean, with Satterthwaite's degrees of freedom; 0 where it is 0."""
+
+    total: float
+    freedom: float
+
+
+def _variance_of_mean(tasks: Sequence[Verdicts], by_seed: Verdicts) -> _Variance:
+    """Return the variance between trainings and between scenes, added."""
+    seeds = len(by_seed)
+    trainings = float(by_seed.var(ddof=1)) / seeds if seeds > 1 else 0.0
+    scenes = 0.0
+    count = 0
+    for verdicts in tasks:
+        episodes = verdicts.shape[1]
+        scenes += float(verdicts.mean(axis=0).var()) / max(1, episodes - 1)
+        count += episodes
+    scenes /= len(tasks) ** 2
+
+    total = trainings + scenes
+    if not total:
+        return _Variance(0.0, 0.0)
+    of_trainings = trainings**2 / max(1, seeds - 1)
+    of_scenes = scenes**2 / max(1, count - len(tasks))
+    return _Variance(total, total**2 / (of_trainings + of_scenes))
 
 
 def write_study(answers: Iterable[StudyAnswer], about: Mapping[str, Any], folder: Path) -> Path:
     """Write the page of a study, and return its path."""
     trained = ", ".join(f"{name} {value}" for name, value in about.items())
     parts = ["# What a listener learns", f"Trained with: {trained}."]
-    parts += [tables_text(study_rates(answers))]
+    parts.append(tables_text(study_rates(answers)))
     parts.append("Every answer: NAME-SEED.jsonl.")
     page = folder / "study.md"
     write_atomically(page, "\n\n".join(parts) + "\n")
@@ -81,44 +126,65 @@ def study_rates(answers: Iterable[StudyAnswer]) -> dict[ListenerCell, TrainedRat
 
 def tables_text(found: Mapping[ListenerCell, TrainedRate]) -> str:
     """Return a table for each kind of words as Markdown."""
-    seeds = max(len(one.by_seed) for one in found.values())
-    note = _NOTE.format(f"{seeds} training seed{'s' * (seeds > 1)}")
-    shown = []
-    for title, pool, has_rival in _SECTIONS:
-        asked = {setting for _, words, setting in found if words == pool}
-        names = [one for one in all_settings() if one in asked and (one == RIVAL) == has_rival]
-        if names:
-            shown.append(
-                markdown_table(
-                    title, names, _rows(found, pool, names), (note,), heads=("listener", "")
-                )
-            )
-    return "\n\n".join(shown)
+    seeds = max(len(rate.by_seed) for rate in found.values())
+    trainings = "1 training seed" if seeds == 1 else f"{seeds} training seeds"
+    note = _NOTE.format(trainings)
+    tables = []
+    for section in _SECTIONS:
+        settings = _settings_of(section, found)
+        if settings:
+            rows = _rows(found, section.pool, settings)
+            heads = ("listener", "")
+            tables.append(markdown_table(section.title, settings, rows, (note,), heads=heads))
+    return "\n\n".join(tables)
+
+
+def _settings_of(section: _Section, found: Iterable[ListenerCell]) -> list[str]:
+    """Return the settings of a section that were answered, in order."""
+    answered = {cell.setting for cell in found if cell.pool == section.pool}
+    settings = []
+    for setting in all_settings():
+        has_rival = setting == RIVAL
+        if setting in answered and has_rival == section.has_rival:
+            settings.append(setting)
+    return settings
 
 
 def _verdicts(answers: Iterable[StudyAnswer]) -> dict[ListenerCell, list[Verdicts]]:
     """Return the verdicts of each cell by task."""
-    found: dict[tuple[ListenerCell, str], dict[int, list[bool]]] = defaultdict(dict)
-    for one in answers:
-        trained = found[(one.listener, one.words, one.setting), one.task]
-        trained.setdefault(one.seed, []).append(one.is_right)
-    cells: dict[ListenerCell, list[Verdicts]] = defaultdict(list)
-    for (cell, _), trained in found.items():
-        cells[cell].append(np.array(list(trained.values()), float))
-    return cells
+    by_task: dict[tuple[ListenerCell, str], dict[int, list[bool]]] = defaultdict(dict)
+    for answer in answers:
+        cell = ListenerCell(answer.listener, answer.words, answer.setting)
+        by_seed = by_task[cell, answer.task]
+        by_seed.setdefault(answer.seed, []).append(answer.is_right)
+    found: dict[ListenerCell, list[Verdicts]] = defaultdict(list)
+    for (cell, _), by_seed in by_task.items():
+        found[cell].append(np.array(list(by_seed.values()), float))
+    return found
 
 
 def _rows(
     found: Mapping[ListenerCell, TrainedRate], pool: str, settings: Sequence[str]
 ) -> Iterator[tuple[str, str, list[str]]]:
+    """Yield two rows for each listener: how often it is right, and how often with each seed."""
     for variant in VARIANTS:
-        own = [found.get((variant.name, pool, setting)) for setting in settings]
-        right = [
-            f"{_percent([one.rate])} ({_percent(one.interval, '–')})" if one else "–" for one in own
-        ]
+        right = []
+        by_seed = []
+        for setting in settings:
+            rate = found.get(ListenerCell(variant.name, pool, setting))
+            right.append(_with_interval(rate))
+            by_seed.append(_NOTHING if rate is None else _percent(rate.by_seed))
         yield variant.title, "right", right
-        yield variant.title, "by seed", [_percent(one.by_seed) if one else "–" for one in own]
+        yield variant.title, "by seed", by_seed
+
+
+def _with_interval(rate: TrainedRate | None) -> str:
+    """Return a rate in percent with its interval, as in "50.0 (40.0–60.0)"."""
+    if rate is None:
+        return _NOTHING
+    return f"{_percent([rate.rate])} ({_percent(rate.interval, '–')})"
 
 
 def _percent(rates: Iterable[float], between: str = ", ") -> str:
+    """Return rates from 0 to 1 in percent, as in "50.0, 75.0"."""
     return between.join(f"{100 * rate:.1f}" for rate in rates)

@@ -12,17 +12,25 @@ from roboirg_learn.labeled_views import Pixels
 from roboirg_learn.listener.object_relations import ObjectsInView
 
 _WORD = re.compile(r"\d+(?:st|nd|rd|th)?|[a-z']+|[.,]")
+"""A number such as 3 or 3rd, a word, or a stop."""
 _CARDINALS = ("zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 _ORDINALS = (
-    *("zeroth", "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth"),
-    *("ninth", "tenth"),
-)
-_NUMBERS = {str(number): word for number, word in enumerate(_CARDINALS)}
-_NUMBERS |= {
-    f"{number}{end}": word
-    for number, word in enumerate(_ORDINALS)
-    for end in ("st", "nd", "rd", "th")
-}
+    "zeroth", "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth",
+    "tenth",
+)  # fmt: skip
+
+
+def _number_words() -> dict[str, str]:
+    """Return the words of digits up to 10: "2" is two; "2nd", and also "2th", is second."""
+    found = {}
+    for number, (cardinal, ordinal) in enumerate(zip(_CARDINALS, _ORDINALS, strict=True)):
+        found[str(number)] = cardinal
+        for ending in ("st", "nd", "rd", "th"):
+            found[f"{number}{ending}"] = ordinal
+    return found
+
+
+_NUMBERS = _number_words()
 WordPool = Literal["train", "test"]
 WORD_POOLS: tuple[WordPool, ...] = get_args(WordPool)
 USUAL_ENCODERS: Mapping[str, dict[str, Any]] = {"words": {}, "objects": {}}
@@ -43,16 +51,6 @@ class Vocabulary(NamedTuple):
     classes: tuple[str, ...]
     tasks: tuple[str, ...]
     parts: tuple[str, ...]
-
-    @property
-    def goal_size(self) -> int:
-        """How many numbers stand for a task and its answer: one for each task and each part."""
-        return len(self.tasks) + len(self.parts)
-
-    @property
-    def content(self) -> dict[str, list[str]]:
-        """What a trained file has of it."""
-        return {name: list(value) for name, value in self._asdict().items()}
 
     @classmethod
     def of(cls, content: Mapping[str, Sequence[str]]) -> Vocabulary:
@@ -81,26 +79,45 @@ def split_words(text: str) -> list[str]:
     return [_NUMBERS.get(word, word) for word in _WORD.findall(text.lower())]
 
 
+def words_of(texts: Iterable[str]) -> tuple[str, ...]:
+    """Return the words of texts, each once."""
+    found: set[str] = set()
+    for text in texts:
+        found.update(split_words(text))
+    return tuple(sorted(found))
+
+
 def parts_of(answer: str) -> list[str]:
-    """Return the parts of an answer, given as canonical JSON."""
+    """Return the parts of an answer, given as canonical JSON.
+
+    Example: ``{"colors": ["red"]}`` has the parts ``colors.length=1`` and ``colors.0=red``.
+    """
     found = []
     for name, value in json.loads(answer).items():
         if isinstance(value, list):
             found.append(f"{name}.length={len(value)}")
-            found += [f"{name}.{place}={one}" for place, one in enumerate(value)]
+            found += [f"{name}.{place}={item}" for place, item in enumerate(value)]
         else:
             found.append(f"{name}={value}")
     return found
+
+
+def parts_of_tasks(tasks: Iterable[str]) -> tuple[str, ...]:
+    """Return the parts of all answers of tasks, in the order of their numbers."""
+    found = set()
+    for task in tasks:
+        for answer in goal_schema(task).goals:
+            found.update(parts_of(answer))
+    return tuple(sorted(found))
 
 
 def make_vocabulary(
     texts: Iterable[str], classes: Iterable[str], tasks: Sequence[str]
 ) -> Vocabulary:
     """Return the vocabulary of texts, classes of objects and the answers of tasks."""
-    answers = (answer for task in tasks for answer in goal_schema(task).goals)
     return Vocabulary(
-        tuple(sorted({word for text in texts for word in split_words(text)})),
+        words_of(texts),
         tuple(sorted(set(classes))),
         tuple(tasks),
-        tuple(sorted({part for answer in answers for part in parts_of(answer)})),
+        parts_of_tasks(tasks),
     )

@@ -39,22 +39,25 @@ def run_layer(layer: Any, tokens: Tensor, seen: Tensor, join: Join) -> Tensor:  
         seen: (n, L) whether there is a token.
         join: of a memory.
     """
-    own = layer.self_attn
-    projected = functional.linear(layer.norm1(tokens), own.in_proj_weight, own.in_proj_bias)
-    queries, keys, values = (split_heads(one) for one in projected.chunk(3, -1))
+    attention = layer.self_attn
+    projected = functional.linear(
+        layer.norm1(tokens), attention.in_proj_weight, attention.in_proj_bias
+    )
+    queries, keys, values = (split_heads(part) for part in projected.chunk(3, -1))
     open_to = seen[:, None, None].expand(-1, 1, tokens.shape[1], -1)
     keys, values, open_to = join.attended(keys, values, open_to)
     found = functional.scaled_dot_product_attention(queries, keys, values, open_to)
-    tokens = tokens + own.out_proj(join_heads(found))
-    hidden = layer.linear1(join.modulated(layer.norm2(tokens)))
-    after: Tensor = tokens + layer.linear2(functional.relu(hidden))
+    attended = tokens + attention.out_proj(join_heads(found))
+
+    hidden = layer.linear1(join.modulated(layer.norm2(attended)))
+    after: Tensor = attended + layer.linear2(functional.relu(hidden))
     return after
 
 
 def split_heads(values: Tensor, heads: int = HEADS) -> Tensor:
     """Return values (n, L, heads * size) as (n, heads, L, size)."""
-    parted: Tensor = values.reshape(*values.shape[:2], heads, -1).transpose(1, 2)
-    return parted
+    split: Tensor = values.reshape(*values.shape[:2], heads, -1).transpose(1, 2)
+    return split
 
 
 def join_heads(values: Tensor) -> Tensor:

@@ -21,6 +21,7 @@ from roboirg_learn.policy.memories import (
     Looks,
     NoMemory,
     RecurrentMemory,
+    Remembered,
     at_looks,
 )
 from roboirg_learn.policy.policy_plan import CHOOSES
@@ -39,6 +40,10 @@ MEMORIES: Mapping[str, type[LookMemory]] = {
 WAVES = 5
 TOOL_NUMBERS = 7
 """x, y, z, cosine and sine of its angle, a finger's opening, video or not."""
+SPOT_NUMBERS = (4 * WAVES + 2) + 2 + 4
+"""A thing's place as waves, its angle, and where it is from the tool."""
+APART_SCALE = 5.0
+"""Per meter from the tool, so that these numbers are about as great as the others."""
 MOST_DONE = 24
 """Stages that are told apart; more count as this many."""
 
@@ -109,12 +114,8 @@ class BodyNet(nn.Module):
     ) -> None:
         super().__init__()
         self.kinds = nn.Embedding(classes, WIDTH)
-        self.spot = nn.Sequential(
-            nn.Linear(4 * WAVES + 2 + 2 + 4, WIDTH), nn.ReLU(), nn.Linear(WIDTH, WIDTH)
-        )
-        self.tool = nn.Sequential(
-            nn.Linear(TOOL_NUMBERS, WIDTH), nn.ReLU(), nn.Linear(WIDTH, WIDTH)
-        )
+        self.spot = _two_layers(SPOT_NUMBERS)
+        self.tool = _two_layers(TOOL_NUMBERS)
         self.unseen = nn.Parameter(torch.randn(WIDTH) * 0.02)
         self.goal = nn.Linear(parts, WIDTH)
         self.memory = MEMORIES[memory]()
@@ -132,41 +133,79 @@ class BodyNet(nn.Module):
         goal = self.goal(batch.goals)[:, None]
         looks = self._looks(batch, goal)._replace(carried=carried)
         remembered = self.memory(looks, batch.decisions)
-        things = at_looks(looks.things, batch.decisions) + remembered.things + goal[:, :, None]
-        whole = at_looks(looks.whole, batch.decisions) + remembered.whole
-        if self.given is not None and batch.planned is not None:
-            places = at_looks(batch.places, batch.decisions)
-            of_whole, of_things = self.given(batch.planned.context, places)
-            whole, things = whole + of_whole, things + of_things
-        tokens = torch.cat([whole[:, :, None], things], 2).flatten(0, 1)
-        closed = ~remembered.can_choose.flatten(0, 1)
-        hidden = torch.cat([torch.zeros_like(closed[:, :1]), closed], 1)
-        joins = remembered.joins or [Join()] * LAYERS
-        for layer, join in zip(self.encoder.layers, joins, strict=True):
-            tokens = run_layer(layer, tokens, ~hidden, join)
-        first, rest = tokens[:, 0], tokens[:, 1:]
-        queries = self.query.weight[None] + self.mixed(first)[:, None]
-        scores = queries @ self.key(rest).transpose(1, 2) / math.sqrt(WIDTH)
-        scores = scores.masked_fill(closed[:, None], CLOSED)
+        can_choose = remembered.can_choose.flatten(0, 1)
+        tokens = self._tokens(batch, goal, looks, remembered)
+        tokens = self._attend(tokens, can_choose, remembered.joins)
+
+        robot = tokens[:, 0]
         shape = batch.decisions.shape
-        every = self.move(first), scores, self.done(first)
-        answer = BodyAnswer(*(one.reshape(*shape, *one.shape[1:]) for one in every))
-        if self.keeps is None:
-            return answer
-        keys = self.keeps(looks, batch.decisions, first.reshape(*shape, -1))
-        return answer._replace(keys=keys)
+        things = self._thing_scores(robot, tokens[:, 1:], can_choose).unflatten(0, shape)
+        moves = self.move(robot).unflatten(0, shape)
+        done = self.done(robot).unflatten(0, shape)
+        keys = None
+        if self.keeps is not None:
+            keys = self.keeps(looks, batch.decisions, robot.unflatten(0, shape))
+        return BodyAnswer(moves, things, done, keys)
+
+    def _tokens(
+        self, batch: EpisodeBatch, goal: Tensor, looks: Looks, remembered: Remembered
+    ) -> Tensor:
+        """Return a token for the robot, and one for each thing, at each decision.
+
+        (B * D, 1 + K, WIDTH), the robot's first.
+        """
+        decisions = batch.decisions
+        things = at_looks(looks.things, decisions) + remembered.things + goal[:, :, None]
+        whole = at_looks(looks.whole, decisions) + remembered.whole
+        if self.given is not None and batch.planned is not None:
+            places = at_looks(batch.places, decisions)
+            to_whole, to_things = self.given(batch.planned.context, places)
+            whole = whole + to_whole
+            things = things + to_things
+        return torch.cat([whole[:, :, None], things], 2).flatten(0, 1)
+
+    def _attend(self, tokens: Tensor, can_choose: Tensor, joins: Sequence[Join]) -> Tensor:
+        """Return the tokens after all layers; things that cannot be chosen are not seen."""
+        is_robot = torch.ones_like(can_choose[:, :1])
+        is_seen = torch.cat([is_robot, can_choose], 1)
+        for number, layer in enumerate(self.encoder.layers):
+            join = joins[number] if joins else Join()
+            tokens = run_layer(layer, tokens, is_seen, join)
+        return tokens
+
+    def _thing_scores(self, robot: Tensor, things: Tensor, can_choose: Tensor) -> Tensor:
+        """Return the score (n, M, K) of each thing for each kind of waypoint."""
+        queries = self.query.weight[None] + self.mixed(robot)[:, None]
+        keys = self.key(things)
+        scores = queries @ keys.transpose(1, 2) / math.sqrt(WIDTH)
+        return scores.masked_fill(~can_choose[:, None], CLOSED)
 
     def _looks(self, batch: EpisodeBatch, goal: Tensor) -> Looks:
-        tool = batch.tool[:, :, None]
-        away = batch.places - tool[..., :2]
-        apart = torch.cat(
-            [away, away.norm(dim=-1, keepdim=True), tool[..., 2:3].expand_as(away[..., :1])], -1
-        )
-        numbers = torch.cat([waves(batch.places / METERS, WAVES), batch.turns, apart * 5.0], -1)
-        things = self.kinds(batch.classes) + self.spot(numbers)
-        things = torch.where(batch.seen[..., None], things, things + self.unseen)
-        own = self.tool(batch.tool)
-        kept = None if batch.planned is None else batch.planned.kept
+        """Return the looks of a batch, embedded."""
+        tool = self.tool(batch.tool)
         return Looks(
-            things, own + goal, own, batch.places, batch.seen, batch.known, batch.there, kept
+            things=self._things(batch),
+            whole=tool + goal,
+            tool=tool,
+            places=batch.places,
+            seen=batch.seen,
+            known=batch.known,
+            there=batch.there,
+            kept=None if batch.planned is None else batch.planned.kept,
         )
+
+    def _things(self, batch: EpisodeBatch) -> Tensor:
+        """Return each thing embedded: its class, its place, also from the tool, and its angle."""
+        tool = batch.tool[:, :, None]
+        from_tool = batch.places - tool[..., :2]
+        distance = from_tool.norm(dim=-1, keepdim=True)
+        height = tool[..., 2:3].expand_as(distance)
+        apart = torch.cat([from_tool, distance, height], -1) * APART_SCALE
+        numbers = torch.cat([waves(batch.places / METERS, WAVES), batch.turns, apart], -1)
+        things: Tensor = self.kinds(batch.classes) + self.spot(numbers)
+        return torch.where(batch.seen[..., None], things, things + self.unseen)
+
+
+def _two_layers(numbers: int) -> nn.Sequential:
+    """Return untrained layers from some numbers to a token."""
+    return nn.Sequential(nn.Linear(numbers, WIDTH), nn.ReLU(), nn.Linear(WIDTH, WIDTH))

@@ -1,4 +1,9 @@
-"""Fast weights: a memory that is itself a small network, trained look by look while it is used."""
+"""Fast weights: a memory that is itself a small network, trained look by look while it is used.
+
+Each look has tokens. From a token come a key, a value and a query: the fast weights take a step
+towards predicting the value from the key, and are then read with the query. The steps are called
+inner ones, as the training of the whole policy goes on around them.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +27,7 @@ from roboirg_learn.policy.memories import (
     FrameTokens,
     LookMemory,
     Looks,
+    MaskedTokens,
     Remembered,
     at_frames,
     seen_now,
@@ -32,8 +38,10 @@ SIZE = WIDTH // FAST_HEADS
 EXPERT_WIDTH = WIDTH // 2
 LAST = 8
 """Looks whose tokens the body sees, the present one included."""
-RATE, MOST_RATE = 0.01, 0.1
-"""Inner rate before anything is learned, and the greatest one."""
+RATE = 0.01
+"""Inner rate before anything is learned."""
+MOST_RATE = 0.1
+"""The greatest inner rate."""
 MOST_CHANGE = 5.0
 """Norm to which a change of the fast weights is clipped."""
 EPSILON = 1e-8
@@ -56,9 +64,10 @@ class FastNorm(NamedTuple):
 
     def pull_back(self, values: Tensor, error: Tensor) -> Tensor:
         """Return the gradient at the values, of an error of what becomes of them."""
-        size, error = _size_of(values), error * (1.0 + self.scale)
+        size = _size_of(values)
         even = values / size
-        return (error - even * (error * even).mean(-1, keepdim=True)) / size
+        scaled = error * (1.0 + self.scale)
+        return (scaled - even * (scaled * even).mean(-1, keepdim=True)) / size
 
 
 class Fast(NamedTuple):
@@ -96,6 +105,22 @@ class Fast(NamedTuple):
         return norm(queries @ self.weights + self.biases) + queries
 
 
+class FastState(NamedTuple):
+    """Fast weights after some looks, and what they gave at each (B, T, m, WIDTH)."""
+
+    fast: Fast
+    given: Tensor
+
+
+class InnerStep(NamedTuple):
+    """What fast weights are updated and read with at one look; arguments of `Fast.after`."""
+
+    queries: Tensor
+    keys: Tensor
+    values: Tensor
+    rates: Tensor
+
+
 class FastWeightMemory(LookMemory):
     """Fast weights, updated with the tokens of each look; joins the body as an expert."""
 
@@ -106,59 +131,76 @@ class FastWeightMemory(LookMemory):
         self.norms = nn.ModuleList(nn.LayerNorm(SIZE) for _ in range(3))
         self.rate = nn.Linear(WIDTH, FAST_HEADS)
         self.weights = nn.Parameter(torch.randn(FAST_HEADS, SIZE, SIZE) / math.sqrt(SIZE))
-        self.scale, self.shift = (nn.Parameter(torch.zeros(FAST_HEADS, 1, SIZE)) for _ in range(2))
+        self.scale = nn.Parameter(torch.zeros(FAST_HEADS, 1, SIZE))
+        self.shift = nn.Parameter(torch.zeros(FAST_HEADS, 1, SIZE))
         self.norm = nn.LayerNorm(WIDTH)
         self.out = nn.Linear(WIDTH, WIDTH, bias=False)
         self.narrow = nn.Linear(WIDTH, EXPERT_WIDTH)
         self.layers = nn.ModuleList(ExpertLayer() for _ in range(LAYERS))
 
     def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
-        tokens, there = self.frames(looks)
-        found = self._through_time(tokens, there, looks.carried or Carried())
-        tokens = tokens + self.out(self.norm(found))
+        tokens = self.frames(looks)
+        given = self._through_time(tokens, looks.carried or Carried())
+        values = tokens.values + self.out(self.norm(given))
         recent = decisions[..., None] - torch.arange(LAST - 1, -1, -1)
-        narrow, there = at_frames(self.narrow(tokens), there, recent)
+        narrow = at_frames(MaskedTokens(self.narrow(values), tokens.there), recent)
         joins: list[Join] = []
         for layer in self.layers:
-            narrow, join = layer(narrow, there)
+            values, join = layer(narrow)
+            narrow = narrow._replace(values=values)
             joins.append(join)
         return seen_now(looks, decisions, joins)
 
-    def _through_time(self, tokens: Tensor, there: Tensor, carried: Carried) -> Tensor:
+    def _through_time(self, tokens: MaskedTokens, carried: Carried) -> Tensor:
         """Return what the weights give at each look (B, T, m, WIDTH), after its own update.
 
         At looks that were taken in before it is what was given then.
         """
-        count = tokens.shape[2]
-        tokens, there = tokens[:, carried.looks :], there[:, carried.looks :]
-        batch, length = tokens.shape[:2]
-        parts = self.projected(tokens).reshape(batch, length, count, 3, FAST_HEADS, SIZE).unbind(3)
-        queries, keys, values = (
-            norm(part).transpose(2, 3) for norm, part in zip(self.norms, parts, strict=True)
-        )  # each (B, T, heads, m, size)
-        start = math.log(math.expm1(RATE))
-        rates = functional.softplus(self.rate(tokens) + start).clamp(0.0, MOST_RATE)
-        rates = (rates * there[..., None]).transpose(2, 3)[..., None]
+        count = tokens.values.shape[2]
+        new = MaskedTokens(tokens.values[:, carried.looks :], tokens.there[:, carried.looks :])
+        steps = self._inner_steps(new)
+        fast, given = self._first_state(new, carried)
         norm = FastNorm(self.scale, self.shift)
-        fast, given = carried.state or (
-            Fast(
-                self.weights.expand(batch, -1, -1, -1),
-                tokens.new_zeros(batch, FAST_HEADS, 1, SIZE),
-            ),
-            tokens.new_zeros(batch, 0, count, WIDTH),
-        )
         found = []
-        for query, key, value, rate in zip(
-            *(one.unbind(1) for one in (queries, keys, values, rates)), strict=True
-        ):
-            fast = fast.after(key, value, rate, norm)
-            found.append(fast.read(query, norm))
-        given = functional.pad(given, (0, 0, 0, count - given.shape[2]))
+        for step in steps:
+            fast = fast.after(step.keys, step.values, step.rates, norm)
+            found.append(fast.read(step.queries, norm))
+
+        room = count - given.shape[2]
+        given = functional.pad(given, (0, 0, 0, room))
         if found:
-            new = torch.stack(found, 1).transpose(2, 3).reshape(batch, length, count, WIDTH)
-            given = torch.cat([given, new], 1)
-        carried.looks, carried.state = given.shape[1], (fast, given)
+            joined = torch.stack(found, 1).transpose(2, 3).flatten(3)
+            given = torch.cat([given, joined], 1)
+        carried.looks = given.shape[1]
+        carried.state = FastState(fast, given)
         return given
+
+    def _inner_steps(self, tokens: MaskedTokens) -> list[InnerStep]:
+        """Return what the weights are updated and read with at each look."""
+        batch, length, count = tokens.there.shape
+        projected = self.projected(tokens.values)
+        thirds = projected.reshape(batch, length, count, 3, FAST_HEADS, SIZE).unbind(3)
+        looks = []
+        for norm, part in zip(self.norms, thirds, strict=True):
+            looks.append(norm(part).transpose(2, 3).unbind(1))  # each (B, heads, m, size)
+        rates = self._rates(tokens).unbind(1)
+        return [InnerStep(*look) for look in zip(*looks, rates, strict=True)]
+
+    def _rates(self, tokens: MaskedTokens) -> Tensor:
+        """Return the inner rate (B, T, heads, m, 1) of each token; 0 for one that is not there."""
+        start = math.log(math.expm1(RATE))
+        rates = functional.softplus(self.rate(tokens.values) + start).clamp(0.0, MOST_RATE)
+        return (rates * tokens.there[..., None]).transpose(2, 3)[..., None]
+
+    def _first_state(self, tokens: MaskedTokens, carried: Carried) -> FastState:
+        """Return the state before the new looks, whose tokens these are."""
+        if carried.state is not None:
+            state: FastState = carried.state
+            return state
+        batch, _, count = tokens.there.shape
+        weights = self.weights.expand(batch, -1, -1, -1)
+        biases = tokens.values.new_zeros(batch, FAST_HEADS, 1, SIZE)
+        return FastState(Fast(weights, biases), tokens.values.new_zeros(batch, 0, count, WIDTH))
 
 
 class ExpertLayer(nn.Module):
@@ -166,26 +208,27 @@ class ExpertLayer(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
-        self.norm1, self.norm2 = nn.LayerNorm(EXPERT_WIDTH), nn.LayerNorm(EXPERT_WIDTH)
+        self.norm1 = nn.LayerNorm(EXPERT_WIDTH)
+        self.norm2 = nn.LayerNorm(EXPERT_WIDTH)
         self.projected = nn.Linear(EXPERT_WIDTH, 3 * WIDTH)
         self.out = nn.Linear(WIDTH, EXPERT_WIDTH)
         self.feed = nn.Sequential(
             nn.Linear(EXPERT_WIDTH, EXPERT_WIDTH), nn.ReLU(), nn.Linear(EXPERT_WIDTH, EXPERT_WIDTH)
         )
 
-    def forward(self, tokens: Tensor, there: Tensor) -> tuple[Tensor, ExpertJoin]:
+    def forward(self, tokens: MaskedTokens) -> tuple[Tensor, ExpertJoin]:
         """Return the tokens (n, m, EXPERT_WIDTH) after the layer, and what the body sees of them.
 
         Args:
             tokens: before it.
-            there: (n, m) which of them there are.
         """
-        projected = self.projected(self.norm1(tokens))
-        queries, keys, values = (split_heads(one, HEADS) for one in projected.chunk(3, -1))
-        open_to = there[:, None, None]
+        projected = self.projected(self.norm1(tokens.values))
+        queries, keys, values = (split_heads(part, HEADS) for part in projected.chunk(3, -1))
+        open_to = tokens.there[:, None, None]
         found = functional.scaled_dot_product_attention(queries, keys, values, open_to)
-        tokens = tokens + self.out(join_heads(found))
-        return tokens + self.feed(self.norm2(tokens)), ExpertJoin(keys, values, there)
+        attended = tokens.values + self.out(join_heads(found))
+        after = attended + self.feed(self.norm2(attended))
+        return after, ExpertJoin(keys, values, tokens.there)
 
 
 class ExpertJoin(Join):
@@ -195,21 +238,21 @@ class ExpertJoin(Join):
     """
 
     def __init__(self, keys: Tensor, values: Tensor, there: Tensor) -> None:
-        self._keys, self._values, self._there = keys, values, there
+        self._keys = keys
+        self._values = values
+        self._there = there
 
     def attended(self, keys: Tensor, values: Tensor, seen: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Return the keys and values of the tokens and of the memory's."""
-        count = keys.shape[2]
-        is_first = torch.arange(count, device=keys.device) == 0
-        extra = is_first[None, None, :, None] & self._there[:, None, None]
-        return (
-            torch.cat([keys, self._keys], 2),
-            torch.cat([values, self._values], 2),
-            torch.cat([seen, extra], -1),
-        )
+        is_first = torch.arange(keys.shape[2], device=keys.device) == 0
+        added = is_first[None, None, :, None] & self._there[:, None, None]
+        every_key = torch.cat([keys, self._keys], 2)
+        every_value = torch.cat([values, self._values], 2)
+        return every_key, every_value, torch.cat([seen, added], -1)
 
 
 def _size_of(values: Tensor) -> Tensor:
+    """Return the root mean square of values (…, size), as (…, 1)."""
     return (values.square().mean(-1, keepdim=True) + EPSILON).sqrt()
 
 

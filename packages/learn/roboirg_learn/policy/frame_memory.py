@@ -18,6 +18,7 @@ from roboirg_learn.policy.memories import (
     FrameTokens,
     LookMemory,
     Looks,
+    MaskedTokens,
     Remembered,
     at_frames,
     at_looks,
@@ -34,10 +35,11 @@ def even_frames(now: Tensor) -> Tensor:
 
     As long as there are fewer, it is all of them, and the rest is -1.
     """
-    spread = (now[..., None] * torch.linspace(0, 1, FRAMES)).round().long()
+    last = now[..., None]
+    evenly = (last * torch.linspace(0, 1, FRAMES)).round().long()
     first = torch.arange(FRAMES)
-    every = torch.where(first <= now[..., None], first, -1)
-    return torch.where(now[..., None] < FRAMES, every, spread)
+    all_looks = torch.where(first <= last, first, -1)
+    return torch.where(last < FRAMES, all_looks, evenly)
 
 
 class EvenFrameMemory(LookMemory):
@@ -49,8 +51,9 @@ class EvenFrameMemory(LookMemory):
         self.layers = nn.ModuleList(Modulation() for _ in range(LAYERS))
 
     def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
-        tokens, there = self.frames(looks)
-        joins = [layer(tokens, there, self.chosen(looks, decisions)) for layer in self.layers]
+        tokens = self.frames(looks)
+        chosen = self.chosen(looks, decisions)
+        joins = [layer(tokens, chosen) for layer in self.layers]
         return seen_now(looks, decisions, joins)
 
     def chosen(self, looks: Looks, decisions: Tensor) -> Tensor:  # noqa: ARG002
@@ -62,9 +65,8 @@ class KeptFrameMemory(EvenFrameMemory):
     """The same with looks that a planner keeps; it may point at what is out of sight."""
 
     def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
-        return (
-            super().forward(looks, decisions)._replace(can_choose=at_looks(looks.known, decisions))
-        )
+        remembered = super().forward(looks, decisions)
+        return remembered._replace(can_choose=at_looks(looks.known, decisions))
 
     def chosen(self, looks: Looks, decisions: Tensor) -> Tensor:  # noqa: ARG002
         """Return the numbers of the looks that are kept (B, D, S); -1 for none."""
@@ -86,33 +88,36 @@ class Modulation(nn.Module):
         nn.init.normal_(self.scale_shift.weight, std=SMALL)
         nn.init.zeros_(self.scale_shift.bias)
 
-    def forward(self, tokens: Tensor, there: Tensor, chosen: Tensor) -> ModulationJoin:
+    def forward(self, tokens: MaskedTokens, chosen: Tensor) -> ModulationJoin:
         """Return what modulates a layer.
 
         Args:
             tokens: (B, T, m, WIDTH) of all looks.
-            there: (B, T, m).
             chosen: (B, D, frames) looks to attend to; -1 for none.
         """
-        found, there = at_frames(self.keyed(self.norm(tokens)), there, chosen)
-        keys, values = found[:, None].chunk(2, -1)
-        return ModulationJoin(self, keys, values, there[:, None, None])
+        keyed = MaskedTokens(self.keyed(self.norm(tokens.values)), tokens.there)
+        frames = at_frames(keyed, chosen)
+        keys, values = frames.values[:, None].chunk(2, -1)
+        return ModulationJoin(self, keys, values, frames.there[:, None, None])
 
 
 class ModulationJoin(Join):
     """Scales and shifts what goes into the feed-forward network; the residual stays as it is."""
 
-    def __init__(self, own: Modulation, keys: Tensor, values: Tensor, there: Tensor) -> None:
-        self._own, self._keys, self._values, self._there = own, keys, values, there
+    def __init__(self, modulation: Modulation, keys: Tensor, values: Tensor, there: Tensor) -> None:
+        self._modulation = modulation
+        self._keys = keys
+        self._values = values
+        self._there = there
 
     def modulated(self, normed: Tensor) -> Tensor:
         """Return the input of the feed-forward network, scaled and shifted."""
-        queries = split_heads(self._own.query(normed))
+        queries = split_heads(self._modulation.query(normed))
         # Queries have four heads, keys and values one, which all of them share.
         found = functional.scaled_dot_product_attention(
             queries.flatten(1, 2)[:, None], self._keys, self._values, self._there
         )
-        joined = join_heads(found.reshape(queries.shape))
-        scale, shift = self._own.scale_shift(self._own.out(joined)).chunk(2, -1)
+        joined = self._modulation.out(join_heads(found.reshape(queries.shape)))
+        scale, shift = self._modulation.scale_shift(joined).chunk(2, -1)
         after: Tensor = normed * (1.0 + scale) + shift
         return after

@@ -15,6 +15,7 @@ from roboirg_learn.policy.subgoal_following import LearnedHands
 
 JointTrajectory = NDArray[np.floating[Any]]
 """Joint angles with the gripper (T, 8), rad."""
+NO_ROWS: JointTrajectory = np.empty((0, 8))
 
 
 class JointChunks:
@@ -34,7 +35,8 @@ class JointChunks:
     demonstration_frames = LOOK_EVERY
 
     def __init__(self, policy: LearnedPolicy) -> None:
-        self.policy, self.version = policy, policy.version
+        self.policy = policy
+        self.version = policy.version
         self.trained_tasks = policy.trained_tasks
 
     @property
@@ -44,20 +46,28 @@ class JointChunks:
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode, and see the video, whose pictures are all or every eighth."""
         self._robot = ObservedRobot()
-        self._steps, self._gripper = 0, 1.0  # open
+        self._steps = 0
+        self._gripper = 1.0  # open
         self._plan: Iterator[JointTrajectory] = iter(())
-        self._rows: JointTrajectory = np.empty((0, 8))
-        joints, video = demonstration["joint_positions"], demonstration
-        if len(joints):
-            fingers, pictures = demonstration["gripper"], demonstration["front_rgb"]
-            states = map(self._robot.observe, joints, fingers)
-            video = {
-                "joint_positions": joints,
-                "gripper": fingers,
-                "end_effector": np.stack([one["end_effector"] for one in states]),
-                "front_rgb": pictures[:: LOOK_EVERY if len(pictures) == len(joints) else 1],
-            }
+        self._rows = NO_ROWS
+        video = demonstration
+        if len(demonstration["joint_positions"]):
+            video = self._with_tool(demonstration)
         self.policy.reset(instruction, video)
+
+    def _with_tool(self, video: Demonstration) -> Demonstration:
+        """Return a video with the computed pose of the tool, and every eighth picture."""
+        joints = video["joint_positions"]
+        fingers = video["gripper"]
+        pictures = video["front_rgb"]
+        has_all_pictures = len(pictures) == len(joints)
+        states = [self._robot.observe(*state) for state in zip(joints, fingers, strict=True)]
+        return {
+            "joint_positions": joints,
+            "gripper": fingers,
+            "end_effector": np.stack([state["end_effector"] for state in states]),
+            "front_rgb": pictures[::LOOK_EVERY] if has_all_pictures else pictures,
+        }
 
     def hear(self, text: str, step: int) -> None:
         self.policy.hear(text, step)
@@ -66,19 +76,22 @@ class JointChunks:
         """Return the rows until the next look (n, 8), n <= 8."""
         state = self._robot.observe(observation["joint_positions"], observation["gripper"])
         now = cast("Observation", {**observation, **state, "history": ()})
-        to_look = LOOK_EVERY - self._steps % LOOK_EVERY
+        until_look = LOOK_EVERY - self._steps % LOOK_EVERY
         if not len(self._rows):
             # After the move this plans the gripper's motion where the arm has arrived.
-            self._rows = next(self._plan, self._rows)
+            self._rows = next(self._plan, NO_ROWS)
         if not len(self._rows):
             (waypoint,) = self.policy.act(now)
             self._plan = self._robot.plan(waypoint)
             still = np.append(state["joint_positions"], self._gripper)
-            self._rows = next(self._plan, np.tile(still, (to_look, 1)))
-        elif to_look == LOOK_EVERY:
+            self._rows = next(self._plan, np.tile(still, (until_look, 1)))
+        elif until_look == LOOK_EVERY:
             self.policy.watch(now)
-        chunk, self._rows = self._rows[:to_look], self._rows[to_look:]
-        self._steps, self._gripper = self._steps + len(chunk), float(chunk[-1, -1])
+
+        chunk = self._rows[:until_look]
+        self._rows = self._rows[until_look:]
+        self._steps += len(chunk)
+        self._gripper = float(chunk[-1, -1])
         return chunk
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -22,7 +22,6 @@ class LearnedPolicy:
 
     Args:
         model: what it has learned.
-        version: of the file that holds it.
         seed: without effect, as nothing is random.
 
     Attributes:
@@ -35,30 +34,31 @@ class LearnedPolicy:
     demonstration_frames = LOOK_EVERY
     observe_every = LOOK_EVERY
 
-    def __init__(self, model: PolicyModel, version: str, seed: int = 0) -> None:
-        self.seed, self.version = seed, version
-        self.model, self.trained_tasks = model, model.vocabulary.tasks
+    def __init__(self, model: PolicyModel, seed: int = 0) -> None:
+        self.seed = seed
+        self.version = model.version
+        self.model = model
+        self.trained_tasks = tuple(model.reader.plan["tasks"])
         self._heard: list[str] = []
         self._goal: NDArray[np.float32] | None = None
 
     @property
     def metadata(self) -> dict[str, Any]:
-        """How it was trained."""
-        return {"trained": self.model.about}
+        """How its body and its reader were trained."""
+        return {"trained": {"body": self.model.body.plan, "reader": self.model.reader.plan}}
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode, and see the video."""
         from roboirg_learn.policy.policy_model import SeenEpisode
 
-        self._heard, self._goal = [instruction], None
+        self._heard = [instruction]
+        self._goal = None
         self.seen = SeenEpisode(self.model)
-        length = len(demonstration["joint_positions"])
-        if length:
-            poses, fingers = demonstration["end_effector"], demonstration["gripper"]
-            tools = [
-                np.append(poses[time], fingers[time][0]) for time in range(0, length, LOOK_EVERY)
-            ]
-            self.seen.look(list(demonstration["front_rgb"]), tools, is_video=True)
+        if len(demonstration["joint_positions"]):
+            poses = demonstration["end_effector"][::LOOK_EVERY]
+            openings = demonstration["gripper"][::LOOK_EVERY, 0]
+            tools = np.column_stack([poses, openings])
+            self.seen.look(list(demonstration["front_rgb"]), list(tools), is_video=True)
 
     def hear(self, text: str, step: int) -> None:  # noqa: ARG002
         """Hear another utterance; the goal is understood anew."""
@@ -71,19 +71,18 @@ class LearnedPolicy:
         return seen.decide(self.understand(), tool_of(observation))[None]
 
     def understand(self) -> NDArray[np.float32]:
-        """Return the goal that was heard, as `PolicyModel.understand` does."""
+        """Return the goal that was heard, as `GoalLayout.numbers` does."""
         if self._goal is None:
             self._goal = self.seen.understand(" ".join(self._heard))
         return self._goal
 
     def watch(self, observation: Observation) -> SeenEpisode:
         """See what happened since the last action, and what there is now."""
-        passed: Sequence[Observation] = observation.get("history", ())
-        looks: list[Mapping[str, Any]] = [*passed]
-        if not passed or not _same(passed[-1], observation):
+        looks: list[Mapping[str, Any]] = list(observation.get("history", ()))
+        if not looks or not _is_same_moment(looks[-1], observation):
             looks.append(observation)
-        pictures = [one["front_rgb"] for one in looks]
-        self.seen.look(pictures, [tool_of(one) for one in looks], is_video=False)
+        pictures = [look["front_rgb"] for look in looks]
+        self.seen.look(pictures, [tool_of(look) for look in looks], is_video=False)
         return self.seen
 
 
@@ -92,6 +91,7 @@ def tool_of(observation: Mapping[str, Any]) -> NDArray[np.float64]:
     return np.append(observation["end_effector"], observation["gripper"][0])
 
 
-def _same(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+def _is_same_moment(first: Mapping[str, Any], second: Mapping[str, Any]) -> bool:
     """Return whether two observations are of the same moment."""
-    return all(np.array_equal(one[name], other[name]) for name in ("joint_positions", "gripper"))
+    names = ("joint_positions", "gripper")
+    return all(np.array_equal(first[name], second[name]) for name in names)

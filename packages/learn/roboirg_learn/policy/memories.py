@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import torch
@@ -20,8 +20,15 @@ from roboirg_learn.policy.body_layers import WIDTH, Join
 
 CLOSED = -1e4
 """Score of a thing that cannot be chosen."""
-TIME_WAVES, SLOWEST = 8, 100.0
-"""Sines and cosines of a look's number in frames, and looks in a radian of the slowest."""
+TIME_WAVES = 8
+"""Sines and cosines that encode a look's number in frames."""
+SLOWEST = 100.0
+"""Looks in a radian of the slowest of them."""
+NEARNESS_PER_METER = 25.0
+ALONE = -3.0
+"""Score of the extra place at which a thing that is alone looks."""
+LEAST = -2.0
+"""Stands for things that are not known in a maximum."""
 
 
 class Carried:
@@ -98,21 +105,30 @@ def at_looks(values: Tensor, decisions: Tensor) -> Tensor:
     return values[rows, decisions]
 
 
-def at_frames(tokens: Tensor, there: Tensor, frames: Tensor) -> tuple[Tensor, Tensor]:
+class MaskedTokens(NamedTuple):
+    """Tokens, and which of them there are."""
+
+    values: Tensor
+    there: Tensor
+
+
+def at_frames(tokens: MaskedTokens, frames: Tensor) -> MaskedTokens:
     """Return the tokens of some looks for each decision, in sequences; m tokens of each look.
 
     Args:
-        tokens: (B, T, m, width).
-        there: (B, T, m) which of them there are.
+        tokens: (B, T, m, width), and (B, T, m).
         frames: (B, D, F) numbers of looks; below 0 for none.
 
     Returns:
-        The tokens (B * D, F * m, width), and which of them there are (B * D, F * m).
+        Tokens (B * D, F * m, width), and which of them there are (B * D, F * m).
     """
-    flat = frames.clamp(min=0).flatten(1)
-    shape = frames.shape[0] * frames.shape[1], frames.shape[2] * tokens.shape[2]
-    is_there = at_looks(there, flat) & (frames >= 0).flatten(1)[..., None]
-    return at_looks(tokens, flat).reshape(*shape, -1), is_there.reshape(shape)
+    looks = frames.clamp(min=0).flatten(1)
+    is_look = (frames >= 0).flatten(1)
+    there = at_looks(tokens.there, looks) & is_look[..., None]
+    batch, decisions, count = frames.shape
+    shape = batch * decisions, count * there.shape[-1]
+    values = at_looks(tokens.values, looks).reshape(*shape, -1)
+    return MaskedTokens(values, there.reshape(shape))
 
 
 class FrameTokens(nn.Module):
@@ -123,23 +139,28 @@ class FrameTokens(nn.Module):
         self.mixed = nn.Linear(2 * WIDTH, WIDTH)
         self.time = nn.Linear(2 * TIME_WAVES, WIDTH)
 
-    def forward(self, looks: Looks) -> tuple[Tensor, Tensor]:
-        """Return tokens (B, T, 1 + K, WIDTH), the robot's first, and which there are."""
+    def forward(self, looks: Looks) -> MaskedTokens:
+        """Return tokens (B, T, 1 + K, WIDTH) of all looks, the robot's first."""
         tool = looks.tool[:, :, None]
         tokens = torch.cat([tool, looks.things], 2)
         there = torch.cat([looks.there[..., None], looks.seen], 2)
-        turns = torch.arange(tokens.shape[1])[:, None] * SLOWEST ** -torch.linspace(
-            0, 1, TIME_WAVES
-        )
-        time = self.time(torch.cat([turns.sin(), turns.cos()], -1))[:, None]
-        return self.mixed(torch.cat([tokens, tool.expand_as(tokens)], -1)) + time, there
+        with_tool = torch.cat([tokens, tool.expand_as(tokens)], -1)
+        return MaskedTokens(self.mixed(with_tool) + self._times(tokens.shape[1]), there)
+
+    def _times(self, length: int) -> Tensor:
+        """Return the encoded number of each look (T, 1, WIDTH)."""
+        speeds = SLOWEST ** -torch.linspace(0, 1, TIME_WAVES)
+        angles = torch.arange(length)[:, None] * speeds
+        times: Tensor = self.time(torch.cat([angles.sin(), angles.cos()], -1))
+        return times[:, None]
 
 
 def seen_now(looks: Looks, decisions: Tensor, joins: Sequence[Join] = ()) -> Remembered:
     """Return that only what is seen now can be chosen, and what a memory does in each layer."""
-    things, whole = at_looks(looks.things, decisions), at_looks(looks.whole, decisions)
+    things = torch.zeros_like(at_looks(looks.things, decisions))
+    whole = torch.zeros_like(at_looks(looks.whole, decisions))
     can_choose = at_looks(looks.seen & looks.known, decisions)
-    return Remembered(torch.zeros_like(things), torch.zeros_like(whole), can_choose, joins)
+    return Remembered(things, whole, can_choose, joins)
 
 
 class NoMemory(LookMemory):
@@ -147,6 +168,33 @@ class NoMemory(LookMemory):
 
     def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
         return seen_now(looks, decisions)
+
+
+class RecurrentState(NamedTuple):
+    """What is known after a look: of each thing (B, K, WIDTH), and of the whole (B, WIDTH)."""
+
+    things: Tensor
+    whole: Tensor
+
+
+class _LookInput(NamedTuple):
+    """What changes the state at one look; B episodes, K things.
+
+    Attributes:
+        thing: (B, K, 3 * WIDTH) what the cell of things makes of each.
+        whole: (B, 3 * WIDTH) what the cell of the whole makes of it.
+        near: (B, K, K) the weights with which things see others.
+        is_updated: (B, K, 1) whether the look shows the thing.
+        known: (B, K, 1) whether it was seen often enough.
+        there: (B, 1) whether the episode has the look.
+    """
+
+    thing: Tensor
+    whole: Tensor
+    near: Tensor
+    is_updated: Tensor
+    known: Tensor
+    there: Tensor
 
 
 class RecurrentMemory(LookMemory):
@@ -161,54 +209,72 @@ class RecurrentMemory(LookMemory):
 
     def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
         carried = looks.carried or Carried()
-        batch, length, count, width = looks.things.shape
-        things, whole = carried.state or (
-            looks.things.new_zeros(batch, 0, width),
-            looks.things.new_zeros(batch, width),
-        )
-        things = functional.pad(things, (0, 0, 0, count - things.shape[1]))
-        new = slice(carried.looks, None)
-        near = self._nearness(looks)[:, new].unbind(1)
-        updates = (looks.seen & looks.there[..., None])[:, new, :, None].unbind(1)
-        there, known = (one[:, new, ..., None].unbind(1) for one in (looks.there, looks.known))
-        of_things, of_whole = (
-            cell.first(one[:, new]).unbind(1)
-            for cell, one in ((self.thing, looks.things), (self.whole, looks.whole))
-        )
-        kept_things, kept_whole = [things], [whole]
-        for now in range(length - carried.looks):
-            around = near[now] @ things
-            updated = self.thing(of_things[now], around, whole[:, None], things)
-            things = torch.where(updates[now], updated, things)
-            mean, most = self._summary(things, known[now])
-            whole = torch.where(there[now], self.whole(of_whole[now], mean, most, whole), whole)
-            kept_things.append(things)
-            kept_whole.append(whole)
-        at = decisions - carried.looks + 1
-        carried.looks, carried.state = length, (things, whole)
+        first_new = carried.looks
+        states = [self._first_state(looks, carried)]
+        for inputs in self._inputs(looks, first_new):
+            states.append(self._after(states[-1], inputs))
+        carried.looks = looks.things.shape[1]
+        carried.state = states[-1]
+
+        numbers = decisions - first_new + 1
         return Remembered(
-            at_looks(torch.stack(kept_things, 1), at),
-            at_looks(torch.stack(kept_whole, 1), at),
+            at_looks(torch.stack([state.things for state in states], 1), numbers),
+            at_looks(torch.stack([state.whole for state in states], 1), numbers),
             at_looks(looks.known, decisions),
         )
 
+    def _first_state(self, looks: Looks, carried: Carried) -> RecurrentState:
+        """Return the state before the new looks, with room for things that are new."""
+        batch, _, count, width = looks.things.shape
+        if carried.state is None:
+            whole = looks.things.new_zeros(batch, width)
+            return RecurrentState(looks.things.new_zeros(batch, count, width), whole)
+        things, whole = carried.state
+        added = count - things.shape[1]
+        return RecurrentState(functional.pad(things, (0, 0, 0, added)), whole)
+
+    def _inputs(self, looks: Looks, first_new: int) -> Iterator[_LookInput]:
+        """Yield what the cells are given at each new look; computed for all looks at once."""
+        parts = [
+            self.thing.first(looks.things[:, first_new:]),
+            self.whole.first(looks.whole[:, first_new:]),
+            self._nearness(looks)[:, first_new:],
+            (looks.seen & looks.there[..., None])[:, first_new:, :, None],
+            looks.known[:, first_new:, :, None],
+            looks.there[:, first_new:, None],
+        ]
+        for look in zip(*(part.unbind(1) for part in parts), strict=True):
+            yield _LookInput(*look)
+
+    def _after(self, state: RecurrentState, look: _LookInput) -> RecurrentState:
+        """Return the state after a look."""
+        things, whole = state
+        around = look.near @ things
+        updated = self.thing(look.thing, around, whole[:, None], things)
+        things = torch.where(look.is_updated, updated, things)
+        mean, most = self._summary(things, look.known)
+        updated = self.whole(look.whole, mean, most, whole)
+        return RecurrentState(things, torch.where(look.there, updated, whole))
+
     def _nearness(self, looks: Looks) -> Tensor:
         """Return the weights (B, T, K, K) with which things see those known before, by distance."""
-        far = torch.cdist(looks.places, looks.places) * 25.0 * self.nearness.exp()
-        before = torch.zeros_like(looks.known)
-        before[:, 1:] = looks.known[:, :-1]
-        itself = torch.eye(far.shape[-1], dtype=torch.bool)
-        closed = ~before[:, :, None, :] | itself
+        far = torch.cdist(looks.places, looks.places) * NEARNESS_PER_METER * self.nearness.exp()
+        was_known = torch.zeros_like(looks.known)
+        was_known[:, 1:] = looks.known[:, :-1]
+        is_itself = torch.eye(far.shape[-1], dtype=torch.bool)
+        is_closed = ~was_known[:, :, None, :] | is_itself
+        scores = (-far).masked_fill(is_closed, -math.inf)
         # A thing that is alone sees nothing: an extra place holds zeros.
-        alone = far.new_full((*far.shape[:-1], 1), -3.0)
-        scores = torch.cat([(-far).masked_fill(closed, -math.inf), alone], -1)
-        return scores.softmax(-1)[..., :-1]
+        alone = far.new_full((*far.shape[:-1], 1), ALONE)
+        return torch.cat([scores, alone], -1).softmax(-1)[..., :-1]
 
     def _summary(self, things: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
         """Return a weighted mean and the maximum (B, WIDTH) of things (B, K, …) known (B, K, 1)."""
         scores = self.pool(things).masked_fill(~known, CLOSED)
-        mean = (scores.softmax(1) * known).transpose(1, 2) @ things
-        return mean[:, 0], things.masked_fill(~known, -2.0).amax(1)
+        weights = scores.softmax(1) * known
+        mean = weights.transpose(1, 2) @ things
+        most = things.masked_fill(~known, LEAST).amax(1)
+        return mean[:, 0], most
 
 
 class _PartedCell(nn.Module):
@@ -217,7 +283,8 @@ class _PartedCell(nn.Module):
     def __init__(self) -> None:
         super().__init__()
         self.first = nn.Linear(WIDTH, 3 * WIDTH)
-        self.second, self.third = (nn.Linear(WIDTH, 3 * WIDTH, bias=False) for _ in range(2))
+        self.second = nn.Linear(WIDTH, 3 * WIDTH, bias=False)
+        self.third = nn.Linear(WIDTH, 3 * WIDTH, bias=False)
         self.own = nn.Linear(WIDTH, 3 * WIDTH)
 
     def forward(self, of_first: Tensor, second: Tensor, third: Tensor, state: Tensor) -> Tensor:
@@ -231,6 +298,7 @@ class _PartedCell(nn.Module):
         """
         given = of_first + self.second(second) + self.third(third)
         own = self.own(state)
-        reset, keep = (given[..., : 2 * WIDTH] + own[..., : 2 * WIDTH]).sigmoid().chunk(2, -1)
-        new = (given[..., 2 * WIDTH :] + reset * own[..., 2 * WIDTH :]).tanh()
+        gates = 2 * WIDTH
+        reset, keep = (given[..., :gates] + own[..., :gates]).sigmoid().chunk(2, -1)
+        new = (given[..., gates:] + reset * own[..., gates:]).tanh()
         return torch.lerp(new, state, keep)

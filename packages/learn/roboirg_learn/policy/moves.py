@@ -1,4 +1,8 @@
-"""The kinds of waypoints that the expert makes, and the waypoint of a kind at a place."""
+"""The kinds of waypoints that the expert makes, and the waypoint of a kind at a place.
+
+A waypoint is a pose of the tool with what the gripper does there. Its kind says where that is from
+a thing, or from the tool, so that few kinds stand for all waypoints.
+"""
 
 from __future__ import annotations
 
@@ -64,38 +68,53 @@ class LookDecision(NamedTuple):
 def decisions_of(recorded: ExpertRecording) -> list[LookDecision]:
     """Return the decisions of an episode; opening or closing belongs to the move before it."""
     found: list[LookDecision] = []
-    for look, action, anchor, turn in zip(
-        recorded.looks, recorded.actions, recorded.anchors, recorded.turns, strict=True
-    ):
-        x, y, z = action[:3] - np.append(recorded.tool[look, :2], 0.0)
-        gripper = float(action[-1])
-        is_still = gripper != LEAVE
-        if is_still and found and found[-1].move.gripper == LEAVE:
-            _end_with(found, gripper)
-            continue
-        at_thing = bool(anchor >= 0)
-        if at_thing or is_still:
-            x = y = 0.0
-        places = _round(x, XY_GRID), _round(y, XY_GRID), 0.0 if is_still else _round(z, Z_GRID)
-        move = Move(at_thing, *places, STAY if is_still else turn, gripper)
-        found.append(LookDecision(int(look), move, int(anchor)))
+    for number, look in enumerate(recorded.looks.tolist()):
+        move = _move_of(recorded, number)
+        has_open_end = bool(found) and found[-1].move.gripper == LEAVE
+        if move.gripper != LEAVE and has_open_end:
+            _end_with(found, move.gripper)
+        else:
+            found.append(LookDecision(look, move, int(recorded.anchors[number])))
     return found
 
 
+def _move_of(recorded: ExpertRecording, number: int) -> Move:
+    """Return the kind of a recorded waypoint; one that opens or closes the gripper stays."""
+    look = recorded.looks[number]
+    action = recorded.actions[number]
+    at_thing = bool(recorded.anchors[number] >= 0)
+    gripper = float(action[-1])
+    if gripper != LEAVE:
+        return Move(at_thing, 0.0, 0.0, 0.0, STAY, gripper)
+    x, y, z = action[:3] - np.append(recorded.tool[look, :2], 0.0)
+    height = _round(z, Z_GRID)
+    turn = recorded.turns[number]
+    if at_thing:
+        return Move(at_thing, 0.0, 0.0, height, turn, gripper)
+    return Move(at_thing, _round(x, XY_GRID), _round(y, XY_GRID), height, turn, gripper)
+
+
 def _end_with(found: list[LookDecision], gripper: float) -> None:
-    """Let the last move open or close the gripper, and the same before it that were not made."""
+    """Let the last move open or close the gripper, and the same before it that were not made.
+
+    A move that is not made is decided again at the next look, and so stands several times.
+    """
     last = found[-1]
-    for number in range(len(found) - 1, -1, -1):
-        one = found[number]
-        if (one.move, one.thing) != (last.move, last.thing):
+    for number in reversed(range(len(found))):
+        decision = found[number]
+        is_same = decision.move == last.move and decision.thing == last.thing
+        if not is_same:
             break
-        found[number] = one._replace(move=one.move._replace(gripper=gripper))
+        found[number] = decision._replace(move=decision.move._replace(gripper=gripper))
 
 
 def common_moves(decisions: Iterable[Sequence[LookDecision]]) -> tuple[Move, ...]:
     """Return the kinds of waypoints that occur often enough, the commonest first."""
-    counts = Counter(one.move for own in decisions for one in own)
-    return tuple(move for move, count in counts.most_common() if count >= RAREST * counts.total())
+    counts: Counter[Move] = Counter()
+    for of_episode in decisions:
+        counts.update(decision.move for decision in of_episode)
+    least = RAREST * counts.total()
+    return tuple(move for move, count in counts.most_common() if count >= least)
 
 
 def waypoint(
@@ -115,10 +134,13 @@ def waypoint(
     if move.turn == STAY:
         return np.append(tool[:6], move.gripper)
     x, y = place if move.at_thing else tool[:2]
-    angles = np.array(HOME if move.turn != "keep" else tool[3:6], np.float64)
-    if move.turn == "align":
-        angles[2] = _nearest_side(math.atan2(turn[1], turn[0]) / 4.0, float(tool[5]))
-    return np.array([x + move.x, y + move.y, move.z, *angles, move.gripper], np.float64)
+    roll, pitch, yaw = HOME
+    if move.turn == "keep":
+        roll, pitch, yaw = tool[3:6]
+    elif move.turn == "align":
+        angle = math.atan2(turn[1], turn[0]) / 4.0
+        yaw = _nearest_side(angle, float(tool[5]))
+    return np.array([x + move.x, y + move.y, move.z, roll, pitch, yaw, move.gripper], np.float64)
 
 
 def _nearest_side(angle: float, now: float) -> float:
@@ -128,4 +150,5 @@ def _nearest_side(angle: float, now: float) -> float:
 
 
 def _round(value: float, grid: float) -> float:
+    """Return the nearest multiple of a grid, never -0: 0.0374 on a grid of 0.0025 is 0.0375."""
     return round(round(float(value) / grid) * grid, 4) + 0.0

@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
+from urllib.parse import quote
 
 from roboirg.extension.commands import InvalidValueError, known_name
 from roboirg.extension.episodes import all_settings
 from roboirg.extension.pages import read_plan_file
-from roboirg_learn.policy.policy_plan import MEMORY_NAMES, PLANNERS, PolicyPlan
+from roboirg_learn.policy.policy_files import PolicyFiles
+from roboirg_learn.policy.policy_plan import MEMORY_NAMES, PLANNERS, BodyPlan
 
 if TYPE_CHECKING:
+    from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.trainer import Progress
 
 SYSTEMS: Mapping[str, str] = {
@@ -22,7 +25,10 @@ SYSTEMS: Mapping[str, str] = {
     "keyframes": "MemER",
 }
 """The paper's system with the mechanism of each memory."""
-MAIN, RESOLVED, CONTEXT, PLANNER = "main", "resolved", "context", "planner"
+MAIN = "main"
+RESOLVED = "resolved"
+CONTEXT = "context"
+PLANNER = "planner"
 PARTS: Mapping[str, str] = {
     MAIN: "paper",
     RESOLVED: "paper",
@@ -78,30 +84,39 @@ def row_name(memory: str, change: str = "") -> str:
 
 
 def train_rows(
-    experiment: ExperimentPlan, plan: PolicyPlan, folder: Path, workers: int, progress: Progress
-) -> dict[str, Path]:
-    """Return the file of each row's policy; what is there already is used again.
+    experiment: ExperimentPlan,
+    plan: BodyPlan,
+    words: ReaderPlan,
+    folder: Path,
+    workers: int,
+    progress: Progress,
+) -> dict[str, PolicyFiles]:
+    """Return the files of each row's policy; what is there already is used again.
 
     Args:
         experiment: which rows.
-        plan: of the training; its memory is the rows'.
+        plan: of the bodies; the memories are the rows'.
+        words: how their reader learns.
         folder: for recordings and files.
-        workers: processes that record.
+        workers: processes that record and draw.
         progress: called with the row and a kind of work, what is done of it, and all of it.
     """
-    from roboirg_learn.policy.policy_training import trained_file
+    from roboirg_learn.policy.policy_training import trained_files
     from roboirg_learn.trainer import part_of
 
-    return {
-        row_name(memory): trained_file(
-            plan._replace(memory=memory), folder, workers, part_of(progress, row_name(memory))
-        )
-        for memory in experiment.memories
-    }
+    found = {}
+    for memory in experiment.memories:
+        row = row_name(memory)
+        row_plan = plan._replace(memory=memory)
+        found[row] = trained_files(row_plan, words, folder, workers, part_of(progress, row))
+    return found
 
 
 def part_options(
-    part: str, experiment: ExperimentPlan, files: Mapping[str, Path], changes: Mapping[str, Any]
+    part: str,
+    experiment: ExperimentPlan,
+    files: Mapping[str, PolicyFiles],
+    changes: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return a part's options of `roboirg.evaluate`: the packaged plan's with the rows as policies.
 
@@ -111,19 +126,22 @@ def part_options(
         files: of each row.
         changes: other options; tasks do not change parts with tasks of their own.
     """
-    given = read_plan_file(PARTS[part])
-    given.pop("policies", None)
-    given["forms"] = ["implicit", *([RESOLVED] if part == RESOLVED else [])]
-    given["policy_seeds"] = 0
+    options = read_plan_file(PARTS[part])
+    options.pop("policies", None)
+    options["forms"] = ["implicit", RESOLVED] if part == RESOLVED else ["implicit"]
+    options["policy_seeds"] = 0
     if experiment.played and part != CONTEXT:
-        given["settings"] = experiment.played
-    if part in OWN_TASKS:
-        changes = {name: one for name, one in changes.items() if name != "tasks"}
-    if changes.get("split", given["split"]) != given["split"]:
-        given["wordings"] = HELD_OUT
-    rows = {name: f"trained:{path}" for name, path in files.items()}
-    policy = _with_planners(experiment, rows) if part == PLANNER else rows
-    return {**given, **changes, "policy": policy}
+        options["settings"] = experiment.played
+    if changes.get("split", options["split"]) != options["split"]:
+        options["wordings"] = HELD_OUT
+    for name, value in changes.items():
+        is_fixed = name == "tasks" and part in OWN_TASKS
+        if not is_fixed:
+            options[name] = value
+    options["policy"] = {row: of_row.spec for row, of_row in files.items()}
+    if part == PLANNER:
+        options["policy"] = _with_planners(experiment, options["policy"])
+    return options
 
 
 def _with_planners(experiment: ExperimentPlan, rows: Mapping[str, str]) -> dict[str, str]:
@@ -132,10 +150,12 @@ def _with_planners(experiment: ExperimentPlan, rows: Mapping[str, str]) -> dict[
     The stronger planner is the interpreter of the words; the stronger hands are the scripted ones.
     """
     found = {}
-    for memory in (one for one in experiment.memories if one in PLANNERS):
-        own = rows[row_name(memory)]
-        found[row_name(memory)] = own
-        found[row_name(memory, "-interpreter")] = f"planner:listener?hands={own}"
-        found[row_name(memory, "-scripted-hands")] = f"{own}?hands=scripted"
+    for memory in experiment.memories:
+        if memory in PLANNERS:
+            spec = rows[row_name(memory)]
+            found[row_name(memory)] = spec
+            hands = quote(spec, safe=":/?=")
+            found[row_name(memory, "-interpreter")] = f"planner:listener?hands={hands}"
+            found[row_name(memory, "-scripted-hands")] = f"{spec}&hands=scripted"
     found["interpreter-scripted-hands"] = "planner:listener?hands=scripted"
     return found

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 EXPLICIT = "explicit"
 FIRST = row_name("none")
 """The row that the others are compared with."""
+WITHOUT_MEMORY, *OTHER_SYSTEMS = SYSTEMS.values()
+"""The paper's system that the others are compared with, and these."""
+LESS_FIRST = "less that of the row without memory, in points"
 TRIALS = 150
 """Rollouts behind a published rate."""
 Z_95 = 1.96
@@ -60,33 +63,67 @@ def answers_text(frames: Mapping[str, pd.DataFrame]) -> str:
     Args:
         frames: results of the parts that were played, as `roboirg.results` returns them.
     """
-    told = {part: frame[frame["arm"] == "told"] for part, frame in frames.items()}
-    main = _main_questions(told[MAIN]) if MAIN in told else ()
-    context = (_stage_question(told[CONTEXT]),) if CONTEXT in told else ()
-    return "\n\n".join([*main, *context])
+    sections: list[str] = []
+    if MAIN in frames:
+        sections += _main_questions(_told(frames[MAIN]))
+    if CONTEXT in frames:
+        sections.append(_stage_question(_told(frames[CONTEXT])))
+    return "\n\n".join(sections)
+
+
+def _told(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the episodes in which the instruction was told, not withheld."""
+    return frame[frame["arm"] == "told"]
+
+
+class _Published:
+    """The paper's rates of the main experiment, by system and setting."""
+
+    def __init__(self) -> None:
+        self._rates = {
+            (row.model, row.options.setting): row.rates for row in published_rows("main")
+        }
+
+    def rates(self, system: str, setting: str) -> Rates:
+        """Return the rates of a system in a setting, by task."""
+        return self._rates[system, setting]
+
+    def changes(self, settings: Sequence[str]) -> Differences:
+        """Return by system, for each setting, its success less explicit success."""
+        found: dict[str, dict[str, Difference]] = {}
+        for system in SYSTEMS.values():
+            explicit = self.rates(system, EXPLICIT)
+            found[system] = {
+                name: _independent(self.rates(system, name), explicit) for name in settings
+            }
+        return found
+
+    def gains(self, settings: Sequence[str]) -> Differences:
+        """Return by system, for each setting, its success less that of the one without memory."""
+        found: dict[str, dict[str, Difference]] = {system: {} for system in OTHER_SYSTEMS}
+        for name in settings:
+            first = self.rates(WITHOUT_MEMORY, name)
+            for system, gains in found.items():
+                gains[name] = _independent(self.rates(system, name), first)
+        return found
 
 
 def _main_questions(told: pd.DataFrame) -> Iterator[str]:
+    """Yield the sections that the main experiment answers, each a table."""
     settings = [name for name in plain_settings() if name != EXPLICIT]
-    published = {(one.model, one.options.setting): one.rates for one in published_rows("main")}
+    published = _Published()
     played = told[told["form"] == "implicit"]
-    carried = _gaps(played, "setting", {"setting": EXPLICIT})
-    theirs = {
-        system: {
-            name: _independent(published[system, name], published[system, EXPLICIT])
-            for name in settings
-        }
-        for system in SYSTEMS.values()
-    }
+    changes = _gaps(played, "setting", {"setting": EXPLICIT})
     yield _table(
         "Does explicit success carry over, and which setting costs most?",
         "Success in each setting less explicit success on the same scenes, in points.",
         settings,
-        carried | theirs,
+        {**changes, **published.changes(settings)},
     )
     if FIRST in set(played["policy"]):
-        yield from _memory_questions(played, [EXPLICIT, *settings], published)
-    yield _retention(settings, carried, published)
+        yield _memory_question(played, [EXPLICIT, *settings], published)
+        yield _group_question(played[played["setting"] == EXPLICIT], published)
+    yield _retention(settings, changes, published)
     resolved = _gaps(told, "setting", {"form": "implicit"}, form="resolved")
     if resolved:
         yield _table(
@@ -97,60 +134,70 @@ def _main_questions(told: pd.DataFrame) -> Iterator[str]:
         )
 
 
-def _memory_questions(
-    played: pd.DataFrame, settings: Sequence[str], published: Mapping[tuple[str, str], Rates]
-) -> Iterator[str]:
-    first, *others = SYSTEMS.values()
-    theirs = {
-        system: {
-            name: _independent(published[system, name], published[first, name]) for name in settings
-        }
-        for system in others
-    }
-    less = "less that of the row without memory, in points"
-    yield _table(
+def _memory_question(played: pd.DataFrame, settings: Sequence[str], published: _Published) -> str:
+    """Return by setting what memory adds."""
+    gaps = _gaps(played, "setting", {"policy": FIRST})
+    return _table(
         "Do memory and referring come apart?",
-        f"Success {less}.",
+        f"Success {LESS_FIRST}.",
         settings,
-        _gaps(played, "setting", {"policy": FIRST}) | theirs,
+        {**gaps, **published.gains(settings)},
     )
-    explicit = played[played["setting"] == EXPLICIT]
-    filmed = explicit[explicit["demonstration_steps"] > 0].assign(suite="with a video")
-    groups: dict[str, set[str]] = {}
+
+
+def _group_question(explicit: pd.DataFrame, published: _Published) -> str:
+    """Return by group of tasks what memory adds; tasks with a video are also a group."""
+    is_filmed = explicit["demonstration_steps"] > 0
+    filmed = explicit[is_filmed].assign(suite="with a video")
+    tasks_of: dict[str, set[str]] = {}
     found: dict[str, dict[str, Any]] = {}
-    for frame in (one for one in (explicit, filmed) if FIRST in set(one["policy"])):
+    for frame in (explicit, filmed):
+        if FIRST not in set(frame["policy"]):
+            continue
         for group, tasks in frame.groupby("suite", sort=False)["task"]:
-            groups[str(group)] = set(tasks)
-        for row, by_group in _gaps(frame, "suite", {"policy": FIRST}).items():
-            found.setdefault(row, {}).update(by_group)
-    for system in others:
-        rates, reference = published[system, EXPLICIT], published[first, EXPLICIT]
-        found[system] = {
-            group: _independent({task: rates[task] for task in rates if task in tasks}, reference)
-            for group, tasks in groups.items()
-        }
-    yield _table(
+            tasks_of[str(group)] = set(tasks)
+        for row, gaps in _gaps(frame, "suite", {"policy": FIRST}).items():
+            found.setdefault(row, {}).update(gaps)
+    for system in OTHER_SYSTEMS:
+        found[system] = _published_gains(system, tasks_of, published)
+    return _table(
         "Where does memory help?",
-        f"Explicit success {less}, by group of tasks.",
-        list(groups),
+        f"Explicit success {LESS_FIRST}, by group of tasks.",
+        list(tasks_of),
         found,
     )
 
 
+def _published_gains(
+    system: str, tasks_of: Mapping[str, set[str]], published: _Published
+) -> dict[str, Difference]:
+    """Return by group of tasks the explicit success of a system less that without memory."""
+    first = published.rates(WITHOUT_MEMORY, EXPLICIT)
+    gains = {}
+    for group, tasks in tasks_of.items():
+        rates = published.rates(system, EXPLICIT).items()
+        of_group = {task: rate for task, rate in rates if task in tasks}
+        gains[group] = _independent(of_group, first)
+    return gains
+
+
 def _stage_question(told: pd.DataFrame) -> str:
+    """Return what each further stage of the context costs."""
     rows = published_rows("context")
-    shortest = min(rows, key=lambda one: len(one.options.stages)).label
-    longer = [one for one in dict.fromkeys(row.label for row in rows) if one != shortest]
-    rates = {(one.model, one.label): one.rates for one in rows}
-    theirs = {
-        system: {one: _independent(rates[system, one], rates[system, shortest]) for one in longer}
-        for system in dict.fromkeys(one.model for one in rows)
-    }
+    shortest = min(rows, key=lambda row: len(row.options.stages)).label
+    longer = [label for label in dict.fromkeys(row.label for row in rows) if label != shortest]
+    rates = {(row.model, row.label): row.rates for row in rows}
+    theirs: dict[str, dict[str, Difference]] = {}
+    for row in rows:
+        if row.label != shortest:
+            difference = _independent(row.rates, rates[row.model, shortest])
+            theirs.setdefault(row.model, {})[row.label] = difference
+    gaps = _gaps(told, "instruction_options", {"instruction_options": shortest})
     return _table(
         "Does success fall with each stage of the context?",
         f"Success less that in {shortest}, in points.",
         longer,
-        _gaps(told, "instruction_options", {"instruction_options": shortest}) | theirs,
+        {**gaps, **theirs},
     )
 
 
@@ -158,13 +205,12 @@ def _gaps(
     frame: pd.DataFrame, column: str, against: Mapping[str, str], form: str = "implicit"
 ) -> dict[str, dict[str, Any]]:
     """Return the gaps of the groups of policy, a column and a form that have one."""
-    found: dict[str, dict[str, Any]] = {}
-    for one in roboirg.measure(frame, ("policy", column, "form"), against):
-        policy, name, own_form = one.key
-        if one.gap is not None and own_form == form:
-            found.setdefault(policy, {})[name] = one.gap
-    ordered = dict.fromkeys([*map(row_name, SYSTEMS), *found])
-    return {row: found[row] for row in ordered if row in found}
+    found: dict[str, dict[str, Any]] = {row_name(memory): {} for memory in SYSTEMS}
+    for measured in roboirg.measure(frame, ("policy", column, "form"), against):
+        policy, name, measured_form = measured.key
+        if measured.gap is not None and measured_form == form:
+            found.setdefault(policy, {})[name] = measured.gap
+    return {row: gaps for row, gaps in found.items() if gaps}
 
 
 def _independent(first: Rates, second: Rates) -> Difference:
@@ -172,68 +218,89 @@ def _independent(first: Rates, second: Rates) -> Difference:
 
     The trials of two published cells are taken as independent, as only their rates are known.
     """
-    shares = [
-        (float(rate) / 100, float(second[task] or 0) / 100)
-        for task, rate in first.items()
-        if rate is not None
-    ]
-    variance = sum(one * (1 - one) for pair in shares for one in pair) / TRIALS / len(shares) ** 2
-    value, spread = sum(one - other for one, other in shares) / len(shares), math.sqrt(variance)
+    total = 0.0
+    variance = 0.0
+    count = 0
+    for task, rate in first.items():
+        if rate is not None:
+            share = float(rate) / 100
+            other = float(second[task] or 0) / 100
+            total += share - other
+            variance += share * (1 - share)
+            variance += other * (1 - other)
+            count += 1
+    value = total / count
+    spread = math.sqrt(variance / TRIALS / count**2)
     if not spread:
         return Difference(value, None, 1.0)
     interval = value - Z_95 * spread, value + Z_95 * spread
     return Difference(value, interval, math.erfc(abs(value) / spread / math.sqrt(2)))
 
 
-def _retention(
-    settings: Sequence[str],
-    carried: Mapping[str, Mapping[str, Any]],
-    published: Mapping[tuple[str, str], Rates],
-) -> str:
-    kept: dict[str, dict[str, str]] = {}
-    for row, own in carried.items():
-        for name, gap in own.items():
+def _retention(settings: Sequence[str], changes: Differences, published: _Published) -> str:
+    """Return how much of explicit success is kept in each setting."""
+    cells: dict[str, dict[str, str]] = {}
+    for row, gaps in changes.items():
+        for setting, gap in gaps.items():
             if gap.retention is not None:
-                kept.setdefault(row, {})[name] = _with_ends(
-                    100 * gap.retention, gap.retention_interval, "{:.0f}", "{:.0f}"
-                )
+                text = _with_interval(100 * gap.retention, gap.retention_interval, "{:.0f}")
+                cells.setdefault(row, {})[setting] = text
     for system in SYSTEMS.values():
-        for name in settings:
-            own, explicit = published[system, name], published[system, EXPLICIT]
-            pairs = [(one, explicit[task]) for task, one in own.items() if one is not None]
-            whole = sum(float(other or 0) for _, other in pairs)
-            share = 100 * sum(float(one) for one, _ in pairs) / whole
-            kept.setdefault(system, {})[name] = f"{share:.0f}"
-    return markdown_table(
-        "Do planners keep more?",
-        settings,
-        [("", row, [own.get(name, "–") for name in settings]) for row, own in kept.items()],
-        ("Success in each setting by explicit success, in percent.",),
-    )
+        explicit = published.rates(system, EXPLICIT)
+        of_system = cells.setdefault(system, {})
+        for setting in settings:
+            percent = _percent_kept(published.rates(system, setting), explicit)
+            of_system[setting] = f"{percent:.0f}"
+    rows = [("", row, _in_columns(texts, settings)) for row, texts in cells.items()]
+    note = "Success in each setting by explicit success, in percent."
+    return markdown_table("Do planners keep more?", settings, rows, (note,))
+
+
+def _percent_kept(rates: Rates, explicit: Rates) -> float:
+    """Return the sum of rates by that of the explicit rates of the same tasks, in percent."""
+    kept = 0.0
+    whole = 0.0
+    for task, rate in rates.items():
+        if rate is not None:
+            kept += float(rate)
+            whole += float(explicit[task] or 0)
+    return 100 * kept / whole
 
 
 def _table(title: str, note: str, columns: Sequence[str], found: Differences) -> str:
     """Return a table of differences; a star marks p at most 0.05 with Holm's correction by row."""
     rows = []
-    for row, own in found.items():
-        shown = [name for name in columns if name in own]
-        adjusted = dict(zip(shown, holm([own[name].p_value for name in shown]), strict=True))
-        cells = {
-            name: _with_ends(
-                100 * own[name].value,
-                own[name].interval,
-                "{:+.1f}" + "*" * (adjusted[name] <= ALPHA),
-                "{:+.0f}",
+    for row, differences in found.items():
+        shown = [name for name in columns if name in differences]
+        p_values = holm([differences[name].p_value for name in shown])
+        texts = {}
+        for name, p_value in zip(shown, p_values, strict=True):
+            difference = differences[name]
+            form = "{:+.1f}*" if p_value <= ALPHA else "{:+.1f}"
+            texts[name] = _with_interval(
+                100 * difference.value, difference.interval, form, "{:+.0f}"
             )
-            for name in shown
-        }
-        rows.append(("", row, [cells.get(name, "–") for name in columns]))
+        rows.append(("", row, _in_columns(texts, columns)))
     return markdown_table(title, columns, rows, (note, _POINTS))
 
 
-def _with_ends(value: float, interval: tuple[float, float] | None, form: str, of_end: str) -> str:
-    """Return a value in percent with the ends of its interval, 0 to 1."""
+def _in_columns(texts: Mapping[str, str], columns: Sequence[str]) -> list[str]:
+    """Return the cells of a row; a dash where there is none."""
+    return [texts.get(name, "–") for name in columns]
+
+
+def _with_interval(
+    value: float,
+    interval: tuple[float, float] | None,
+    form: str,
+    form_of_ends: str = "{:.0f}",
+) -> str:
+    """Return a value in percent with the ends of its interval, which are from 0 to 1.
+
+    Example: ``-12.0* (-20 to -4)``.
+    """
+    shown = form.format(value)
     if interval is None:
-        return f"{form.format(value)} (no interval)"
-    low, high = (of_end.format(100 * end) for end in interval)
-    return f"{form.format(value)} ({low} to {high})"
+        return f"{shown} (no interval)"
+    low, high = (form_of_ends.format(100 * end) for end in interval)
+    return f"{shown} ({low} to {high})"

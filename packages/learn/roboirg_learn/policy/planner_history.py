@@ -12,8 +12,16 @@ from roboirg.extension.episodes import merge_keyframes
 from roboirg.extension.sight import LOOK_EVERY
 from roboirg_learn.policy.subgoals import POINT_NUMBERS
 
-VIDEO_FRAMES, SWITCHES, KEYS, RECENT = 10, 4, 16, 8
-"""Most looks of the video, at changes of subgoal, chosen, and recent ones that are kept."""
+VIDEO_FRAMES = 10
+"""Most looks of the video that are kept."""
+SWITCHES = 4
+"""Most looks at changes of subgoal that are kept."""
+KEYS = 16
+"""Most chosen looks that are kept."""
+RECENT = 8
+"""Recent looks that are kept, and among which a planner chooses."""
+NO_LOOK = -1
+"""In the place of a look's number where there is none."""
 LONGEST = 40
 """Looks since a subgoal was named; more count as this many."""
 
@@ -34,8 +42,9 @@ class PlannedNumbers(NamedTuple):
 
 def asked_for(rows: Sequence[NDArray[np.float32]]) -> PlannedNumbers:
     """Return what hands are given that follow subgoals, as `asked_numbers` returns them."""
-    nothing = [np.full((len(rows), size), -1, np.int64) for size in (1, RECENT)]
-    return PlannedNumbers(np.stack(rows), *nothing)
+    no_looks = np.full((len(rows), 1), NO_LOOK, np.int64)
+    no_keys = np.full((len(rows), RECENT), NO_LOOK, np.int64)
+    return PlannedNumbers(np.stack(rows), no_looks, no_keys)
 
 
 class PlannerHistory:
@@ -50,7 +59,8 @@ class PlannerHistory:
     """
 
     def __init__(self, forms: int, *, chooses: bool) -> None:
-        self._forms, self._chooses = forms, chooses
+        self._forms = forms
+        self._chooses = chooses
         self._named: list[int] = []
         self.switches: list[int] = []
         self._keys: tuple[int, ...] = ()
@@ -63,17 +73,21 @@ class PlannerHistory:
 
     def choose(self, looks: Iterable[int]) -> None:
         """Keep some looks; those in a row become one."""
-        steps = (look * LOOK_EVERY for look in (*self._keys, *looks))
+        steps = [look * LOOK_EVERY for look in (*self._keys, *looks)]
         self._keys = tuple(step // LOOK_EVERY for step in merge_keyframes(steps))
 
     def context(self, look: int) -> NDArray[np.float32]:
         """Return how often each form was done, which is under way, and since when."""
-        done, under_way = (np.zeros(self._forms, np.float32) for _ in range(2))
-        for form in self._named[:-1]:
-            done[form] += 1.0
-        under_way[self._named[-1:]] = 1.0
-        since = min(look - self.switches[-1], LONGEST) / LONGEST if self.switches else 0.0
-        return np.concatenate([done, under_way, [since], np.zeros(POINT_NUMBERS)], dtype=np.float32)
+        done = np.zeros(self._forms)
+        under_way = np.zeros(self._forms)
+        since = 0.0
+        if self._named:
+            *earlier, present = self._named
+            np.add.at(done, np.array(earlier, int), 1.0)
+            under_way[present] = 1.0
+            since = min(look - self.switches[-1], LONGEST) / LONGEST
+        point = np.zeros(POINT_NUMBERS)
+        return np.concatenate([done, under_way, [since], point], dtype=np.float32)
 
     def kept(self, video: int, look: int) -> NDArray[np.int64]:
         """Return the looks to attend to, -1 for none; the present one is always among them.
@@ -82,16 +96,19 @@ class PlannerHistory:
             video: number of looks of the video.
             look: the present one.
         """
-        evenly = np.linspace(0, video - 1, min(video, VIDEO_FRAMES)).round().astype(int)
+        count = min(video, VIDEO_FRAMES)
+        looks = np.linspace(0, video - 1, count).round().astype(int).tolist()
         if self._chooses:
-            rest = [*self._keys[-KEYS:], *recent_looks(look)]
+            looks += self._keys[-KEYS:]
+            looks += recent_looks(look)
             size = VIDEO_FRAMES + KEYS + RECENT
         else:
-            rest, size = [*self.switches[-SWITCHES:], look], VIDEO_FRAMES + SWITCHES + 1
-        found = np.full(size, -1, np.int64)
-        every = [*evenly, *rest]
-        found[: len(every)] = every
-        return found
+            looks += self.switches[-SWITCHES:]
+            looks.append(look)
+            size = VIDEO_FRAMES + SWITCHES + 1
+        kept = np.full(size, NO_LOOK, np.int64)
+        kept[: len(looks)] = looks
+        return kept
 
 
 def recent_looks(look: int) -> list[int]:
@@ -109,6 +126,8 @@ def replayed(
 ) -> PlannedNumbers:
     """Return what a planner would be given that names what is due, and chooses where it changes.
 
+    Planners learn from this: how one would go on that has made no mistake so far.
+
     Args:
         forms: (D,) the subgoal due at each decision; -1 where nothing is named.
         looks: (D,) of the decisions.
@@ -117,14 +136,25 @@ def replayed(
         chooses: as for `PlannerHistory`.
     """
     history = PlannerHistory(size, chooses=chooses)
-    context, kept, keys = [], [], []
+    context = []
+    kept = []
+    keys = []
     for form, look in zip(forms.tolist(), looks.tolist(), strict=True):
         context.append(history.context(look))
         kept.append(history.kept(video, look))
         if form >= 0:
             history.name(form, look)
-            history.choose(one for one in history.switches[-1:] if one == look)
-        recent = np.array(recent_looks(look))
-        is_asked = (recent >= 0) & (form >= 0)
-        keys.append(np.where(is_asked, np.isin(recent, history.switches), -1))
+            if history.switches[-1] == look:
+                history.choose([look])
+        keys.append(_right_keys(look, history.switches, is_named=form >= 0))
     return PlannedNumbers(np.stack(context), np.stack(kept), np.stack(keys))
+
+
+def _right_keys(look: int, switches: Sequence[int], *, is_named: bool) -> NDArray[np.int64]:
+    """Return which of the recent looks are to be kept (RECENT,): those at changes of subgoal.
+
+    Where there is no look, or nothing is named, it is `NO_LOOK`.
+    """
+    recent = np.array(recent_looks(look))
+    is_asked = (recent >= 0) & is_named
+    return np.where(is_asked, np.isin(recent, switches), NO_LOOK)

@@ -1,4 +1,8 @@
-"""Recorded episodes, and episodes that are played, as numbers for the network."""
+"""Recorded episodes, and episodes that are played, as numbers for the network.
+
+A track is a thing that is followed from look to look, by its number. A decision is a look at which
+the next waypoint, or subgoal, is chosen.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +18,17 @@ from roboirg.extension.sight import LOOK_EVERY, ExpertRecording
 from roboirg_learn.policy.body_net import EpisodeBatch
 from roboirg_learn.policy.moves import LookDecision
 from roboirg_learn.policy.planner_history import PlannedNumbers
-from roboirg_learn.policy.sight import GHOST, Sight, labeled_looks
+from roboirg_learn.policy.sight import GHOST, LabeledLook, Sight, labeled_looks
 from roboirg_learn.policy.subgoal_net import PlannedBatch
 from roboirg_learn.policy.tracks import LookTokens, Tracks
 
 COUNTED_LOOKS = 10
 """Looks of an episode, besides those of decisions, at which a body learns what is completed."""
+NOT_ASKED = -1
+"""In the place of a move, thing or count that a network is not to say, or does not see."""
+HEIGHT_SCALE = 5.0
+FINGER_SCALE = 25.0
+"""Per meter, so that these numbers of a tool are about as great as the others."""
 
 
 class LookNumbers(NamedTuple):
@@ -54,7 +63,7 @@ class LookHistory:
 
     def __init__(self) -> None:
         self.tracks = Tracks()
-        self._rows: list[tuple[NDArray[Any], ...]] = []
+        self._rows: list[dict[str, NDArray[Any]]] = []
         self._tools: list[NDArray[np.float32]] = []
 
     def __len__(self) -> int:
@@ -70,25 +79,54 @@ class LookHistory:
             tool: (7,) pose and opening; see `ExpertRecording`.
             is_video: whether it is one of the video.
         """
-        mine = self.tracks.update(look)
-        now = self.tracks
+        tracks_of_look = self.tracks.update(look)
         self._rows.append(
-            (now.classes.copy(), now.places.copy(), now.turns.copy(), now.seen.copy(), now.known)
+            {
+                "classes": self.tracks.classes.copy(),
+                "places": self.tracks.places.copy(),
+                "turns": self.tracks.turns.copy(),
+                "seen": self.tracks.seen.copy(),
+                "known": self.tracks.known,
+            }
         )
         self._tools.append(_tool_numbers(tool, is_video=is_video))
-        return mine
+        return tracks_of_look
 
     def numbers(self) -> LookNumbers:
         """Return all looks; a thing has the place where it was last seen."""
         count = max(1, self.tracks.count)
-        parts = [np.stack(part)[:, :count] for part in zip(*self._rows, strict=True)]
-        return LookNumbers._make([*parts, np.stack(self._tools)])
+        parts = {}
+        for name in self._rows[0]:
+            parts[name] = np.stack([row[name] for row in self._rows])[:, :count]
+        return LookNumbers(**parts, tool=np.stack(self._tools))
 
 
 def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray[np.float32]:
+    """Return pose and opening of the tool as numbers of about the same size, `TOOL_NUMBERS`."""
     x, y, z, _, _, yaw, finger = tool
+    height = z * HEIGHT_SCALE
+    opening = finger * FINGER_SCALE
+    # The gripper looks the same after half a turn.
     turn = math.cos(2 * yaw), math.sin(2 * yaw)
-    return np.array([x, y, z * 5.0, *turn, finger * 25.0, is_video], np.float32)
+    return np.array([x, y, height, *turn, opening, is_video], np.float32)
+
+
+class AskedMoves:
+    """What a network is to say at some looks of an episode."""
+
+    def __init__(self) -> None:
+        self._looks: list[int] = []
+        self._rows: list[tuple[int, int, int]] = []
+
+    def add(self, look: int, done: int, move: int = NOT_ASKED, thing: int = NOT_ASKED) -> None:
+        """Ask at a look for completed stages, and for a move and a thing at a decision."""
+        self._looks.append(look)
+        self._rows.append((move, thing, done))
+
+    def numbers(self, looks: LookNumbers, goal: NDArray[np.float32]) -> EpisodeNumbers:
+        """Return the episode with what is asked."""
+        moves, things, done = np.array(self._rows, np.int64).T
+        return EpisodeNumbers(looks, goal, np.array(self._looks, np.int64), moves, things, done)
 
 
 def to_numbers(
@@ -109,63 +147,100 @@ def to_numbers(
         moves: the number of each kind of waypoint, or of each form of subgoals.
         rng: draws the noise of the detector.
     """
-    history = LookHistory()
-    track_of: dict[int, int] = {}
-    times: list[int] = []
-    asked: list[tuple[int, int, int]] = []
-    due = {one.look: one for one in decisions}
-    merged = set(recorded.looks.tolist()) - due.keys()
-    acting = np.flatnonzero(~recorded.is_video)
-    counted = set(rng.choice(acting, min(COUNTED_LOOKS, len(acting)), replace=False).tolist())
-    for look, (tokens, objects) in enumerate(labeled_looks(recorded, sight, rng)):
-        if look in merged and recorded.steps[look] % LOOK_EVERY:
-            continue  # who opens or closes the gripper with the move before does not look here
-        mine = history.add(tokens, recorded.tool[look], is_video=bool(recorded.is_video[look]))
-        track_of.update(zip(objects.tolist(), mine.tolist(), strict=True))
-        track_of[GHOST] = -1
-        done = int(recorded.done[look])
-        if look in due:
-            one = due[look]
-            asked.append((moves.get(one.move, -1), track_of.get(one.thing, -1), done))
-        elif look in counted:
-            asked.append((-1, -1, done))
-        else:
+    history = _LabeledHistory()
+    asked = AskedMoves()
+    decision_at = {decision.look: decision for decision in decisions}
+    skipped = _merged_looks(recorded) - decision_at.keys()
+    counted = _counted_looks(recorded, rng)
+    for look, labeled in enumerate(labeled_looks(recorded, sight, rng)):
+        if look in skipped:
             continue
-        times.append(len(history) - 1)
-    numbers = np.array(asked, np.int64)
-    return EpisodeNumbers(history.numbers(), goal, np.array(times, np.int64), *numbers.T)
+        is_video = bool(recorded.is_video[look])
+        now = history.add(labeled, recorded.tool[look], is_video=is_video)
+        done = int(recorded.done[look])
+        if look in decision_at:
+            decision = decision_at[look]
+            move = moves.get(decision.move, NOT_ASKED)
+            asked.add(now, done, move, history.track(decision.thing))
+        elif look in counted:
+            asked.add(now, done)
+    return asked.numbers(history.looks.numbers(), goal)
+
+
+class _LabeledHistory:
+    """The looks of a recorded episode so far, and the track of each object that was found.
+
+    Attributes:
+        looks: as a policy remembers them.
+    """
+
+    def __init__(self) -> None:
+        self.looks = LookHistory()
+        self._track_of: dict[int, int] = {}
+
+    def add(self, labeled: LabeledLook, tool: NDArray[np.floating[Any]], *, is_video: bool) -> int:
+        """Add a look; returns its number."""
+        tracks = self.looks.add(labeled.tokens, tool, is_video=is_video)
+        self._track_of.update(zip(labeled.objects.tolist(), tracks.tolist(), strict=True))
+        return len(self.looks) - 1
+
+    def track(self, number: int) -> int:
+        """Return the track of an object; `NOT_ASKED` for none, and for one that was not found."""
+        if number == GHOST:
+            return NOT_ASKED
+        return self._track_of.get(number, NOT_ASKED)
+
+
+def _merged_looks(recorded: ExpertRecording) -> set[int]:
+    """Return the looks at which only the expert decides.
+
+    Who opens or closes the gripper with the move before does not look at the time between.
+    """
+    return {look for look in recorded.looks.tolist() if recorded.steps[look] % LOOK_EVERY}
+
+
+def _counted_looks(recorded: ExpertRecording, rng: np.random.Generator) -> set[int]:
+    """Draw the looks at which a body learns what is completed, besides those of decisions."""
+    acting = np.flatnonzero(~recorded.is_video)
+    count = min(COUNTED_LOOKS, len(acting))
+    return set(rng.choice(acting, count, replace=False).tolist())
 
 
 def to_batch(episodes: Sequence[EpisodeNumbers]) -> EpisodeBatch:
     """Return episodes padded to the longest."""
-    looks, goals, decisions, moves, things, done, planned = zip(*episodes, strict=True)
-    of_looks = {
-        name: _pad([getattr(own, name) for own in looks], 0) for name in LookNumbers._fields
-    }
-    there = [np.ones(len(own.tool), bool) for own in looks]
+    looks = {}
+    for name in LookNumbers._fields:
+        looks[name] = _pad([getattr(episode.looks, name) for episode in episodes], 0)
+    there = [np.ones(len(episode.looks.tool), bool) for episode in episodes]
     return EpisodeBatch(
-        **of_looks,
+        **looks,
         there=_pad(there, 0),
-        goals=torch.from_numpy(np.stack(goals)),
-        decisions=_pad(decisions, 0),
-        moves=_pad(moves, -1),
-        things=_pad(things, -1),
-        done=_pad(done, -1),
-        planned=_planned([own for own in planned if own is not None]),
+        goals=torch.from_numpy(np.stack([episode.goal for episode in episodes])),
+        decisions=_pad([episode.decisions for episode in episodes], 0),
+        moves=_pad([episode.moves for episode in episodes], NOT_ASKED),
+        things=_pad([episode.things for episode in episodes], NOT_ASKED),
+        done=_pad([episode.done for episode in episodes], NOT_ASKED),
+        planned=_planned([episode.planned for episode in episodes if episode.planned is not None]),
     )
 
 
 def _planned(episodes: Sequence[PlannedNumbers]) -> PlannedBatch | None:
+    """Return the subgoals, or what planners keep, padded; None without any."""
     if not episodes:
         return None
-    context, kept, keys = zip(*episodes, strict=True)
     # A decision that is there for padding sees the first look.
-    return PlannedBatch(_pad(context, 0), _pad(kept, 0), _pad(keys, -1))
+    return PlannedBatch(
+        context=_pad([episode.context for episode in episodes], 0),
+        kept=_pad([episode.kept for episode in episodes], 0),
+        keys=_pad([episode.keys for episode in episodes], NOT_ASKED),
+    )
 
 
 def _pad(arrays: Sequence[NDArray[Any]], fill: int) -> torch.Tensor:
-    shape = tuple(max(own) for own in zip(*(one.shape for one in arrays), strict=True))
+    """Return arrays in one, each filled up to the greatest size along each axis."""
+    shape = np.max([array.shape for array in arrays], axis=0)
     padded = np.full((len(arrays), *shape), fill, arrays[0].dtype)
-    for row, one in zip(padded, arrays, strict=True):
-        row[tuple(slice(size) for size in one.shape)] = one
+    for row, array in zip(padded, arrays, strict=True):
+        corner = tuple(slice(size) for size in array.shape)
+        row[corner] = array
     return torch.from_numpy(padded)

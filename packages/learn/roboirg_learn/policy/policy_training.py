@@ -5,73 +5,37 @@ from __future__ import annotations
 import json
 import math
 import random
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
-from torch.nn import functional
 
-from roboirg.extension.commands import (
-    InvalidValueError,
-    parallel_map,
-    short_hash,
-    write_atomically,
-)
-from roboirg.extension.episodes import (
-    ENVIRONMENT_VERSION,
-    Episode,
-    episodes_of,
-    language_label,
-)
+from roboirg.extension.commands import InvalidValueError, parallel_map, write_atomically
+from roboirg.extension.episodes import Episode, episodes_of
 from roboirg.extension.sight import ExpertRecording, decode_png, points_of, record_expert
-from roboirg_learn.listener.encoders import ENCODERS
-from roboirg_learn.listener.listener_net import ListenerNet
-from roboirg_learn.listener.object_relations import corners_of
-from roboirg_learn.listener.reader_training import (
-    Lesson,
-    check_reader,
-    lesson_of,
-    said,
-    train_reader,
-)
-from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary, make_vocabulary
-from roboirg_learn.policy.body_training import train_body
-from roboirg_learn.policy.moves import common_moves, decisions_of
-from roboirg_learn.policy.policy_model import (
-    FIRST_LOOKS,
-    PolicyModel,
-    load_policy,
-    save_policy,
-    seen_things,
-)
-from roboirg_learn.policy.policy_plan import (
-    HANDS,
-    PLANNERS,
-    WORDLESS,
-    PolicyPlan,
-    Recorded,
-)
+from roboirg_learn.listener.reader_plan import ReaderPlan
+from roboirg_learn.listener.vocabulary import parts_of_tasks
+from roboirg_learn.policy.body_training import BodyLayout, BodyLesson, train_body
+from roboirg_learn.policy.moves import LookDecision, common_moves, decisions_of
+from roboirg_learn.policy.policy_files import PolicyFiles
+from roboirg_learn.policy.policy_plan import PLANNERS, BodyPlan, Recorded
 from roboirg_learn.policy.recording_files import load_recording, save_recording
-from roboirg_learn.policy.sight import (
-    Sight,
-    labeled_looks,
-    sight_of,
-    turns_of,
-)
+from roboirg_learn.policy.sight import Sight, sight_of, turns_of
 from roboirg_learn.policy.subgoals import forms_of, subgoals_due
-from roboirg_learn.policy.task_net import TaskNet
 from roboirg_learn.policy.thing_detector import (
     LabeledPicture,
     ThingDetector,
     detector_loss,
     varied,
 )
-from roboirg_learn.policy.tracks import LookTokens
-from roboirg_learn.trainer import KeptTraining, Progress, Trainer, batch_count, batches
+from roboirg_learn.policy.trained_body import GoalLayout, TrainedBody, load_body, save_body
+from roboirg_learn.policy.trained_reader import load_reader, save_reader
+from roboirg_learn.policy.word_training import check_words, teach_reader
+from roboirg_learn.trained_file import END
+from roboirg_learn.trainer import Course, KeptTraining, Progress, Training, batches
 
 RECORDINGS = "recordings"
 """The folder of recordings in that of a policy."""
@@ -79,98 +43,97 @@ PICTURE_EVERY = 16
 """Looks from one picture to the next in scenes that are drawn; many scenes help more than many
 pictures of each."""
 MOST_LOOKS = 10_000
-DETECTOR_BATCH, DETECTOR_RATE = 16, 8e-3
-TASK_EPOCHS, TASK_RATE = 6, 5e-3
-FORGOTTEN_WORDS = 0.1
-"""Share of the words that the task must be named without."""
+DETECTOR_BATCH = 16
+DETECTOR_RATE = 8e-3
 
 
-def train_policy(plan: PolicyPlan, folder: Path, workers: int, progress: Progress) -> PolicyModel:
-    """Return a policy that has learned from the disturbed expert in random scenes.
+def trained_files(
+    plan: BodyPlan, words: ReaderPlan, folder: Path, workers: int, progress: Progress
+) -> PolicyFiles:
+    """Return the files of a policy that has learned from the disturbed expert in random scenes.
 
-    What is recorded and learned stays in the folder, and is used again by the same plan, and as
-    far as it fits by others.
+    What is recorded and learned stays in the folder, and is used again by the same plans, and as
+    far as it fits by others: bodies with other memories, readers of other words.
 
     Args:
-        plan: how.
-        folder: for recordings, and for what is learned on the way.
-        workers: processes that record; 0 uses this one.
+        plan: how its body learns.
+        words: how its reader learns.
+        folder: for recordings, for what is learned on the way, and for the files.
+        workers: processes that record and draw; 0 uses this one.
         progress: called with a kind of work, what is done of it, and all of it.
 
     Raises:
-        InvalidValueError: no episode of a task could be recorded, the plan cannot be followed, or
-            the folder holds what another plan recorded.
+        InvalidValueError: no episode of a task could be recorded, a plan cannot be followed, or
+            the folder holds what another plan recorded or learned.
     """
-    check_reader(plan.tasks, plan.settings, plan.encoders, plan.language)
-    if pixels := [name for name in plan.encoders if ENCODERS[name].reads_pixels]:
-        raise InvalidValueError(f"Encoder {pixels[0]!r} reads pixels; a policy's reader has none.")
+    name = f"{words.heard}-{words.seed}"
+    files = PolicyFiles(
+        body=folder / f"{plan.memory}-{plan.seed}.body{END}",
+        reader=folder / f"{name}.reader{END}",
+    )
+    check_words(words)
     _check_folder(plan, folder)
-    recorded = record_all(plan, folder, workers, progress)
-    sight = sight_of(one.recording for one in recorded)
-    detector = _detector(plan, recorded, sight, folder, progress)
-    corners = _corners(recorded)
-    lessons, vocabulary = _lessons(plan, recorded, sight, corners)
-    decisions = [decisions_of(one.recording) for one in recorded]
-    moves = common_moves(decisions)
-    planned = plan.memory in PLANNERS
-    hands = plan._replace(memory=HANDS) if planned else plan
-    body = train_body(hands, recorded, decisions, moves, sight, vocabulary, folder, progress)
-    forms = forms_of(one.episode for one in recorded) if planned else ()
-    planner = None
-    if planned:
-        due = [
-            subgoals_due(one.recording, one.episode, [decision.look for decision in own])
-            for one, own in zip(recorded, decisions, strict=True)
-        ]
-        planner = train_body(plan, recorded, due, forms, sight, vocabulary, folder, progress)
-    task_net, reader = _train_words(plan, lessons, vocabulary, folder, progress)
-    about = {**about_policy(plan), "episodes": len(recorded)}
-    return PolicyModel(
-        sight, detector, vocabulary, task_net, reader, corners, moves, plan.memory,
-        body, about, forms, planner,
-    )  # fmt: skip
+    if not files.body.exists():
+        save_body(_learn_body(plan, folder, workers, progress), files.body)
+    body = load_body(files.body)
+    _check_plan(files.body, body.plan, plan.about)
+    if not files.reader.exists():
+        reader = teach_reader(body, words, folder, name, workers, progress)
+        save_reader(reader, files.reader)
+    _check_plan(files.reader, load_reader(files.reader).plan, words.about)
+    return files
 
 
-def trained_file(plan: PolicyPlan, folder: Path, workers: int, progress: Progress) -> Path:
-    """Return the file of a policy; it is trained unless the folder has it.
-
-    Raises:
-        InvalidValueError: as for `train_policy`, or the file is of another plan.
-    """
-    path = folder / f"{plan.name}.pt"
-    if not path.exists():
-        save_policy(train_policy(plan, folder, workers, progress), path)
-    about = load_policy(path).about
-    if any(about.get(name) != value for name, value in about_policy(plan).items()):
+def _check_plan(path: Path, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+    """Refuse a file that was trained by another plan; what else the file has is no matter."""
+    if not wanted.items() <= found.items():
         raise InvalidValueError(
             f"{str(path)!r} was trained by another plan; give another folder, or delete it."
         )
-    return path
 
 
-def about_policy(plan: PolicyPlan) -> dict[str, Any]:
-    """Return what a policy's file says about its plan."""
-    return {
-        **{name: value for name, value in plan._asdict().items() if name != "language"},
-        "tasks": list(plan.tasks),
-        "settings": list(plan.settings),
-        "words": plan.words if plan.settings else WORDLESS,
-        "language_version": language_label(plan.tasks, plan.words, plan.language, plan.settings),
-    }
+def _learn_body(plan: BodyPlan, folder: Path, workers: int, progress: Progress) -> TrainedBody:
+    """Return a body that has learned from recordings, with a planner if the plan has one."""
+    recorded = record_all(plan, folder, workers, progress)
+    body = _body_alone(plan, recorded, folder, progress)
+    if plan.memory not in PLANNERS:
+        return body
+    forms = forms_of(played.episode for played in recorded)
+    lessons = [BodyLesson(played, _subgoals_of(played)) for played in recorded]
+    layout = BodyLayout(body.sight, body.goals, forms)
+    planner = train_body(plan, lessons, layout, folder, progress)
+    return body._replace(forms=forms, planner=planner)
 
 
-def _check_folder(plan: PolicyPlan, folder: Path) -> None:
+def _body_alone(
+    plan: BodyPlan, recorded: Sequence[Recorded], folder: Path, progress: Progress
+) -> TrainedBody:
+    """Return a body without planner; where the plan has one, it follows subgoals."""
+    sight = sight_of(played.recording for played in recorded)
+    goals = GoalLayout(plan.tasks, parts_of_tasks(plan.tasks))
+    lessons = [BodyLesson(played, decisions_of(played.recording)) for played in recorded]
+    moves = common_moves(lesson.decisions for lesson in lessons)
+    detector = _trained_detector(plan, recorded, sight, folder, progress)
+    net = train_body(plan.of_net, lessons, BodyLayout(sight, goals, moves), folder, progress)
+    about = {**plan.about, "episodes": len(recorded)}
+    return TrainedBody(sight, detector, goals, moves, net, about)
+
+
+def _subgoals_of(played: Recorded) -> list[LookDecision]:
+    """Return the subgoals that are due at the decisions of an episode."""
+    looks = [decision.look for decision in decisions_of(played.recording)]
+    return subgoals_due(played.recording, played.episode, looks)
+
+
+def _check_folder(plan: BodyPlan, folder: Path) -> None:
     """Refuse a folder whose recordings and detector do not fit; write what they are made for."""
-    path, recordings = folder / "recorded.json", folder / RECORDINGS
-    if recordings.exists() and not path.exists():
+    path = folder / "recorded.json"
+    if (folder / RECORDINGS).exists() and not path.exists():
         raise InvalidValueError(
             f"{str(folder)!r} holds recordings of an earlier version; give another folder."
         )
-    wanted = {
-        "tasks": list(plan.tasks),
-        "drawn": plan.drawn,
-        "environment_version": ENVIRONMENT_VERSION,
-    }
+    about = plan.about
+    wanted = {name: about[name] for name in ("tasks", "drawn", "environment_version")}
     if not path.exists():
         write_atomically(path, json.dumps(wanted))
     found = json.loads(path.read_text(encoding="utf-8"))
@@ -182,27 +145,41 @@ def _check_folder(plan: PolicyPlan, folder: Path) -> None:
             )
 
 
-def record_all(plan: PolicyPlan, folder: Path, workers: int, progress: Progress) -> list[Recorded]:
+def record_all(plan: BodyPlan, folder: Path, workers: int, progress: Progress) -> list[Recorded]:
     """Record what is missing, and return the episodes in which the expert succeeded.
 
     Raises:
         InvalidValueError: it succeeded in none of a task.
     """
-    place = folder / RECORDINGS
-    place.mkdir(parents=True, exist_ok=True)
-    episodes = sorted(episodes_of(plan.tasks, "random", plan.scenes), key=lambda one: one.index)
-    missing = [one for one in episodes if not _path(place, one).exists()]
-    record = partial(_record, place, plan.drawn)
-    for done, _ in enumerate(parallel_map(record, missing, workers), 1):
-        progress("recordings", len(episodes) - len(missing) + done, len(episodes))
-    recorded = [Recorded(one, load_recording(_path(place, one))) for one in episodes]
-    found = [one for one in recorded if one.recording.status == "success"]
+    recordings = folder / RECORDINGS
+    recordings.mkdir(parents=True, exist_ok=True)
+    every_scene = episodes_of(plan.tasks, "random", plan.scenes)
+    episodes = sorted(every_scene, key=lambda episode: episode.index)
+    _record_missing(episodes, plan.drawn, recordings, workers, progress)
+    found = []
+    for episode in episodes:
+        recording = load_recording(_path(recordings, episode))
+        if recording.status == "success":
+            found.append(Recorded(episode, recording))
+
+    learned_tasks = {played.episode.task for played in found}
     for task in plan.tasks:
-        if not any(one.episode.task == task for one in found):
+        if task not in learned_tasks:
             raise InvalidValueError(
                 f"The expert succeeded in none of {plan.scenes} scenes of {task}; record more."
             )
     return found
+
+
+def _record_missing(
+    episodes: Sequence[Episode], drawn: int, folder: Path, workers: int, progress: Progress
+) -> None:
+    """Record the episodes that the folder does not have."""
+    missing = [episode for episode in episodes if not _path(folder, episode).exists()]
+    done = len(episodes) - len(missing)
+    for _ in parallel_map(partial(_record, folder, drawn), missing, workers):
+        done += 1
+        progress("recordings", done, len(episodes))
 
 
 def _path(folder: Path, episode: Episode) -> Path:
@@ -210,137 +187,69 @@ def _path(folder: Path, episode: Episode) -> Path:
 
 
 def _record(folder: Path, drawn: int, episode: Episode) -> None:
-    first, end = episode.index % PICTURE_EVERY, MOST_LOOKS if episode.index < drawn else 0
-    recorded = record_expert(episode, range(first, end, PICTURE_EVERY))
-    save_recording(recorded, _path(folder, episode))
+    """Record an episode; pictures of some looks are drawn in the first `drawn` ones of a task."""
+    pictures = range(0)
+    if episode.index < drawn:
+        # Not the same looks in every scene.
+        pictures = range(episode.index % PICTURE_EVERY, MOST_LOOKS, PICTURE_EVERY)
+    save_recording(record_expert(episode, pictures), _path(folder, episode))
 
 
-def _detector(
-    plan: PolicyPlan, recorded: Sequence[Recorded], sight: Sight, folder: Path, progress: Progress
+def _trained_detector(
+    plan: BodyPlan, recorded: Sequence[Recorded], sight: Sight, folder: Path, progress: Progress
 ) -> ThingDetector:
     """Return the folder's detector if it is of the same plan, or train it."""
-    torch.manual_seed(plan.seed)
-    detector = ThingDetector(len(sight.classes))
-    views: list[LabeledPicture] = []
-    count = sum(len(one.recording.pictures) for one in recorded)
-    made_of = [list(sight.classes), list(plan.tasks), count, plan.detector_epochs]
+    course = ThingDetectorCourse(plan, recorded, sight)
+    kept = KeptTraining(folder / "detector.pt", course.made_of)
+    Training(course).run(partial(progress, "detector"), kept)
+    return course.net
 
-    def moved(number: int) -> Iterator[list[LabeledPicture]]:
-        if not views:
-            views.extend(
-                view for one in recorded for view in labeled_pictures(one.recording, sight)
-            )
-        variation = np.random.default_rng((plan.seed, number))
-        rng = random.Random(f"{plan.seed}/{number}")
-        for batch in batches(views, rng, DETECTOR_BATCH):
-            yield [varied(one, variation) for one in batch]
 
-    trainer = Trainer[LabeledPicture](
-        detector,
-        lambda batch: detector_loss(detector, batch),
-        DETECTOR_RATE,
-        plan.detector_epochs * math.ceil(count / DETECTOR_BATCH),
-    )
-    kept = KeptTraining(folder / "detector.pt", made_of)
-    trainer.learn(plan.detector_epochs, moved, partial(progress, "detector"), kept)
-    return detector
+class ThingDetectorCourse(Course[LabeledPicture]):
+    """A detector learns the pictures of recordings, which are moved and mirrored in each pass."""
+
+    net: ThingDetector
+    rate = DETECTOR_RATE
+
+    def __init__(self, plan: BodyPlan, recorded: Sequence[Recorded], sight: Sight) -> None:
+        torch.manual_seed(plan.seed)
+        self._plan = plan
+        self._recorded = recorded
+        self._sight = sight
+        self._views: list[LabeledPicture] = []
+        self._count = sum(len(played.recording.pictures) for played in recorded)
+        self.net = ThingDetector(len(sight.classes))
+        self.epochs = plan.detector_epochs
+        self.steps = math.ceil(self._count / DETECTOR_BATCH)
+
+    @property
+    def made_of(self) -> list[Any]:
+        """All that the detector depends on, apart from the seed."""
+        return [list(self._sight.classes), list(self._plan.tasks), self._count, self.epochs]
+
+    def batches(self, epoch: int) -> Iterator[list[LabeledPicture]]:
+        self._decode()
+        variation = np.random.default_rng((self._plan.seed, epoch))
+        rng = random.Random(f"{self._plan.seed}/{epoch}")
+        for batch in batches(self._views, rng, DETECTOR_BATCH):
+            yield [varied(view, variation) for view in batch]
+
+    def loss(self, batch: Sequence[LabeledPicture]) -> torch.Tensor:
+        return detector_loss(self.net, batch)
+
+    def _decode(self) -> None:
+        """Decode all pictures once, which a training that has ended before does not need."""
+        if not self._views:
+            for played in self._recorded:
+                self._views += labeled_pictures(played.recording, self._sight)
 
 
 def labeled_pictures(recorded: ExpertRecording, sight: Sight) -> Iterator[LabeledPicture]:
     """Yield the pictures of an episode with what the simulator says is in them."""
     kinds = sight.kinds(recorded.classes)
     for look, png in recorded.pictures.items():
-        shown = recorded.visible[look] & (kinds >= 0)
-        things = recorded.things[look, shown].astype(np.float64)
-        points, turns = points_of(things[:, :3]), turns_of(things[:, 3])
-        yield LabeledPicture(decode_png(png), kinds[shown], points, turns)
-
-
-def _corners(recorded: Sequence[Recorded]) -> NDArray[np.float64]:
-    """Return the corners of the area where things stand at first, as `corners_of` does."""
-    first = [one.recording.things[0, one.recording.visible[0], :2] for one in recorded]
-    return corners_of(np.concatenate(first))
-
-
-def _lessons(
-    plan: PolicyPlan, recorded: Sequence[Recorded], sight: Sight, corners: NDArray[np.float64]
-) -> tuple[list[Lesson], Vocabulary]:
-    """Return the instructions that the reader hears, and what it can name."""
-    rng = np.random.default_rng(plan.seed)
-    seen = {
-        one.episode.key: seen_things(first_looks(one.recording, sight, rng), corners, sight.classes)
-        for one in recorded
-    }
-    episodes = [one.episode for one in recorded]
-    told = list(said(episodes, plan.settings, plan.words, plan.goals, plan.seed, plan.language))
-    if not plan.settings:
-        told = [(episode, "") for episode in episodes]
-    vocabulary = make_vocabulary((text for _, text in told), sight.classes, plan.tasks)
-    lessons = [
-        lesson_of(ListenerInput(episode.task, text, seen[episode.key]), episode)
-        for episode, text in told
-    ]
-    return lessons, vocabulary
-
-
-def first_looks(
-    recorded: ExpertRecording, sight: Sight, rng: np.random.Generator
-) -> list[LookTokens]:
-    """Return what the reader of words sees of an episode."""
-    wanted = FIRST_LOOKS if recorded.is_video[0] else FIRST_LOOKS[:1]
-    looks = enumerate(labeled_looks(recorded, sight, rng))
-    return [tokens for look, (tokens, _) in looks if look in wanted]
-
-
-def _train_words(
-    plan: PolicyPlan,
-    lessons: Sequence[Lesson],
-    vocabulary: Vocabulary,
-    folder: Path,
-    progress: Progress,
-) -> tuple[TaskNet, ListenerNet]:
-    """Return what names the task, and what reads the goal: the folder's, or train them."""
-    texts = short_hash("\n".join(one.given.text for one in lessons))
-    made_of = [*map(list, vocabulary), texts, plan.reader_epochs, dict(plan.encoders)]
-    name = f"{plan.heard}-{plan.seed}.pt"
-    torch.manual_seed(plan.seed)
-    kept = KeptTraining(folder / f"tasks-{name}", made_of)
-    task_net = _train_tasks(plan, lessons, vocabulary, kept, progress)
-    reader = train_reader(
-        lessons, vocabulary, plan.reader_epochs, plan.seed, progress, plan.encoders,
-        KeptTraining(folder / f"words-{name}", made_of),
-    )  # fmt: skip
-    return task_net, reader
-
-
-def _train_tasks(
-    plan: PolicyPlan,
-    lessons: Sequence[Lesson],
-    vocabulary: Vocabulary,
-    kept: KeptTraining,
-    progress: Progress,
-) -> TaskNet:
-    """Return what names the task."""
-    rng = random.Random(plan.seed)
-    task_net = TaskNet(vocabulary)
-    numbers = {task: number for number, task in enumerate(plan.tasks)}
-
-    def task_loss(batch: Sequence[Lesson]) -> torch.Tensor:
-        texts = [_thinned(one.given.text, rng) for one in batch]
-        wanted = torch.tensor([numbers[one.given.task] for one in batch])
-        scores = task_net(texts, [one.given.seen for one in batch])
-        return functional.cross_entropy(scores, wanted)
-
-    trainer = Trainer[Lesson](task_net, task_loss, TASK_RATE, TASK_EPOCHS * batch_count(lessons))
-
-    def mixed(number: int) -> Iterator[list[Lesson]]:
-        rng.seed(f"{plan.seed}/{number}")
-        return batches(lessons, rng)
-
-    trainer.learn(TASK_EPOCHS, mixed, partial(progress, "tasks"), kept)
-    return task_net
-
-
-def _thinned(text: str, rng: random.Random) -> str:
-    """Return a text without some of its words."""
-    return " ".join(word for word in text.split() if rng.random() >= FORGOTTEN_WORDS)
+        is_shown = recorded.visible[look] & (kinds >= 0)
+        things = recorded.things[look, is_shown].astype(np.float64)
+        points = points_of(things[:, :3])
+        turns = turns_of(things[:, 3])
+        yield LabeledPicture(decode_png(png), kinds[is_shown], points, turns)

@@ -5,12 +5,18 @@ from __future__ import annotations
 import io
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from roboirg.extension.commands import InvalidValueError, write_atomically
 from roboirg.extension.sight import ExpertRecording
 
+_TEXTS = ("names", "classes", "turns")
+"""Fields with several texts."""
+_WORDS = ("key", "status")
+"""Fields with one text."""
 _PICTURE = "picture_"
 """Before the number of a look, in the names of a file."""
 
@@ -20,7 +26,8 @@ def save_recording(recorded: ExpertRecording, path: Path) -> None:
     fields = recorded._asdict()
     pictures = fields.pop("pictures")
     arrays = {name: np.asarray(value) for name, value in fields.items()}
-    arrays |= {f"{_PICTURE}{look}": np.frombuffer(png, np.uint8) for look, png in pictures.items()}
+    for look, png in pictures.items():
+        arrays[f"{_PICTURE}{look}"] = np.frombuffer(png, np.uint8)
     file = io.BytesIO()
     np.savez(file, allow_pickle=False, **arrays)
     write_atomically(path, file.getvalue())
@@ -34,16 +41,24 @@ def load_recording(path: Path) -> ExpertRecording:
     """
     try:
         with np.load(path, allow_pickle=False) as content:
-            found = dict(content)
-        pictures = {
-            int(name.removeprefix(_PICTURE)): found.pop(name).tobytes()
-            for name in list(found)
-            if name.startswith(_PICTURE)
-        }
-        texts = {name: tuple(found[name].tolist()) for name in ("names", "classes", "turns")}
-        words = {name: str(found[name]) for name in ("key", "status")}
-        return ExpertRecording(**{**found, **texts, **words}, pictures=pictures)
+            return _recording_of(dict(content))
     except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
         raise InvalidValueError(
             f"The recording {str(path)!r} cannot be read ({error}); delete it to make it again."
         ) from error
+
+
+def _recording_of(arrays: dict[str, NDArray[Any]]) -> ExpertRecording:
+    """Return the recording of a file's arrays."""
+    fields: dict[str, Any] = {"pictures": {}}
+    for name, array in arrays.items():
+        if name.startswith(_PICTURE):
+            look = int(name.removeprefix(_PICTURE))
+            fields["pictures"][look] = array.tobytes()
+        elif name in _TEXTS:
+            fields[name] = tuple(array.tolist())
+        elif name in _WORDS:
+            fields[name] = str(array)
+        else:
+            fields[name] = array
+    return ExpertRecording(**fields)

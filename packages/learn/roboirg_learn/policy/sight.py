@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -21,10 +22,14 @@ HIDDEN_LOOKS = 5
 """Looks for which a thing that is lost stays lost, and what is not there is found."""
 GHOST = -1
 """Number of the object where none is."""
-PLACE_NOISE, TURN_NOISE = 0.7, 0.2
-"""Standard deviations of what a detector finds: of a place, pixels, and of the angle, rad."""
-LOST, LOST_NEAR_TOOL = 0.02, 0.15
+PLACE_NOISE = 0.7
+"""Standard deviation of the places that a detector finds, pixels."""
+TURN_NOISE = 0.2
+"""Standard deviation of the angles that it finds, rad."""
+LOST = 0.02
 """Mean probability that a thing is not found; some things are lost more often."""
+LOST_NEAR_TOOL = 0.15
+"""The same near the tool."""
 GHOST_RATE = 0.04
 """Probability that something is found that is not there, where something else is."""
 
@@ -53,54 +58,166 @@ class Sight(NamedTuple):
 
 
 def turns_of(angles: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Return cosine and sine (..., 2) of four times angles, rad, which a square has four of."""
+    """Return cosine and sine (..., 2) of four times angles, rad.
+
+    A square looks the same after a quarter turn, and so do these numbers.
+    """
     return np.stack([np.cos(4.0 * angles), np.sin(4.0 * angles)], -1).astype(np.float32)
 
 
 def sight_of(recorded: Iterable[ExpertRecording]) -> Sight:
     """Return the classes of things that episodes show, each with its height when first seen."""
-    found: dict[str, list[float]] = {}
-    for one in recorded:
-        for number in np.flatnonzero(one.visible.any(axis=0)):
-            first = int(one.visible[:, number].argmax())
-            found.setdefault(one.classes[number], []).append(float(one.things[first, number, 2]))
-    classes = tuple(sorted(found))
-    return Sight(classes, np.array([np.median(found[name]) for name in classes]))
+    heights: dict[str, list[float]] = {}
+    for recording in recorded:
+        for number, name in enumerate(recording.classes):
+            is_visible = recording.visible[:, number]
+            if is_visible.any():
+                height = recording.things[is_visible.argmax(), number, 2]
+                heights.setdefault(name, []).append(float(height))
+    classes = tuple(sorted(heights))
+    return Sight(classes, np.array([np.median(heights[name]) for name in classes]))
+
+
+class LabeledLook(NamedTuple):
+    """What a detector might find at a look.
+
+    Attributes:
+        tokens: the things.
+        objects: the number of the object that each is; `GHOST` where there is none.
+    """
+
+    tokens: LookTokens
+    objects: NDArray[np.intp]
+
+    def with_ghost(
+        self, kind: int, place: NDArray[np.float32], turn: NDArray[np.float32]
+    ) -> LabeledLook:
+        """Return the same with a thing that is not there."""
+        tokens = LookTokens(
+            np.append(self.tokens.classes, kind),
+            np.vstack([self.tokens.places, place]),
+            np.vstack([self.tokens.turns, turn]),
+        )
+        return LabeledLook(tokens, np.append(self.objects, GHOST))
 
 
 def labeled_looks(
     recorded: ExpertRecording, sight: Sight, rng: np.random.Generator
-) -> Iterator[tuple[LookTokens, NDArray[np.intp]]]:
-    """Yield what a detector might find at each look, and the numbers of the objects found.
+) -> Iterator[LabeledLook]:
+    """Yield what a detector might find at each look.
 
-    An object that is found by mistake has the number `GHOST`.
+    A detector loses things, mistakes their places and angles a little, and now and then finds a
+    ghost: a thing of any class at the place of another.
     """
+    things = _noisy_things(recorded, sight, rng)
+    looks, objects = things.is_found.shape
+    ghosts = _draw_ghosts(looks, objects, len(sight.classes), rng)
+    for look in range(looks):
+        labeled = things.at_look(look)
+        block = look // HIDDEN_LOOKS
+        host = ghosts.hosts[block]
+        if ghosts.is_there[block] and things.is_found[look, host]:
+            place = things.places[look, host]
+            labeled = labeled.with_ghost(ghosts.kinds[block], place, things.turns[look, host])
+        yield labeled
+
+
+class _Ghosts(NamedTuple):
+    """Things that are not there, one for each block of looks, if any.
+
+    Attributes:
+        is_there: whether there is one.
+        kinds: the number of its class.
+        hosts: the number of the object at whose place it is.
+    """
+
+    is_there: NDArray[np.bool_]
+    kinds: NDArray[np.int64]
+    hosts: NDArray[np.int64]
+
+
+class _NoisyThings(NamedTuple):
+    """What a detector would find of T looks at K objects.
+
+    Attributes:
+        kinds: (K,) numbers of classes.
+        is_found: (T, K) whether it finds an object.
+        places: (T, K, 2) x and y where it finds it, m.
+        turns: (T, K, 2) as `turns_of` returns them.
+    """
+
+    kinds: NDArray[np.int64]
+    is_found: NDArray[np.bool_]
+    places: NDArray[np.float32]
+    turns: NDArray[np.float32]
+
+    def at_look(self, look: int) -> LabeledLook:
+        """Return what is found at a look."""
+        objects = np.flatnonzero(self.is_found[look])
+        places = self.places[look, objects]
+        tokens = LookTokens(self.kinds[objects], places, self.turns[look, objects])
+        return LabeledLook(tokens, objects)
+
+
+def _noisy_things(
+    recorded: ExpertRecording, sight: Sight, rng: np.random.Generator
+) -> _NoisyThings:
+    """Draw what a detector would find of the objects of an episode."""
     kinds = sight.kinds(recorded.classes)
     positions = recorded.things[..., :3].astype(np.float64)
-    away = np.hypot(*np.moveaxis(positions[..., :2] - recorded.tool[:, None, :2], -1, 0))
-    lost = np.where(away < NEAR_TOOL, LOST_NEAR_TOOL, LOST)
-    # A detector has trouble with the same thing again and again.
-    lost = lost * rng.exponential(1.0, lost.shape[1])
+    is_found = _is_not_lost(recorded, positions, rng)
     points = points_of(positions)
-    # What hides a thing does so for a while.
-    blocks = -(-len(lost) // HIDDEN_LOOKS)
-    drawn = rng.random((blocks, lost.shape[1])).repeat(HIDDEN_LOOKS, axis=0)[: len(lost)]
-    found = recorded.visible & (drawn >= lost) & (kinds >= 0)
-    low, high = np.array([0, ROWS[0]]), np.array([COLUMNS, ROWS[1]])
-    found &= ((points >= low) & (points < high)).all(axis=-1)
+    is_found &= recorded.visible & (kinds >= 0) & _is_on_table(points)
+
     points += rng.normal(0.0, PLACE_NOISE, points.shape)
-    shape = points.shape[:2]
-    every = np.broadcast_to(np.maximum(kinds, 0), shape).ravel()
-    places = sight.places(every, points.reshape(-1, 2)).reshape(*shape, 2)
-    turns = turns_of(recorded.things[..., 3] + rng.normal(0.0, TURN_NOISE, shape))
-    is_ghost = rng.random(blocks) < GHOST_RATE
-    ghosts = rng.integers(0, len(sight.classes), blocks)
-    hosts = rng.integers(0, shape[1], blocks)
-    for look, shown in enumerate(found):
-        block = look // HIDDEN_LOOKS
-        objects = at = np.flatnonzero(shown)
-        own = kinds[at]
-        if is_ghost[block] and shown[hosts[block]]:
-            at, own = np.append(at, hosts[block]), np.append(own, ghosts[block])
-            objects = np.append(objects, GHOST)
-        yield LookTokens(own, places[look, at], turns[look, at]), objects
+    places = _places_of(points, kinds, sight)
+    angles = recorded.things[..., 3]
+    turns = turns_of(angles + rng.normal(0.0, TURN_NOISE, angles.shape))
+    return _NoisyThings(kinds, is_found, places, turns)
+
+
+def _is_not_lost(
+    recorded: ExpertRecording, positions: NDArray[np.float64], rng: np.random.Generator
+) -> NDArray[np.bool_]:
+    """Draw whether a detector does not lose things that are visible (looks, objects)."""
+    from_tool = positions[..., :2] - recorded.tool[:, None, :2]
+    distances = np.hypot(from_tool[..., 0], from_tool[..., 1])
+    probabilities = np.where(distances < NEAR_TOOL, LOST_NEAR_TOOL, LOST)
+    looks, objects = distances.shape
+    # A detector has trouble with the same thing again and again.
+    probabilities = probabilities * rng.exponential(1.0, objects)
+    # What hides a thing does so for a while.
+    drawn = rng.random((_block_count(looks), objects)).repeat(HIDDEN_LOOKS, axis=0)
+    return drawn[:looks] >= probabilities
+
+
+def _is_on_table(points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return whether points (..., 2), column and row, are in the part that shows the table."""
+    low = np.array([0, ROWS[0]])
+    high = np.array([COLUMNS, ROWS[1]])
+    is_inside = (points >= low) & (points < high)
+    return is_inside[..., 0] & is_inside[..., 1]
+
+
+def _places_of(
+    points: NDArray[np.float64], kinds: NDArray[np.int64], sight: Sight
+) -> NDArray[np.float32]:
+    """Return x and y, m, of the points of objects at all looks (looks, objects, 2)."""
+    known_kinds = np.maximum(kinds, 0)  # the others are not found
+    kind_of_each = np.broadcast_to(known_kinds, points.shape[:2]).ravel()
+    return sight.places(kind_of_each, points.reshape(-1, 2)).reshape(points.shape)
+
+
+def _draw_ghosts(looks: int, objects: int, classes: int, rng: np.random.Generator) -> _Ghosts:
+    """Draw a ghost for each block of looks; most have none."""
+    blocks = _block_count(looks)
+    return _Ghosts(
+        is_there=rng.random(blocks) < GHOST_RATE,
+        kinds=rng.integers(0, classes, blocks),
+        hosts=rng.integers(0, objects, blocks),
+    )
+
+
+def _block_count(looks: int) -> int:
+    """Return how many blocks of `HIDDEN_LOOKS` looks there are, the last one maybe shorter."""
+    return math.ceil(looks / HIDDEN_LOOKS)

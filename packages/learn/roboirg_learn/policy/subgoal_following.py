@@ -12,6 +12,7 @@ from roboirg.extension.sight import LOOK_EVERY
 from roboirg_learn.policy.learned_policy import LearnedPolicy, tool_of
 from roboirg_learn.policy.moves import LEAVE
 from roboirg_learn.policy.planner_history import (
+    NO_LOOK,
     RECENT,
     PlannedNumbers,
     PlannerHistory,
@@ -22,7 +23,7 @@ from roboirg_learn.policy.policy_plan import CHOOSES
 from roboirg_learn.policy.subgoals import asked_numbers
 
 if TYPE_CHECKING:
-    from roboirg_learn.policy.policy_model import PolicyModel, SeenEpisode
+    from roboirg_learn.policy.policy_model import NetworkChoice, PolicyModel, SeenEpisode
 
 
 class SubgoalNamer:
@@ -34,33 +35,47 @@ class SubgoalNamer:
     """
 
     def __init__(self, model: PolicyModel, seen: SeenEpisode) -> None:
-        self._model, self._seen = model, seen
-        self._history = PlannerHistory(len(model.forms), chooses=model.memory == CHOOSES)
-        self._last: tuple[int, int | None, str] | None = None
+        self._body = model.body
+        self._seen = seen
+        chooses = self._body.plan["memory"] == CHOOSES
+        self._history = PlannerHistory(len(self._body.forms), chooses=chooses)
+        self._last_kind: int | None = None
+        self._last_thing: int | None = None
+        self._subgoal = ""
 
     def next(self, goal: NDArray[np.float32]) -> str:
         """Return the subgoal; its point stays as long as the same thing is meant.
 
         Args:
-            goal: as `PolicyModel.understand` returns it.
+            goal: as `GoalLayout.numbers` returns it.
         """
-        if self._model.planner is None:
+        if self._body.planner is None:
             raise RuntimeError("This policy has no planner.")
-        history, look = self._history, self._seen.looks - 1
-        planned = PlannedNumbers(
-            history.context(look)[None],
-            history.kept(self._seen.video_looks, look)[None],
-            np.full((1, RECENT), -1),
+        look = self._seen.looks - 1
+        chosen = self._seen.choose(self._body.planner, goal, self._planned(look))
+        self._history.name(chosen.kind, look)
+        recent = [recent_looks(look)[place] for place in chosen.keys]
+        self._history.choose(kept for kept in recent if kept >= 0)
+
+        is_same = chosen.kind == self._last_kind and chosen.thing == self._last_thing
+        if not is_same:
+            self._last_kind = chosen.kind
+            self._last_thing = chosen.thing
+            self._subgoal = self._words(chosen)
+        return self._subgoal
+
+    def _planned(self, look: int) -> PlannedNumbers:
+        """Return what the planner is given at a look; which looks to keep it says itself."""
+        return PlannedNumbers(
+            context=self._history.context(look)[None],
+            kept=self._history.kept(self._seen.video_looks, look)[None],
+            keys=np.full((1, RECENT), NO_LOOK),
         )
-        chosen = self._seen.choose(self._model.planner, goal, planned)
-        history.name(chosen.kind, look)
-        recent = recent_looks(look)
-        history.choose(recent[place] for place in chosen.keys if recent[place] >= 0)
-        if self._last is None or self._last[:2] != chosen[:2]:
-            form = self._model.forms[chosen.kind]
-            point = None if chosen.thing is None else self._seen.point(chosen.thing)
-            self._last = (*chosen[:2], form.at(point))
-        return self._last[2]
+
+    def _words(self, chosen: NetworkChoice) -> str:
+        """Return a subgoal with the point where its thing was last seen."""
+        point = None if chosen.thing is None else self._seen.point(chosen.thing)
+        return self._body.forms[chosen.kind].at(point)
 
 
 class LearnedHands(LearnedPolicy):
@@ -76,7 +91,8 @@ class LearnedHands(LearnedPolicy):
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         super().reset(instruction, demonstration)
-        self.subgoal, self._asked = None, None
+        self.subgoal = None
+        self._asked = None
         self._namer = SubgoalNamer(self.model, self.seen)
 
     def follow(self, subgoal: str) -> None:
@@ -91,14 +107,16 @@ class LearnedHands(LearnedPolicy):
             self._take(self._namer.next(self.understand()))
         if self._asked is None:
             return np.append(observation["end_effector"], LEAVE)[None]
-        nothing = np.zeros(self.model.vocabulary.goal_size, np.float32)
+        nothing = np.zeros(self.model.body.goals.size, np.float32)
         chosen = seen.decide(nothing, tool_of(observation), asked_for([self._asked]))
         return chosen[None]
 
     def _take(self, subgoal: str) -> None:
-        found = asked_numbers(subgoal, self.model.sight)
+        """Set the subgoal if its words have a known form."""
+        found = asked_numbers(subgoal, self.model.body.sight)
         if found is not None:
-            self.subgoal, self._asked = subgoal, found
+            self.subgoal = subgoal
+            self._asked = found
 
 
 class LearnedPlanner:
@@ -106,16 +124,15 @@ class LearnedPlanner:
 
     Args:
         model: whose planner names them.
-        version: of the file that holds it.
     """
 
     cameras = ("front",)
     demonstration_frames = LOOK_EVERY
     observe_every = LOOK_EVERY
 
-    def __init__(self, model: PolicyModel, version: str) -> None:
-        self.version = version
-        self._eyes = LearnedPolicy(model, version)
+    def __init__(self, model: PolicyModel) -> None:
+        self.version = model.version
+        self._eyes = LearnedPolicy(model)
         self.trained_tasks = self._eyes.trained_tasks
 
     @property

@@ -11,6 +11,8 @@ from roboirg_learn.policy.body_layers import WIDTH
 from roboirg_learn.policy.memories import Looks, at_looks
 from roboirg_learn.policy.planner_history import RECENT
 
+AWAY_SCALE = 5.0
+"""Per meter from the point, so that these numbers are about as great as the others."""
 NEAR = 25.0
 """Per meter: how fast a thing counts less, the farther it is from the point."""
 
@@ -42,10 +44,11 @@ class ContextInput(nn.Module):
             context: (B, D, numbers), with the point at the end.
             places: (B, D, K, 2) of the things, m.
         """
-        has, point = context[:, :, None, -3:-2], context[:, :, None, -2:]
-        away = places - point
+        # The last three numbers: whether there is a point, its x and its y.
+        has_point = context[:, :, None, -3:-2]
+        away = places - context[:, :, None, -2:]
         near = (-away.norm(dim=-1, keepdim=True) * NEAR).exp()
-        numbers = torch.cat([away * 5.0, near, torch.ones_like(near)], -1) * has
+        numbers = torch.cat([away * AWAY_SCALE, near, torch.ones_like(near)], -1) * has_point
         every = self.every(context)
         return every, every[:, :, None] + self.pointed(numbers)
 
@@ -65,11 +68,13 @@ class KeepScore(nn.Module):
             decisions: (B, D) the numbers of their looks.
             now: (B, D, WIDTH) the robot's token after all layers.
         """
-        recent = decisions[..., None] - torch.arange(RECENT - 1, -1, -1)
-        shown = torch.cat([looks.tool, (looks.things * looks.seen[..., None]).mean(2)], -1)
-        found = at_looks(shown, recent.clamp(min=0).flatten(1))
+        present = decisions[..., None]
+        recent = present - torch.arange(RECENT - 1, -1, -1)
+        seen_things = (looks.things * looks.seen[..., None]).mean(2)
+        summaries = torch.cat([looks.tool, seen_things], -1)
+        found = at_looks(summaries, recent.clamp(min=0).flatten(1))
         frames = found.reshape(*recent.shape, -1)
         thought = now[:, :, None].expand(-1, -1, RECENT, -1)
-        is_now = (recent == decisions[..., None]).float()[..., None]
-        scores: Tensor = self.layers(torch.cat([frames, thought, is_now], -1))
+        is_present = (recent == present).float()[..., None]
+        scores: Tensor = self.layers(torch.cat([frames, thought, is_present], -1))
         return scores.squeeze(-1)

@@ -18,7 +18,7 @@ IS_VIDEO = 6
 
 def with_planned(
     memory: str,
-    one: Recorded,
+    recorded: Recorded,
     numbers: EpisodeNumbers,
     forms: int,
     sight: Sight,
@@ -28,7 +28,7 @@ def with_planned(
 
     Args:
         memory: a name of `MEMORIES`.
-        one: the episode.
+        recorded: the episode.
         numbers: the same for the network.
         forms: number of forms of subgoals, for a planner.
         sight: of the camera.
@@ -36,22 +36,20 @@ def with_planned(
     """
     if memory == HANDS:
         done = numbers.done.tolist()
-        subgoals = recorded_subgoals(one.recording, one.episode, done, rng)
+        subgoals = recorded_subgoals(recorded.recording, recorded.episode, done, rng)
+        asked = asked_for([_asked_numbers(subgoal, sight) for subgoal in subgoals])
         # Hands know what they are asked for, and no goal.
-        return numbers._replace(
-            goal=np.zeros_like(numbers.goal),
-            planned=asked_for([_known(subgoal, sight) for subgoal in subgoals]),
-        )
+        return numbers._replace(goal=np.zeros_like(numbers.goal), planned=asked)
     if memory in PLANNERS:
+        chooses = memory == CHOOSES
         video = int(numbers.looks.tool[:, IS_VIDEO].sum())
-        planned = replayed(
-            numbers.moves, numbers.decisions, video, forms, chooses=memory == CHOOSES
-        )
+        planned = replayed(numbers.moves, numbers.decisions, video, forms, chooses=chooses)
         return numbers._replace(planned=planned)
     return numbers
 
 
-def _known(subgoal: str, sight: Sight) -> NDArray[np.float32]:
+def _asked_numbers(subgoal: str, sight: Sight) -> NDArray[np.float32]:
+    """Return the numbers of a subgoal; raise if it has no known form."""
     found = asked_numbers(subgoal, sight)
     if found is None:
         raise InvalidValueError(f"The subgoal {subgoal!r} has no form that hands know.")

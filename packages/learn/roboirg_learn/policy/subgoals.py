@@ -1,4 +1,8 @@
-"""Subgoals as numbers: what a body is asked for, from words with a point."""
+"""Subgoals as numbers: what a body is asked for, from words with a point.
+
+A subgoal is what is to be done next, as in "pick up the red cube at <110, 84>", with row and column
+of the place in the front picture. An episode has stages, and each has a subgoal.
+"""
 
 from __future__ import annotations
 
@@ -14,19 +18,25 @@ from roboirg_learn.policy.moves import LookDecision
 from roboirg_learn.policy.sight import Sight
 
 AT = "{at}"
+NO_THING = -1
+"""In the place of an object's number where a subgoal points at none."""
+LAST_PIXEL = 255
+"""Greatest column and row of the front picture."""
 THINGS = ("cube", "tape", "container", "target", "bin", "box", "button")
 MOTIONS = (
-    *("pick_cube", "place_on", "drop_into", "put_into", "move_over", "put_down", "pick_container"),
-    *("press", "press_below", "hover", "hold", "hold_until", "retreat", "go_home"),
-)
+    "pick_cube", "place_on", "drop_into", "put_into", "move_over", "put_down", "pick_container",
+    "press", "press_below", "hover", "hold", "hold_until", "retreat", "go_home",
+)  # fmt: skip
 COLORS = ("red", "green", "blue", "yellow", "gray", "purple")
 MARKS = (*MOTIONS, *THINGS, *COLORS, "left", "right")
 """In the order in which trained files have them."""
 POINT_NUMBERS = 3
 """Whether there is a point, and its x and y on the table, m."""
 ASKED_NUMBERS = len(MARKS) + POINT_NUMBERS
-SPREAD, FARTHEST = 3.2, 8.0
-"""Standard deviation and limit of the noise of a point, pixels."""
+SPREAD = 3.2
+"""Standard deviation of the noise of a point, pixels."""
+FARTHEST = 8.0
+"""Limit of that noise, pixels."""
 
 
 class SubgoalForm(NamedTuple):
@@ -43,7 +53,7 @@ class SubgoalForm(NamedTuple):
         """Return it with a point, column and row in the front picture; None leaves that out."""
         if point is None:
             return self.words.replace(f" {AT}", "")
-        column, row = np.clip(np.rint(point), 0, 255).astype(int)
+        column, row = np.clip(np.rint(point), 0, LAST_PIXEL).astype(int)
         return self.words.replace(AT, f"at <{row}, {column}>")
 
 
@@ -51,19 +61,27 @@ def subgoals_due(
     recorded: ExpertRecording, episode: Episode, looks: Sequence[int]
 ) -> list[LookDecision]:
     """Return the subgoal that is due at each of some looks."""
-    found, stages = [], episode.stages
+    found = []
     for look in looks:
-        stage = stages[min(int(recorded.done[look]), len(stages) - 1)]
-        at = stage.points_at
-        thing = -1 if at is None else recorded.names.index(at)
+        stage = episode.stages[_stage_after(int(recorded.done[look]), episode)]
+        thing = NO_THING
+        if stage.points_at is not None:
+            thing = recorded.names.index(stage.points_at)
         found.append(LookDecision(look, SubgoalForm(stage.subgoal), thing))
     return found
 
 
+def _stage_after(done: int, episode: Episode) -> int:
+    """Return the number of the stage that is under way after completed ones, at most the last."""
+    return min(done, len(episode.stages) - 1)
+
+
 def forms_of(episodes: Iterable[Episode]) -> tuple[SubgoalForm, ...]:
     """Return the forms of all subgoals of some episodes, in order."""
-    found = {stage.subgoal for one in episodes for stage in one.stages}
-    return tuple(map(SubgoalForm, sorted(found)))
+    found: set[str] = set()
+    for episode in episodes:
+        found.update(stage.subgoal for stage in episode.stages)
+    return tuple(SubgoalForm(words) for words in sorted(found))
 
 
 def asked_numbers(subgoal: str, sight: Sight) -> NDArray[np.float32] | None:
@@ -78,13 +96,24 @@ def asked_numbers(subgoal: str, sight: Sight) -> NDArray[np.float32] | None:
     for name in (request.kind, request.thing, request.color, request.side):
         if name is not None:
             found[MARKS.index(name)] = 1.0
-    kinds = [n for n, name in enumerate(sight.classes) if name.split()[0] == request.thing]
-    if request.point is not None and kinds:
-        same = [kind for kind in kinds if sight.classes[kind] == f"{request.thing} {request.color}"]
-        kind, (row, column) = np.array((same or kinds)[:1]), request.point
+    meant = _class_meant(request.thing, request.color, sight)
+    if request.point is not None and meant is not None:
+        row, column = request.point
         # The point is at the height of what is meant.
-        found[-POINT_NUMBERS:] = 1.0, *sight.places(kind, np.array([[column, row]], float))[0]
+        places = sight.places(np.array([meant]), np.array([[column, row]], float))
+        found[-POINT_NUMBERS:] = 1.0, *places[0]
     return found
+
+
+def _class_meant(thing: str | None, color: str | None, sight: Sight) -> int | None:
+    """Return the class of a thing and a color, else the first of the thing; None if unknown."""
+    same_thing = None
+    for number, name in enumerate(sight.classes):
+        if name == f"{thing} {color}":
+            return number
+        if same_thing is None and name.split()[0] == thing:
+            same_thing = number
+    return same_thing
 
 
 def recorded_subgoals(
@@ -102,17 +131,30 @@ def recorded_subgoals(
         rng: moves the points; None leaves them where they are.
     """
     texts: dict[int, str] = {}
-    stages = episode.stages
-    for index in {min(number, len(stages) - 1) for number in done}:
-        stage, point = stages[index], None
+    numbers = [_stage_after(count, episode) for count in done]
+    for number in set(numbers):
+        stage = episode.stages[number]
+        point = None
         if stage.points_at is not None:
-            began = int(np.flatnonzero(~recorded.is_video & (recorded.done >= index))[0])
-            spot = recorded.things[began, recorded.names.index(stage.points_at), :3]
-            point = points_of(spot.astype(np.float64))
+            point = _point_at_begin(recorded, number, stage.points_at)
             if rng is not None:
-                from scipy.stats import truncnorm  # takes a second, and looks for PyTorch
+                point += _noise(rng)
+        texts[number] = SubgoalForm(stage.subgoal).at(point)
+    return [texts[number] for number in numbers]
 
-                most = FARTHEST / SPREAD
-                point += truncnorm.rvs(-most, most, scale=SPREAD, size=2, random_state=rng)
-        texts[index] = SubgoalForm(stage.subgoal).at(point)
-    return [texts[min(number, len(stages) - 1)] for number in done]
+
+def _point_at_begin(recorded: ExpertRecording, stage: int, name: str) -> NDArray[np.float64]:
+    """Return column and row of an object when a stage, given by its number, began."""
+    has_begun = ~recorded.is_video & (recorded.done >= stage)
+    first_look = int(np.flatnonzero(has_begun)[0])
+    position = recorded.things[first_look, recorded.names.index(name), :3]
+    return points_of(position.astype(np.float64))
+
+
+def _noise(rng: np.random.Generator) -> NDArray[np.float64]:
+    """Draw by how much a point is moved, column and row; never by more than `FARTHEST`."""
+    from scipy.stats import truncnorm  # takes a second, and looks for PyTorch
+
+    most = FARTHEST / SPREAD
+    drawn: NDArray[np.float64] = truncnorm.rvs(-most, most, scale=SPREAD, size=2, random_state=rng)
+    return drawn

@@ -11,6 +11,8 @@ from roboirg_learn.listener.object_relations import ObjectsInView
 from roboirg_learn.listener.vocabulary import Vocabulary, split_words
 
 WIDTH = 32
+OBJECT_WEIGHT = 0.3
+"""What each object of a class adds to the number of the class."""
 
 
 class TaskNet(nn.Module):
@@ -33,9 +35,12 @@ class TaskNet(nn.Module):
         """Return logits (n, tasks); two looks mean that there is a video."""
         rows = torch.zeros(len(texts), len(self._words) + self._classes + 1)
         for row, text, objects in zip(rows, texts, seen, strict=True):
-            row[[self._words[word] for word in split_words(text) if word in self._words]] = 1.0
+            for word in split_words(text):
+                if word in self._words:
+                    row[self._words[word]] = 1.0
             for kind in objects.kinds[objects.views == 0]:
-                row[len(self._words) + int(kind)] += 0.3
-            row[-1] = float(objects.looks > 1)
+                row[len(self._words) + int(kind)] += OBJECT_WEIGHT
+            has_video = objects.looks > 1
+            row[-1] = float(has_video)
         scores: Tensor = self.layers(rows)
         return scores

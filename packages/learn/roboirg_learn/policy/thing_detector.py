@@ -1,4 +1,8 @@
-"""A small network that finds the things of a front picture: class, place and angle."""
+"""A small network that finds the things of a front picture: class, place and angle.
+
+The part of the picture that shows the table is divided into a grid of cells. Pictures that a
+detector learns from are moved and mirrored.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +21,10 @@ from roboirg_learn.policy.sight import COLUMNS, ROWS
 CELL = 4
 """Pixels of a cell of the grid in which things are found."""
 GRID = ((ROWS[1] - ROWS[0]) // CELL, COLUMNS // CELL)
+TABLE_CORNER = (0, ROWS[0])
+"""Column and row, pixels, of the corner of the part of a picture in which things are found."""
+MIRRORED = 0.5
+"""Share of the pictures that are mirrored while a detector learns."""
 CHANNELS = (16, 24, 40, 40)
 MOST_THINGS = 24
 LEAST_SCORE = 0.6
@@ -81,17 +89,36 @@ class ThingDetector(nn.Module):
         logits, details = self(torch.from_numpy(np.stack(pictures)))
         scores = logits.sigmoid()
         peaks = functional.max_pool2d(scores, 3, stride=1, padding=1)
-        sure = (scores >= peaks) & (scores > LEAST_SCORE)
+        is_thing = (scores >= peaks) & (scores > LEAST_SCORE)
         found = []
-        for picture, own, score, detail in zip(pictures, sure, scores, details, strict=True):
-            kinds, rows, columns = torch.nonzero(own, as_tuple=True)
-            best = score[kinds, rows, columns].argsort(descending=True)[:MOST_THINGS]
-            kinds, rows, columns = kinds[best], rows[best], columns[best]
-            shift = detail[:, rows, columns].numpy().T
-            points = (np.stack([columns, rows], 1) + shift[:, :2]) * CELL + (0, ROWS[0])
-            turns = shift[:, 2:].astype(np.float32)
-            found.append(LabeledPicture(picture, kinds.numpy(), points, turns))
+        for number, picture in enumerate(pictures):
+            cells = _surest_cells(is_thing[number], scores[number])
+            found.append(_labels_at(cells, details[number], picture))
         return found
+
+
+class _Cells(NamedTuple):
+    """Cells of a grid (n,), each with the class that is there."""
+
+    kinds: Tensor
+    rows: Tensor
+    columns: Tensor
+
+
+def _surest_cells(is_thing: Tensor, scores: Tensor) -> _Cells:
+    """Return the cells with things, (classes, *GRID), the surest first and not too many."""
+    kinds, rows, columns = torch.nonzero(is_thing, as_tuple=True)
+    surest = scores[kinds, rows, columns].argsort(descending=True)[:MOST_THINGS]
+    return _Cells(kinds[surest], rows[surest], columns[surest])
+
+
+def _labels_at(cells: _Cells, details: Tensor, picture: NDArray[np.uint8]) -> LabeledPicture:
+    """Return what is in a picture, given the cells, and place and angle in each cell of it."""
+    shift = details[:, cells.rows, cells.columns].numpy().T
+    corners = np.stack([cells.columns, cells.rows], 1)
+    points = (corners + shift[:, :2]) * CELL + TABLE_CORNER
+    turns = shift[:, 2:].astype(np.float32)
+    return LabeledPicture(picture, cells.kinds.numpy(), points, turns)
 
 
 def varied(view: LabeledPicture, rng: np.random.Generator) -> LabeledPicture:
@@ -100,30 +127,50 @@ def varied(view: LabeledPicture, rng: np.random.Generator) -> LabeledPicture:
     A few scenes show each thing in a few places only, and a detector learns those by heart.
     """
     down, right = rng.integers(-MOST_SHIFT, MOST_SHIFT + 1, 2).tolist()
-    rows, columns = view.picture.shape[:2]
-    picture = view.picture[np.clip(np.arange(rows) - down, 0, rows - 1)]
-    picture = picture[:, np.clip(np.arange(columns) - right, 0, columns - 1)]
-    points, turns = view.points + np.array([right, down]), view.turns
-    if rng.random() < 0.5:  # noqa: PLR2004
-        picture, turns = picture[:, ::-1], turns * np.array([1.0, -1.0], np.float32)
-        points = np.array([columns, 0.0]) + points * np.array([-1.0, 1.0])
-    return LabeledPicture(picture, view.classes, points, turns)
+    moved = _moved(view, down, right)
+    is_mirrored = rng.random() < MIRRORED
+    return _mirrored(moved) if is_mirrored else moved
+
+
+def _moved(view: LabeledPicture, down: int, right: int) -> LabeledPicture:
+    """Return a picture moved by pixels; its border fills what comes in."""
+    height, width = view.picture.shape[:2]
+    rows = np.clip(np.arange(height) - down, 0, height - 1)
+    columns = np.clip(np.arange(width) - right, 0, width - 1)
+    points = view.points + np.array([right, down])
+    return view._replace(picture=view.picture[rows][:, columns], points=points)
+
+
+def _mirrored(view: LabeledPicture) -> LabeledPicture:
+    """Return a picture with left and right exchanged."""
+    width = view.picture.shape[1]
+    points = np.array([width, 0.0]) + view.points * np.array([-1.0, 1.0])
+    turns = view.turns * np.array([1.0, -1.0], np.float32)
+    return view._replace(picture=view.picture[:, ::-1], points=points, turns=turns)
 
 
 def detector_loss(net: ThingDetector, views: Sequence[LabeledPicture]) -> Tensor:
     """Return the loss of a batch: where each class is, and place and angle there."""
     logits, details = net(torch.from_numpy(np.stack([view.picture for view in views])))
-    there = torch.zeros_like(logits)
+    is_there = torch.zeros_like(logits)
     wanted = torch.zeros_like(details)
     for number, view in enumerate(views):
-        cells = (view.points - (0, ROWS[0])) / CELL
-        for kind, (column, row), turn in zip(view.classes, cells, view.turns, strict=True):
-            if 0 <= row < GRID[0] and 0 <= column < GRID[1]:
-                spot = int(row), int(column)
-                there[number, int(kind), *spot] = 1.0
-                wanted[number, :, *spot] = torch.tensor([column - spot[1], row - spot[0], *turn])
-    weights = torch.where(there > 0, PRESENT_WEIGHT, 1.0)
-    scored = functional.binary_cross_entropy_with_logits(logits, there, weights, reduction="sum")
-    has = there.amax(1, keepdim=True)
-    refined = (functional.l1_loss(details, wanted, reduction="none") * has).sum()
-    return (scored / PRESENT_WEIGHT + refined) / there.sum().clamp(min=1.0)
+        _label_cells(view, is_there[number], wanted[number])
+    weights = torch.where(is_there > 0, PRESENT_WEIGHT, 1.0)
+    scored = functional.binary_cross_entropy_with_logits(logits, is_there, weights, reduction="sum")
+
+    has_thing = is_there.amax(1, keepdim=True)
+    distances = functional.l1_loss(details, wanted, reduction="none")
+    refined = (distances * has_thing).sum()
+    return (scored / PRESENT_WEIGHT + refined) / is_there.sum().clamp(min=1.0)
+
+
+def _label_cells(view: LabeledPicture, is_there: Tensor, wanted: Tensor) -> None:
+    """Write what is in a picture into its grids: 1 at each class, and place and angle in cells."""
+    cells = (view.points - TABLE_CORNER) / CELL
+    for kind, (x, y), turn in zip(view.classes, cells, view.turns, strict=True):
+        if 0 <= y < GRID[0] and 0 <= x < GRID[1]:
+            row = int(y)
+            column = int(x)
+            is_there[int(kind), row, column] = 1.0
+            wanted[:, row, column] = torch.tensor([x - column, y - row, *turn])

@@ -59,35 +59,42 @@ class Tracks:
 
     def update(self, look: LookTokens) -> NDArray[np.int64]:
         """Take in a look; returns the track of each of its things, -1 beyond the most tracks."""
-        mine = self._assign(look)
-        old = mine >= 0
-        own = mine[old]
-        way = look.places[old] - self.places[own]
-        followed = self.seen[own, None]
-        self._speeds[:] = 0.0
-        self._speeds[own] = np.where(followed, way, 0.0)
-        new = np.flatnonzero(~old)[: MOST_TRACKS - self.count]
-        mine[new] = self.count + np.arange(len(new))
+        tracks = self._assign(look)
+        self._follow(look, tracks)
+        new = np.flatnonzero(tracks < 0)[: MOST_TRACKS - self.count]
+        tracks[new] = self.count + np.arange(len(new))
         self.count += len(new)
-        kept = mine >= 0
-        own = mine[kept]
+
+        is_tracked = tracks >= 0
+        shown = tracks[is_tracked]
         self.seen[:] = False
-        self._times[own] += 1
+        self.seen[shown] = True
+        self.classes[shown] = look.classes[is_tracked]
+        self.places[shown] = look.places[is_tracked]
+        self.turns[shown] = look.turns[is_tracked]
+        self._times[shown] += 1
         self._looks += 1
-        self.seen[own], self.classes[own] = True, look.classes[kept]
-        self.places[own], self.turns[own] = look.places[kept], look.turns[kept]
-        return mine
+        return tracks
+
+    def _follow(self, look: LookTokens, tracks: NDArray[np.int64]) -> None:
+        """Note how far things have moved that the last look showed, too."""
+        is_old = tracks >= 0
+        old = tracks[is_old]
+        way = look.places[is_old] - self.places[old]
+        self._speeds[:] = 0.0
+        self._speeds[old] = np.where(self.seen[old, None], way, 0.0)
 
     def _assign(self, look: LookTokens) -> NDArray[np.int64]:
         """Return the track of each thing, -1 for a new one; pairs are nearest in all."""
-        mine = np.full(len(look.classes), -1, np.int64)
-        if not self.count or not len(mine):
-            return mine
+        found = np.full(len(look.classes), -1, np.int64)
+        if not self.count or not len(found):
+            return found
         expected = (self.places + self._speeds)[: self.count]
         away = look.places[:, None] - expected
-        far = np.hypot(away[..., 0], away[..., 1])
-        far[look.classes[:, None] != self.classes[: self.count]] = NEVER
-        things, tracks = linear_sum_assignment(np.minimum(far, NEVER))
-        near = far[things, tracks] <= GATE
-        mine[things[near]] = tracks[near]
-        return mine
+        distances = np.hypot(away[..., 0], away[..., 1])
+        is_other_class = look.classes[:, None] != self.classes[: self.count]
+        distances[is_other_class] = NEVER
+        things, tracks = linear_sum_assignment(np.minimum(distances, NEVER))
+        is_near = distances[things, tracks] <= GATE
+        found[things[is_near]] = tracks[is_near]
+        return found

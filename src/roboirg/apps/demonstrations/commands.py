@@ -20,6 +20,7 @@ from roboirg.cli.options import (
 from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
+    from roboirg.apps.demonstrations.dataset_replay import ReplayResult
     from roboirg.apps.demonstrations.export_plan import ExportPlan
 
 
@@ -70,8 +71,8 @@ def export_demonstrations(
     Example: roboirg export demonstrations --tasks PickXtimes --out data
     """
     from roboirg.apps.demonstrations.export_plan import ExportPlan, training_words
-    from roboirg.evaluation.plan.option_parsing import parse_episodes
     from roboirg.policies import find_policy
+    from roboirg.runs.plan.option_parsing import parse_episodes
 
     add_working_directory(last=True)
     words = PlanWords(context, plan, "demonstrations", OWN_OPTIONS)
@@ -80,7 +81,7 @@ def export_demonstrations(
     split = words.given("split", split)
     # `validated` checks the names that are cast.
     names = words.tasks(tasks)
-    made = ExportPlan(
+    export_plan = ExportPlan(
         tasks=names,
         split=split,
         episodes=parse_episodes(words.given("episodes", episodes), split, names),
@@ -91,22 +92,21 @@ def export_demonstrations(
         pictures=cast("Any", pictures),
         **chosen,
     ).validated()
-    _print_size(made)
+    _print_size(export_plan)
     if not dry_run:
-        _export(made, out, workers, trajectories)
+        _export(export_plan, out, workers, trajectories)
 
 
 def _print_size(plan: ExportPlan) -> None:
+    """Print how much is recorded and exported, and a warning where that spoils a test."""
     from roboirg.apps.demonstrations.export_plan import recording_jobs
 
-    for is_held_out, warning in (
-        (plan.split == "test", _TEST_EPISODES),
-        (plan.options.wordings == "test", _TEST_WORDS),
-    ):
-        if is_held_out:
-            typer.echo(warning, err=True)
+    if plan.split == "test":
+        typer.echo(_TEST_EPISODES, err=True)
+    if plan.options.wordings == "test":
+        typer.echo(_TEST_WORDS, err=True)
     jobs = recording_jobs(plan)
-    episodes = sum(len(said) for _, said in jobs)
+    episodes = sum(len(spoken.texts) for spoken in jobs)
     recorded = counted(len(jobs), "trajectory", "trajectories")
     typer.echo(f"{recorded}, {counted(episodes, 'episode')}", err=True)
 
@@ -125,10 +125,10 @@ def _export(plan: ExportPlan, out: Path, workers: int | None, trajectories: Path
             show(work, done, total, decimal(size) if size else "")
 
         summary = run_export(plan, out, worker_count(workers), report, trajectories)
-    ends = ", ".join(f"{number} {status}" for status, number in summary.statuses.items())
+    outcomes = [f"{count} {status}" for status, count in summary.statuses.items()]
     typer.echo(
         f"{counted(summary.episodes, 'episode')}, {decimal(summary.size)}: {out} "
-        f"(trajectories: {ends})"
+        f"(trajectories: {', '.join(outcomes)})"
     )
 
 
@@ -142,30 +142,33 @@ def replay(
 
     Example: roboirg replay data
     """
-    from collections import Counter
-
     from roboirg.apps.demonstrations.dataset_replay import TOLERANCE, replay_dataset
     from roboirg.util.processor import worker_count
 
-    count, largest = Counter[str](), 0.0
-    for one in replay_dataset(dataset, worker_count()):
-        count["trajectories"] += 1
-        count["same verdict"] += one.status == one.recorded_status
-        count["agree"] += one.agrees
-        largest = max(largest, one.final)
-        if not one.agrees:
-            typer.echo(
-                f"{one.name}: {one.status} after {one.steps} of {one.recorded_steps} steps "
-                f"(recorded: {one.recorded_status}); final state differs by {one.final:.2g}, "
-                f"any by at most {one.largest:.2g}"
-            )
+    results = []
+    for result in replay_dataset(dataset, worker_count()):
+        results.append(result)
+        if not result.agrees:
+            typer.echo(_difference_text(result))
+    total = counted(len(results), "trajectory", "trajectories")
+    same_verdict = sum(result.status == result.recorded_status for result in results)
+    agree = sum(result.agrees for result in results)
+    largest = max([0.0, *(result.final for result in results)])
     typer.echo(
-        f"{counted(count['trajectories'], 'trajectory', 'trajectories')}: {count['same verdict']} "
-        f"with the same verdict, {count['agree']} also with a final state within {TOLERANCE:g} "
-        f"(largest difference {largest:.2g})"
+        f"{total}: {same_verdict} with the same verdict, {agree} also with a final state within "
+        f"{TOLERANCE:g} (largest difference {largest:.2g})"
     )
-    if count["agree"] < count["trajectories"]:
+    if agree < len(results):
         raise typer.Exit(2)
+
+
+def _difference_text(result: ReplayResult) -> str:
+    """Return how the replay of a trajectory differs from its recording."""
+    return (
+        f"{result.name}: {result.status} after {result.steps} of {result.recorded_steps} steps "
+        f"(recorded: {result.recorded_status}); final state differs by {result.final:.2g}, "
+        f"any by at most {result.largest:.2g}"
+    )
 
 
 def add_commands(app: typer.Typer) -> None:

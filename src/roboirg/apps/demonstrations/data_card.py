@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from roboirg.apps.demonstrations.dataset_part import DatasetPart
@@ -38,34 +39,16 @@ def card_text(
         facts: of all trajectories, those that are left out, too.
         root: folder of the dataset.
     """
-    lengths = list(_lengths(parts))
-    lines = [
-        "---",
-        "license: apache-2.0",
-        "task_categories: [robotics]",
-        "tags: [LeRobot, RoboIRGBench]",
+    lines = ["---", "license: apache-2.0", "task_categories: [robotics]"]
+    lines.append("tags: [LeRobot, RoboIRGBench]")
+    if plan.format != "robomme-hdf5":
         # Without them, Hugging Face takes the tables of facts for frames.
-        *(
-            ()
-            if plan.format == "robomme-hdf5"
-            else ("configs: [{config_name: default, data_files: data/*/*.parquet}]",)
-        ),
-        "---",
-        "",
-        "# Demonstrations of RoboIRGBench",
-        "",
-        _head_line(plan),
-        "",
-        *_count_lines(plan, lengths, facts),
-        "",
-        "## Content",
-        "",
-        *_content_lines(plan),
-        "",
-        "## Training",
-        "",
-        training_text(plan, root),
-    ]
+        lines.append("configs: [{config_name: default, data_files: data/*/*.parquet}]")
+    lines += ["---", "", "# Demonstrations of RoboIRGBench", "", _head_line(plan), ""]
+    lines += _count_lines(_counts(parts))
+    lines += ["", *_words_lines(plan, facts)]
+    lines += ["", "## Content", "", *_content_lines(plan)]
+    lines += ["", "## Training", "", training_text(plan, root)]
     return "\n".join(lines) + "\n"
 
 
@@ -80,36 +63,56 @@ def _head_line(plan: ExportPlan) -> str:
     )
 
 
-def _lengths(parts: Sequence[DatasetPart]) -> Iterator[tuple[int, str, int]]:
-    """Yield frames, task and number of instructions of each trajectory."""
+@dataclass
+class _Counts:
+    """What is exported of a task: the frames of each trajectory, and what its words make of it."""
+
+    lengths: list[int] = field(default_factory=list)
+    episodes: int = 0
+    frames: int = 0
+
+    def add(self, length: int, instructions: int) -> None:
+        """Add a trajectory, which is an episode for each of its instructions."""
+        self.lengths.append(length)
+        self.episodes += instructions
+        self.frames += length * instructions
+
+    def line(self, label: str) -> str:
+        """Return a row of the table."""
+        lengths = f"{min(self.lengths)} to {max(self.lengths)}"
+        return f"| {label} | {len(self.lengths)} | {lengths} | {self.episodes} | {self.frames} |"
+
+
+def _counts(parts: Sequence[DatasetPart]) -> dict[str, _Counts]:
+    """Return the counts of each task, and of all."""
+    by_task: dict[str, _Counts] = {}
+    total = _Counts()
     for part in parts:
         for episode in part.episodes:
             facts = load_facts(episode.path)
-            yield facts.frames, facts.task, len(episode.texts)
+            for counts in (by_task.setdefault(facts.task, _Counts()), total):
+                counts.add(facts.frames, len(episode.texts))
+    return {**by_task, "all": total}
 
 
-def _count_lines(
-    plan: ExportPlan,
-    lengths: Sequence[tuple[int, str, int]],
-    facts: Sequence[TrajectoryFacts],
-) -> Iterator[str]:
+def _count_lines(counts: Mapping[str, _Counts]) -> Iterator[str]:
+    """Yield a table of what there is of each task."""
     yield "| task | trajectories | their frames | episodes | frames |"
     yield "| --- | --- | --- | --- | --- |"
-    tasks = dict.fromkeys(task for _, task, _ in lengths)
-    for label, names in (*((task, {task}) for task in tasks), ("all", tasks)):
-        own = [(length, count) for length, name, count in lengths if name in names]
-        shortest, longest = min(own)[0], max(own)[0]
-        episodes, frames = sum(count for _, count in own), sum(a * b for a, b in own)
-        yield f"| {label} | {len(own)} | {shortest} to {longest} | {episodes} | {frames} |"
-    yield ""
-    words = ", ".join(plan.settings)
+    for label, of_task in counts.items():
+        yield of_task.line(label)
+
+
+def _words_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator[str]:
+    """Yield what is said, and how trajectories ended."""
     yield (
-        f"Settings: {words}; forms: {', '.join(plan.forms)}. Each trajectory comes once with the "
-        "words of each of them that can express it; `meta/demonstrations.parquet` says which "
-        "episode is which."
+        f"Settings: {', '.join(plan.settings)}; forms: {', '.join(plan.forms)}. Each trajectory "
+        "comes once with the words of each of them that can express it; "
+        "`meta/demonstrations.parquet` says which episode is which."
     )
-    ends = Counter(one.status for one in facts)
-    yield f"Trajectories by outcome: {', '.join(f'{n} {status}' for status, n in ends.items())}."
+    outcomes = Counter(recorded.status for recorded in facts)
+    counts = [f"{count} {status}" for status, count in outcomes.items()]
+    yield f"Trajectories by outcome: {', '.join(counts)}."
 
 
 def _content_lines(plan: ExportPlan) -> Iterator[str]:

@@ -33,6 +33,13 @@ class RecordedEpisode(NamedTuple):
     texts: tuple[PlacedText, ...]
 
 
+class FilePlace(NamedTuple):
+    """Numbers of a folder, called chunk, and of a file in it."""
+
+    chunk: int
+    file: int
+
+
 @dataclass(frozen=True)
 class DatasetPart:
     """What is written at once; a part that is complete is never written again.
@@ -50,9 +57,9 @@ class DatasetPart:
     episodes: tuple[RecordedEpisode, ...]
 
     @property
-    def place(self) -> tuple[int, int]:
+    def place(self) -> FilePlace:
         """Numbers of the folder and of the file in it."""
-        return divmod(self.number, CHUNK_SIZE)
+        return FilePlace(*divmod(self.number, CHUNK_SIZE))
 
 
 class DatasetWriter(Protocol):
@@ -82,30 +89,31 @@ class RecordedTexts(NamedTuple):
 
 def place_texts(recorded: Sequence[RecordedTexts]) -> list[RecordedEpisode]:
     """Give every instruction its place; trajectories without frames are left out."""
-    texts: dict[str, int] = {}
-    episode_index = first_index = 0
-    placed = []
-    for path, said in recorded:
+    task_indices: dict[str, int] = {}
+    episode_index = 0
+    first_index = 0
+    episodes = []
+    for path, texts in recorded:
         length = load_facts(path).frames
         if not length:
             continue
-        own = []
-        for words in said:
-            task_index = texts.setdefault(words.text, len(texts))
-            own.append(PlacedText(words, episode_index, first_index, task_index))
-            episode_index, first_index = episode_index + 1, first_index + length
-        placed.append(RecordedEpisode(path, tuple(own)))
-    return placed
+        placed = []
+        for words in texts:
+            task_index = task_indices.setdefault(words.text, len(task_indices))
+            placed.append(PlacedText(words, episode_index, first_index, task_index))
+            episode_index += 1
+            first_index += length
+        episodes.append(RecordedEpisode(path, tuple(placed)))
+    return episodes
 
 
 def all_texts(parts: Sequence[DatasetPart]) -> list[str]:
     """Return all texts in the order of their indices."""
-    found = {
-        one.task_index: one.words.text
-        for part in parts
-        for episode in part.episodes
-        for one in episode.texts
-    }
+    found = {}
+    for part in parts:
+        for episode in part.episodes:
+            for placed in episode.texts:
+                found[placed.task_index] = placed.words.text
     return [found[index] for index in range(len(found))]
 
 
@@ -122,6 +130,8 @@ def episode_row(trajectory: Trajectory, placed: PlacedText) -> dict[str, Any]:
     """Return the row of an episode in the table of facts next to the dataset."""
     facts = trajectory.facts
     words = placed.words
+    final_joints = trajectory.joint_positions[-1].tolist()
+    final_fingers = trajectory.gripper[-1].tolist()
     return {
         "episode_index": placed.episode_index,
         "from_index": placed.first_index,
@@ -135,10 +145,7 @@ def episode_row(trajectory: Trajectory, placed: PlacedText) -> dict[str, Any]:
         "actions": facts.actions,
         "disturbed": facts.disturbed,
         "trajectory": _trajectory_name(facts, words.options),
-        "final_state": [
-            *trajectory.joint_positions[-1].tolist(),
-            *trajectory.gripper[-1].tolist(),
-        ],
+        "final_state": final_joints + final_fingers,
         "demonstration_source": facts.demonstration_source,
         "environment_version": facts.environment_version,
         "delivery": words.options.delivery,
@@ -149,7 +156,9 @@ def episode_row(trajectory: Trajectory, placed: PlacedText) -> dict[str, Any]:
 def _trajectory_name(facts: TrajectoryFacts, options: InstructionOptions) -> str:
     """Return a name that all instructions of a trajectory share; only the oracle's has several."""
     name = f"{facts.task}/{facts.split}/{facts.episode}/{facts.variation}"
-    return name if facts.policy == ORACLE else f"{name}/{options.setting}-{options.form}"
+    if facts.policy == ORACLE:
+        return name
+    return f"{name}/{options.setting}-{options.form}"
 
 
 EPISODE_TABLE = "meta/demonstrations.parquet"

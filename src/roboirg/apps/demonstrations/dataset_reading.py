@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,8 +20,12 @@ from roboirg.core.actions import JOINT_ANGLE, CheckedActions
 from roboirg.core.errors import InvalidValueError
 from roboirg.util.parquet_support import check_parquet_support
 
-_STATES, _ACTIONS = ("observation.state", "state"), ("action", "actions")
+_STATES = ("observation.state", "state")
+"""Names of the column of states, by format."""
+_ACTIONS = (EXECUTED, "action", "actions")
+"""Names of the column of what was executed, by format; the first that a dataset has counts."""
 _HDF5_NAME = re.compile(r"record_dataset_(\w+)\.h5")
+"""For example record_dataset_PickXtimes.h5."""
 _JOINTS = 7
 
 
@@ -82,62 +86,75 @@ def read_dataset(path: Path) -> Iterator[ReplayableTrajectory]:
 def _hdf5_files(folder: Path) -> list[Path]:
     """Return the HDF5 files that hold time steps, not links to them."""
     for place in (folder, folder / SHARED_FOLDER):
-        files = sorted(one for one in place.glob("*.h5") if _HDF5_NAME.fullmatch(one.name))
+        files = sorted(path for path in place.glob("*.h5") if _HDF5_NAME.fullmatch(path.name))
         if files:
             return files
     return []
 
 
 def _read_tables(root: Path, info: Mapping[str, Any]) -> Iterator[ReplayableTrajectory]:
-    from pyarrow import parquet
-
-    seen: set[str] = set()
-    places = _data_files(root, info)
-    state = next(name for name in _STATES if name in info["features"])
-    action = next(name for name in (EXECUTED, *_ACTIONS) if name in info["features"])
+    """Yield the trajectories of an export of ours in LeRobot's formats."""
+    files = _data_files(root, info)
+    state, action = _columns(info)
+    rows: dict[str, dict[str, Any]] = {}
     for row in read_rows(root / EPISODE_TABLE):
-        if row["trajectory"] in seen:
-            continue
-        seen.add(row["trajectory"])
+        rows.setdefault(row["trajectory"], row)  # that of its first instruction
+    for name, row in rows.items():
         number = row["episode_index"]
-        columns = [state, action, "episode_index", "is_video_demo"]
-        table = parquet.read_table(places[number], columns=columns)
-        own = np.asarray(table["episode_index"]) == number
-        own &= ~np.asarray(table["is_video_demo"])
-        states = np.array(table[state].to_pylist())[own]
+        frames = _own_frames(files[number], number, (state, action))
         final = np.array(row["final_state"])
         yield ReplayableTrajectory(
-            name=row["trajectory"],
+            name=name,
             task=row["task"],
             seed=row["seed"],
             split=row["split"],
             index=row["episode"],
-            actions=np.array(table[action].to_pylist(), dtype=np.float64)[own],
-            states=np.concatenate([states[1:], final[None, : _JOINTS + 1]]),
+            actions=frames[action].astype(np.float64),
+            states=np.concatenate([frames[state][1:], final[None, : _JOINTS + 1]]),
             final_state=final,
             status=row["status"],
             space=row.get("actions", JOINT_ANGLE.name),
         )
 
 
+def _columns(info: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the names of the columns of states and of executed actions."""
+    state = next(name for name in _STATES if name in info["features"])
+    action = next(name for name in _ACTIONS if name in info["features"])
+    return state, action
+
+
+def _own_frames(path: Path, number: int, names: Sequence[str]) -> dict[str, NDArray[Any]]:
+    """Return columns of the frames of an episode, without those of its video."""
+    from pyarrow import parquet
+
+    table = parquet.read_table(path, columns=[*names, "episode_index", "is_video_demo"])
+    is_own = np.asarray(table["episode_index"]) == number
+    is_own &= ~np.asarray(table["is_video_demo"])
+    return {name: np.array(table[name].to_pylist())[is_own] for name in names}
+
+
 def _data_files(root: Path, info: Mapping[str, Any]) -> Mapping[int, Path]:
     """Return the file of frames of each episode."""
     pattern = info["data_path"]
+    files = {}
     if info["codebase_version"] != "v3.0":
         size = info["chunks_size"]
-        return {
-            number: root / pattern.format(episode_chunk=number // size, episode_index=number)
-            for number in range(info["total_episodes"])
-        }
-    found = {}
+        for number in range(info["total_episodes"]):
+            name = pattern.format(episode_chunk=number // size, episode_index=number)
+            files[number] = root / name
+        return files
     for path in sorted((root / "meta/episodes").glob("*/*.parquet")):
         for row in read_rows(path):
-            place = {"chunk_index": row["data/chunk_index"], "file_index": row["data/file_index"]}
-            found[row["episode_index"]] = root / pattern.format(**place)
-    return found
+            name = pattern.format(
+                chunk_index=row["data/chunk_index"], file_index=row["data/file_index"]
+            )
+            files[row["episode_index"]] = root / name
+    return files
 
 
 def _read_hdf5(files: list[Path]) -> Iterator[ReplayableTrajectory]:
+    """Yield the trajectories of RoboMME's files."""
     check_hdf5_support()
     import h5py
 
@@ -149,14 +166,20 @@ def _read_hdf5(files: list[Path]) -> Iterator[ReplayableTrajectory]:
 
 
 def _read_hdf5_episode(group: Any, task: str, name: str) -> ReplayableTrajectory:  # noqa: ANN401
-    actions, states, final = [], [], None
-    for step in sorted((one for one in group if one.startswith("timestep_")), key=_number):
+    """Return an episode of RoboMME's files, without the time steps of its video."""
+    actions = []
+    states = []
+    final = None
+    names = [name for name in group if name.startswith("timestep_")]
+    for step in sorted(names, key=_number):
         entry = group[step]
-        action = entry["action/joint_action"][()]
-        if bool(entry["info/is_video_demo"][()]) or np.asarray(action).dtype.kind != "f":
-            continue  # frames without an action hold a text
-        joints, fingers = entry["obs/joint_state"][()], entry["obs/gripper_state"][()]
-        actions.append(np.asarray(action, dtype=np.float64))
+        action = np.asarray(entry["action/joint_action"][()])
+        has_action = action.dtype.kind == "f"  # else it is a text
+        if entry["info/is_video_demo"][()] or not has_action:
+            continue
+        joints = entry["obs/joint_state"][()]
+        fingers = entry["obs/gripper_state"][()]
+        actions.append(action.astype(np.float64))
         states.append(np.append(joints, fingers[0]).astype(np.float64))
         final = np.append(joints, fingers).astype(np.float64)
     return ReplayableTrajectory(

@@ -68,34 +68,36 @@ def replay_dataset(path: Path, workers: int) -> Iterator[ReplayResult]:
 def replay(recorded: ReplayableTrajectory) -> ReplayResult:
     """Execute the actions of a trajectory in its episode."""
     env = make(_find_episode(recorded), cameras=(), actions=recorded.space)
+    differences = []
+    final = float("nan")
     try:
         env.reset()
-        steps, largest, final = 0, 0.0, float("nan")
         for action, expected in zip(recorded.actions, recorded.states, strict=True):
             observation, *_ = env.step(action)
-            steps += 1
             state = np.append(observation["joint_positions"], observation["gripper"])
-            largest = max(largest, _difference(state[:-1], expected))
+            one_finger = state[:-1]
+            differences.append(_difference(one_finger, expected))
             if env.status != "ongoing":
                 break
-        if steps and recorded.final_state is not None:
+        if differences and recorded.final_state is not None:
             final = _difference(state, recorded.final_state)
         status = "failure" if env.status == "ongoing" else env.status
     finally:
         env.close()
     return ReplayResult(
-        recorded.name,
-        status,
-        recorded.status,
-        steps,
-        len(recorded.actions),
-        largest,
-        final,
+        name=recorded.name,
+        status=status,
+        recorded_status=recorded.status,
+        steps=len(differences),
+        recorded_steps=len(recorded.actions),
+        largest=max(differences, default=0.0),
+        final=final,
     )
 
 
-def _difference(one: NDArray[np.floating[Any]], other: NDArray[np.floating[Any]]) -> float:
-    return float(np.abs(one.astype(np.float64) - other).max())
+def _difference(state: NDArray[np.floating[Any]], expected: NDArray[np.floating[Any]]) -> float:
+    """Return the greatest difference of a number."""
+    return float(np.abs(state.astype(np.float64) - expected).max())
 
 
 def _find_episode(recorded: ReplayableTrajectory) -> Episode:
@@ -113,8 +115,9 @@ def _find_episode(recorded: ReplayableTrajectory) -> Episode:
 @functools.cache
 def _places(task: str) -> dict[int, tuple[str, int]]:
     """Return split and index of each seed of a task."""
-    return {
-        get_episode(task, split, index).seed: (split, index)
-        for split in SPLITS
-        for index in range(SIZES[split])
-    }
+    found = {}
+    for split in SPLITS:
+        for index in range(SIZES[split]):
+            seed = get_episode(task, split, index).seed
+            found[seed] = (split, index)
+    return found

@@ -15,7 +15,7 @@ from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, known_name
 from roboirg.core.field_types import check_whole
-from roboirg.core.instruction_options import InstructionOptions, identifying
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import CAMERAS, check_cameras
 from roboirg.core.word_pools import PoolName, pool_of
 from roboirg.language.generator import instruct_with
@@ -115,7 +115,7 @@ class ExportPlan:
             raise InvalidValueError(
                 f"size is {self.size}; it must be an even number from {SMALLEST} to {PICTURE_SIZE}."
             )
-        is_whole = (set(self.cameras), self.size) == (set(CAMERAS), PICTURE_SIZE)
+        is_whole = set(self.cameras) == set(CAMERAS) and self.size == PICTURE_SIZE
         if not is_whole and (self.format == "robomme-hdf5" or self.is_for_openpi):
             raise InvalidValueError(
                 f"cameras is {', '.join(self.cameras)} and size {self.size}; RoboMME's format and "
@@ -129,16 +129,20 @@ class ExportPlan:
     @property
     def is_for_openpi(self) -> bool:
         """Whether the features have openpi's names: it alone reads tables of this format."""
-        return (self.format, self.pictures) == ("lerobot-v2.1", "png")
+        return self.format == "lerobot-v2.1" and self.pictures == "png"
 
     @property
     def recording(self) -> RecordingSpec:
         """What the trajectories must hold."""
-        has_depth = self.format == "robomme-hdf5"
         return RecordingSpec(
-            self.pictures, self.video, has_depth, self.cameras, self.size, self.actions,
-            self.disturbed,
-        )  # fmt: skip
+            coding=self.pictures,
+            video=self.video,
+            depth=self.format == "robomme-hdf5",
+            cameras=self.cameras,
+            size=self.size,
+            actions=self.actions,
+            disturbed=self.disturbed,
+        )
 
     @property
     def pool(self) -> PoolName:
@@ -147,17 +151,13 @@ class ExportPlan:
 
     @property
     def language_label(self) -> str:
-        """The version of its language, and which words of each task it has."""
-        options = self.options
-        return language_label(
-            self.tasks, self.pool, options.language, self.settings, options.wordings
-        )
+        """The version of the language, and which words of each task it has."""
+        return language_label(self.tasks, self.pool, self.settings, self.options.wordings)
 
     def fingerprint(self) -> str:
         """Return a hash of everything that determines the dataset."""
         versions = [self.language_label, ENVIRONMENT_VERSION, TRAJECTORY_VERSION]
-        written = {**asdict(self), "options": identifying(self.options)}
-        return hashlib.sha256(json.dumps([written, versions]).encode()).hexdigest()
+        return hashlib.sha256(json.dumps([asdict(self), versions]).encode()).hexdigest()
 
 
 class TaskText(NamedTuple):
@@ -201,17 +201,35 @@ class RecordingJob(NamedTuple):
 
     def path(self, folder: Path) -> Path:
         """Return the path of the trajectory's file, whose name has all that it depends on."""
-        said = ""
+        name = f"{self.task}-{self.split}-{self.number:05d}-{self.variation:03d}"
         if self.options is not None:
-            said = f"-{short_hash(self.policy)}-{self.options.setting}-{self.options.form}"
-        spec: list[str] = [self.spec.coding]
-        spec += ["video"] * self.spec.video + ["depth"] * self.spec.depth
-        spec += self.spec.cameras * (self.spec.cameras != CAMERAS)
-        spec += [str(self.spec.size)] * (self.spec.size != PICTURE_SIZE)
-        spec += [self.spec.actions] * (self.spec.actions != ExportPlan.actions)
-        spec += ["disturbed"] * self.spec.disturbed
-        name = f"{self.task}-{self.split}-{self.number:05d}-{self.variation:03d}{said}"
-        return folder / f"{name}-{'-'.join(spec)}{SUFFIX}"
+            name += f"-{short_hash(self.policy)}-{self.options.setting}-{self.options.form}"
+        return folder / f"{'-'.join([name, *self._spec_words()])}{SUFFIX}"
+
+    def _spec_words(self) -> list[str]:
+        """Return what the trajectory holds, as words of its name; the usual is left out."""
+        spec = self.spec
+        words: list[str] = [spec.coding]
+        if spec.video:
+            words.append("video")
+        if spec.depth:
+            words.append("depth")
+        if spec.cameras != CAMERAS:
+            words += spec.cameras
+        if spec.size != PICTURE_SIZE:
+            words.append(str(spec.size))
+        if spec.actions != ExportPlan.actions:
+            words.append(spec.actions)
+        if spec.disturbed:
+            words.append("disturbed")
+        return words
+
+
+class SpokenJob(NamedTuple):
+    """A trajectory to record, and the instructions with which it is exported."""
+
+    job: RecordingJob
+    texts: tuple[TaskText, ...]
 
 
 def training_words(split: str, options: InstructionOptions) -> InstructionOptions:
@@ -221,40 +239,52 @@ def training_words(split: str, options: InstructionOptions) -> InstructionOption
     return options
 
 
-def recording_jobs(plan: ExportPlan) -> list[tuple[RecordingJob, tuple[TaskText, ...]]]:
+def recording_jobs(plan: ExportPlan) -> list[SpokenJob]:
     """Return the trajectories of a plan in the order of the dataset, with their instructions.
 
     Raises:
         InvalidValueError: no setting can express any of the episodes.
     """
-    jobs: list[tuple[RecordingJob, tuple[TaskText, ...]]] = []
+    jobs: list[SpokenJob] = []
     for task, index in itertools.product(plan.tasks, plan.episodes):
-        episode = get_episode(task, plan.split, index)
-        said = _texts_of(plan, episode)
-        if not said:
-            continue
-        job = RecordingJob(
-            episode.task, episode.split, episode.index, 0, plan.policy, None, plan.recording
-        )
-        if plan.policy != ORACLE:
-            jobs += [(job._replace(options=one.options), (one,)) for one in said]
-            continue
-        jobs += [(job._replace(variation=number), said) for number in range(plan.variations)]
+        jobs += _jobs_of(plan, get_episode(task, plan.split, index))
     if not jobs:
         raise InvalidValueError(f"None of these tasks has the setting {', '.join(plan.settings)}.")
     return jobs
 
 
+def _jobs_of(plan: ExportPlan, episode: Episode) -> list[SpokenJob]:
+    """Return the trajectories of an episode; only the oracle's is the same for all words."""
+    texts = _texts_of(plan, episode)
+    if not texts:
+        return []
+    job = RecordingJob(
+        task=episode.task,
+        split=episode.split,
+        number=episode.index,
+        variation=0,
+        policy=plan.policy,
+        options=None,
+        spec=plan.recording,
+    )
+    if plan.policy != ORACLE:
+        return [SpokenJob(job._replace(options=text.options), (text,)) for text in texts]
+    variations = range(plan.variations)
+    return [SpokenJob(job._replace(variation=number), texts) for number in variations]
+
+
 def _texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
     """Return the instructions of an episode; an explicit one is its own resolved form."""
-    found = instructions([episode], plan.settings, plan.forms, plan.options)
-    words = InstructionOptions(wordings=plan.options.wordings, language=plan.options.language)
+    words = InstructionOptions(wordings=plan.options.wordings)
     explicit = instruct_with(episode, words).text
-    said = []
-    for _, one in found:
-        is_repeated = one.form == "resolved" and "implicit" in plan.forms
-        if is_repeated and not all_settings()[one.setting].implicit:
+    texts = []
+    found = instructions([episode], plan.settings, plan.forms, plan.options)
+    for _, instruction in found:
+        is_explicit = not all_settings()[instruction.setting].implicit
+        is_resolved = instruction.form == "resolved" and "implicit" in plan.forms
+        if is_explicit and is_resolved:
             continue
-        options = replace(plan.options, setting=one.setting, form=one.form)
-        said.append(TaskText(options, one.text, row(episode, one) | {"explicit": explicit}))
-    return tuple(said)
+        options = replace(plan.options, setting=instruction.setting, form=instruction.form)
+        facts = row(episode, instruction) | {"explicit": explicit}
+        texts.append(TaskText(options, instruction.text, facts))
+    return tuple(texts)

@@ -1,5 +1,8 @@
 """Run an export: record what is missing, write the parts, then what describes them.
 
+A trajectory is one recorded episode. A part is what is written at once: a file or a few of the
+dataset. An episode of the dataset is a trajectory with one instruction.
+
 All work is resumable: trajectories and parts appear under their names only when they are complete,
 and what makes the dataset readable is written last.
 """
@@ -22,6 +25,7 @@ from roboirg.apps.demonstrations.export_plan import (
     ExportPlan,
     FormatName,
     RecordingJob,
+    SpokenJob,
     recording_jobs,
 )
 from roboirg.apps.demonstrations.formats import lerobot_v3, lerobot_v21, robomme_hdf5
@@ -103,31 +107,47 @@ def run_export(
         check_hdf5_support()
     jobs = recording_jobs(plan)
     with _opened(plan, out) as work:
-        folder = work / "trajectories" if trajectories is None else trajectories
-        folder.mkdir(parents=True, exist_ok=True)
-        parts_folder = work / "parts"
-        missing = [
-            job
-            for job, _ in jobs
-            if not _is_usable(plan, job, folder, may_lack_pictures=parts_folder.exists())
-        ]
-        _record(plan, missing, len(jobs), folder, workers, report)
-        facts = [load_facts(job.path(folder)) for job, _ in jobs]
-        kept = [
-            RecordedTexts(job.path(folder), said)
-            for (job, said), one in zip(jobs, facts, strict=True)
-            if _is_wanted(plan, one)
-        ]
-        if not kept:
-            raise InvalidValueError(
-                f"None of the {len(jobs)} trajectories is a success; ask for `outcomes: all`."
-            )
-        parts = WRITERS[plan.format].make_parts(plan, out, kept)
-        _write_parts(parts, parts_folder, workers, report, keep=trajectories is not None)
+        usable = _Usable(
+            plan=plan,
+            folder=trajectories or work / "trajectories",
+            may_lack_pictures=(work / "parts").exists(),
+        )
+        recorded = _record_missing(jobs, usable, workers, report)
+        facts = [load_facts(spoken.job.path(usable.folder)) for spoken in jobs]
+        texts = _wanted(plan, jobs, facts, usable.folder)
+        parts = WRITERS[plan.format].make_parts(plan, out, texts)
+        keeps_pictures = trajectories is not None
+        _write_parts(parts, work / "parts", workers, report, keeps_pictures=keeps_pictures)
         _finish(plan, out, parts, facts)
-    statuses = Counter(one.status for one in facts)
-    episodes = sum(len(one.texts) for part in parts for one in part.episodes)
-    return ExportSummary(len(missing), statuses, episodes, folder_size(out))
+    statuses = Counter(trajectory.status for trajectory in facts)
+    return ExportSummary(recorded, statuses, _episode_count(parts), folder_size(out))
+
+
+def _wanted(
+    plan: ExportPlan, jobs: Sequence[SpokenJob], facts: Sequence[TrajectoryFacts], folder: Path
+) -> list[RecordedTexts]:
+    """Return the trajectories of the dataset, with their instructions.
+
+    Raises:
+        InvalidValueError: there is none.
+    """
+    pairs = zip(jobs, facts, strict=True)
+    wanted = [spoken for spoken, recorded in pairs if _is_wanted(plan, recorded)]
+    found = [RecordedTexts(spoken.job.path(folder), spoken.texts) for spoken in wanted]
+    if not found:
+        raise InvalidValueError(
+            f"None of the {len(jobs)} trajectories is a success; ask for `outcomes: all`."
+        )
+    return found
+
+
+def _episode_count(parts: Sequence[DatasetPart]) -> int:
+    """Return how many episodes a dataset has: one for each instruction of a trajectory."""
+    count = 0
+    for part in parts:
+        for episode in part.episodes:
+            count += len(episode.texts)
+    return count
 
 
 @contextlib.contextmanager
@@ -145,8 +165,8 @@ def _opened(plan: ExportPlan, out: Path) -> Iterator[Path]:
         )
     with locked(work / ".lock", f"Another export writes to {str(out)!r}."):
         started = work / "plan.json"
-        before = _read_fingerprint(started)
-        if before not in (None, plan.fingerprint()):
+        started_fingerprint = _read_fingerprint(started)
+        if started_fingerprint not in (None, plan.fingerprint()):
             raise InvalidValueError(
                 f"The export in {str(out)!r} was started with other options or another version; "
                 "give the same ones, or choose another folder."
@@ -159,26 +179,29 @@ def _opened(plan: ExportPlan, out: Path) -> Iterator[Path]:
 
 
 def _read_fingerprint(path: Path) -> str | None:
+    """Return the fingerprint of an export in a file; None if there is none."""
     try:
         return str(json.loads(path.read_text(encoding="utf-8"))["fingerprint"])
     except (OSError, ValueError, KeyError):
         return None
 
 
-def _record(
-    plan: ExportPlan,
-    missing: Sequence[RecordingJob],
-    total: int,
-    folder: Path,
-    workers: int,
-    report: Report,
-) -> None:
-    done, size = total - len(missing), folder_size(folder)
-    report("record", done, total, size)
-    work = functools.partial(_record_job, folder, only_successes=plan.outcomes == "successes")
-    for job, _ in parallel_map(work, missing, workers):
-        done, size = done + 1, size + job.path(folder).stat().st_size
-        report("record", done, total, size)
+def _record_missing(
+    jobs: Sequence[SpokenJob], usable: _Usable, workers: int, report: Report
+) -> int:
+    """Record the trajectories that are missing, and report all; returns how many were."""
+    usable.folder.mkdir(parents=True, exist_ok=True)
+    missing = [spoken.job for spoken in jobs if not usable.has(spoken.job)]
+    done = len(jobs) - len(missing)
+    size = folder_size(usable.folder)
+    report("record", done, len(jobs), size)
+    only_successes = usable.plan.outcomes == "successes"
+    record_job = functools.partial(_record_job, usable.folder, only_successes=only_successes)
+    for job, _ in parallel_map(record_job, missing, workers):
+        done += 1
+        size += job.path(usable.folder).stat().st_size
+        report("record", done, len(jobs), size)
+    return len(missing)
 
 
 def _record_job(folder: Path, job: RecordingJob, *, only_successes: bool) -> None:
@@ -204,35 +227,45 @@ def choose_policy(job: RecordingJob) -> Policy:
     return make_policy(job.policy, 0)
 
 
-def _is_usable(
-    plan: ExportPlan, job: RecordingJob, folder: Path, *, may_lack_pictures: bool
-) -> bool:
-    """Return whether a trajectory need not be recorded.
+class _Usable(NamedTuple):
+    """Which trajectories of a folder need not be recorded.
 
-    Args:
-        plan: the plan.
-        job: the trajectory.
+    Attributes:
+        plan: of the export.
         folder: of the trajectories.
         may_lack_pictures: whether parts are being written: a trajectory then loses its pictures as
             soon as they have been.
     """
-    path = job.path(folder)
-    if not path.exists():
-        return False
-    facts = load_facts(path)
-    if facts.environment_version != ENVIRONMENT_VERSION:
-        return False
-    if plan.pictures == "none" or not _is_wanted(plan, facts):
-        return True
-    return may_lack_pictures or has_pictures(path)
+
+    plan: ExportPlan
+    folder: Path
+    may_lack_pictures: bool
+
+    def has(self, job: RecordingJob) -> bool:
+        """Return whether the folder has a trajectory as it is needed."""
+        path = job.path(self.folder)
+        if not path.exists():
+            return False
+        facts = load_facts(path)
+        if facts.environment_version != ENVIRONMENT_VERSION:
+            return False
+        if self.plan.pictures == "none" or not _is_wanted(self.plan, facts):
+            return True
+        return self.may_lack_pictures or has_pictures(path)
 
 
 def _is_wanted(plan: ExportPlan, facts: TrajectoryFacts) -> bool:
+    """Return whether a trajectory that ended like this is exported."""
     return plan.outcomes == "all" or facts.status == "success"
 
 
 def _write_parts(
-    parts: Sequence[DatasetPart], folder: Path, workers: int, report: Report, *, keep: bool
+    parts: Sequence[DatasetPart],
+    folder: Path,
+    workers: int,
+    report: Report,
+    *,
+    keeps_pictures: bool,
 ) -> None:
     """Write the parts that are missing; pictures that are no longer needed are deleted."""
     folder.mkdir(exist_ok=True)
@@ -243,8 +276,9 @@ def _write_parts(
         write_atomically(_mark(folder, part), "")
         done += 1
         report("write", done, len(parts), 0)
-        for one in () if keep else part.episodes:
-            drop_pictures(one.path)
+        if not keeps_pictures:
+            for episode in part.episodes:
+                drop_pictures(episode.path)
 
 
 def _mark(folder: Path, part: DatasetPart) -> Path:
@@ -268,8 +302,9 @@ def _finish(
 
 def folder_size(folder: Path) -> int:
     """Return the size of all files in a folder, bytes, without unfinished work."""
-    return sum(
-        path.stat().st_size
-        for path in folder.rglob("*")
-        if path.is_file() and WORK_FOLDER not in path.relative_to(folder).parts
-    )
+    size = 0
+    for path in folder.rglob("*"):
+        is_unfinished = WORK_FOLDER in path.relative_to(folder).parts
+        if path.is_file() and not is_unfinished:
+            size += path.stat().st_size
+    return size

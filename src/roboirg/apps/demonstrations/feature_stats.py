@@ -25,15 +25,17 @@ def vector_stats(values: NDArray[Any]) -> FeatureStats:
         Lists of `size` numbers, and `count`, a list with the number of frames.
     """
     numbers = values.astype(np.float64)
-    found = {
-        "min": numbers.min(axis=0),
-        "max": numbers.max(axis=0),
-        "mean": numbers.mean(axis=0),
-        "std": numbers.std(axis=0),
-        **dict(zip(QUANTILES, np.quantile(numbers, list(QUANTILES.values()), axis=0), strict=True)),
+    stats: FeatureStats = {
+        "min": numbers.min(axis=0).tolist(),
+        "max": numbers.max(axis=0).tolist(),
+        "mean": numbers.mean(axis=0).tolist(),
+        "std": numbers.std(axis=0).tolist(),
     }
-    stats: FeatureStats = {name: array.tolist() for name, array in found.items()}
-    return stats | {"count": [len(numbers)]}
+    quantiles = np.quantile(numbers, list(QUANTILES.values()), axis=0)
+    for name, quantile in zip(QUANTILES, quantiles, strict=True):
+        stats[name] = quantile.tolist()
+    stats["count"] = [len(numbers)]
+    return stats
 
 
 def picture_stats(counts: NDArray[np.int64], pixels: int) -> FeatureStats:
@@ -54,23 +56,27 @@ def picture_stats(counts: NDArray[np.int64], pixels: int) -> FeatureStats:
 
 
 def _channel_stats(counts: NDArray[np.int64]) -> dict[str, float]:
-    values, total = np.arange(len(counts), dtype=np.float64), int(counts.sum())
-    present = np.flatnonzero(counts)
+    """Return the statistics of values from 0, given how often each occurs."""
+    values = np.arange(len(counts), dtype=np.float64)
+    total = int(counts.sum())
     mean = float(counts @ values) / total
-    spread = float(counts @ (values - mean) ** 2) / total
+    variance = float(counts @ (values - mean) ** 2) / total
+    present = np.flatnonzero(counts)
     return {
         "min": float(present[0]),
         "max": float(present[-1]),
         "mean": mean,
-        "std": spread**0.5,
+        "std": variance**0.5,
         **{name: _quantile(counts, share) for name, share in QUANTILES.items()},
     }
 
 
 def _quantile(counts: NDArray[np.int64], share: float) -> float:
     """Return the quantile of counted values, with linear interpolation as in NumPy."""
-    ends = np.cumsum(counts)
-    place = (int(ends[-1]) - 1) * share
+    cumulative = np.cumsum(counts)
+    last = int(cumulative[-1]) - 1
+    place = last * share
     below = int(np.floor(place))
-    low, high = np.searchsorted(ends, [below, min(below + 1, int(ends[-1]) - 1)], side="right")
+    above = min(below + 1, last)
+    low, high = np.searchsorted(cumulative, [below, above], side="right")
     return float(low + (place - below) * (high - low))

@@ -88,8 +88,9 @@ class FrameColumns:
     def features(self) -> dict[str, dict[str, Any]]:
         """Return what ``info.json`` says of each column."""
         found = {self.keys[camera]: self._picture_feature() for camera in self.cameras}
-        found[self.keys["state"]] = _feature("float32", [*JOINTS, "gripper"])
-        names = _POSE if self.plan.actions == "waypoint" else [*JOINTS, "gripper"]
+        joint_names = [*JOINTS, "gripper"]
+        names = _POSE if self.plan.actions == "waypoint" else joint_names
+        found[self.keys["state"]] = _feature("float32", joint_names)
         found[self.keys["action"]] = _feature("float32", names)
         if self.plan.disturbed:
             found[EXECUTED] = _feature("float32", names)
@@ -100,7 +101,8 @@ class FrameColumns:
 
     def table_features(self) -> dict[str, dict[str, Any]]:
         """Return the features that are columns of the tables: all but videos."""
-        return {name: one for name, one in self.features().items() if one["dtype"] != "video"}
+        features = self.features().items()
+        return {name: feature for name, feature in features if feature["dtype"] != "video"}
 
     def _picture_feature(self) -> dict[str, Any]:
         feature: dict[str, Any] = {
@@ -162,11 +164,12 @@ class FrameColumns:
     def pictures(self, trajectory: Trajectory) -> dict[str, list[bytes]]:
         """Return the columns of PNGs."""
         rows = range(trajectory.facts.frames)
+        columns = {}
         with zipfile.ZipFile(trajectory.path) as archive:
-            return {
-                self.keys[camera]: [archive.read(picture_name(camera, row)) for row in rows]
-                for camera in self.cameras
-            }
+            for camera in self.cameras:
+                pictures = [archive.read(picture_name(camera, row)) for row in rows]
+                columns[self.keys[camera]] = pictures
+        return columns
 
     def stats(
         self,
@@ -174,9 +177,14 @@ class FrameColumns:
         counts: Mapping[str, NDArray[np.int64]],
     ) -> dict[str, FeatureStats]:
         """Return the statistics of all columns but texts."""
-        found = {name: picture_stats(one, self.plan.size**2) for name, one in counts.items()}
-        return found | {name: vector_stats(np.concatenate(one)) for name, one in numbers.items()}
+        found = {}
+        for name, of_values in counts.items():
+            found[name] = picture_stats(of_values, self.plan.size**2)
+        for name, arrays in numbers.items():
+            found[name] = vector_stats(np.concatenate(arrays))
+        return found
 
 
 def _feature(dtype: str, names: list[str]) -> dict[str, Any]:
+    """Return what ``info.json`` says of a column of so many numbers."""
     return {"dtype": dtype, "shape": [len(names)], "names": names}

@@ -35,6 +35,7 @@ def picture_column(pictures: Sequence[bytes]) -> Any:  # noqa: ANN401
 
 
 def text_column(texts: Sequence[str]) -> Any:  # noqa: ANN401
+    """Return texts as a column."""
     import pyarrow as pa
 
     return pa.array(texts, pa.string())
@@ -63,29 +64,43 @@ def write_frames(
     import pyarrow as pa
     from pyarrow import parquet
 
-    tables = [pa.table({name: {**shared, **one}[name] for name in features}) for one in own]
+    tables = []
+    for columns in own:
+        every_column = {**shared, **columns}
+        tables.append(pa.table({name: every_column[name] for name in features}))
     table = pa.concat_tables(tables)
     if is_described:
-        types = {name: _hugging_face_type(one) for name, one in features.items()}
+        types = {name: _hugging_face_type(feature) for name, feature in features.items()}
         described = json.dumps({"info": {"features": types}})
         table = table.replace_schema_metadata({"huggingface": described})
-    pictures = [name for name, one in features.items() if one["dtype"] == "image"]
-    repeated = [f"{name}.bytes" for name in pictures] if len(own) > 1 else []
-    texts = [name for name, one in features.items() if one["dtype"] == "string"]
+    repeats_pictures = len(own) > 1
     with replacing(path) as part:
         parquet.write_table(
             table,
             part,
-            compression={
-                **dict.fromkeys(features, "snappy"),
-                **{f"{name}.bytes": "none" for name in pictures},
-                **{f"{name}.path": "snappy" for name in pictures},
-            },
-            use_dictionary=[*repeated, *texts],
+            **_storage(features, repeats_pictures=repeats_pictures),
             dictionary_pagesize_limit=_DICTIONARY_LIMIT,
             row_group_size=max(len(table), 1),
-            write_statistics=[name for name in features if name not in pictures],
         )
+
+
+def _storage(
+    features: Mapping[str, Mapping[str, Any]], *, repeats_pictures: bool
+) -> dict[str, Any]:
+    """Return how columns are stored: PNGs are compressed already, and have no statistics."""
+    pictures = [name for name, feature in features.items() if feature["dtype"] == "image"]
+    dictionaries = [name for name, feature in features.items() if feature["dtype"] == "string"]
+    compression = dict.fromkeys(features, "snappy")
+    for name in pictures:
+        compression[f"{name}.bytes"] = "none"
+        compression[f"{name}.path"] = "snappy"
+    if repeats_pictures:
+        dictionaries = [f"{name}.bytes" for name in pictures] + dictionaries
+    return {
+        "compression": compression,
+        "use_dictionary": dictionaries,
+        "write_statistics": [name for name in features if name not in pictures],
+    }
 
 
 def _hugging_face_type(feature: Mapping[str, Any]) -> dict[str, Any]:
@@ -94,7 +109,9 @@ def _hugging_face_type(feature: Mapping[str, Any]) -> dict[str, Any]:
         return {"_type": "Image"}
     value = {"dtype": feature["dtype"], "_type": "Value"}
     (size,) = feature["shape"]
-    return value if size == 1 else {"feature": value, "length": size, "_type": "Sequence"}
+    if size == 1:
+        return value
+    return {"feature": value, "length": size, "_type": "Sequence"}
 
 
 def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
@@ -103,10 +120,11 @@ def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     from pyarrow import parquet
 
     with replacing(path) as part:
-        parquet.write_table(pa.Table.from_pylist([dict(one) for one in rows]), part)
+        parquet.write_table(pa.Table.from_pylist([dict(row) for row in rows]), part)
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
+    """Return the rows of a table of facts."""
     from pyarrow import parquet
 
     rows: list[dict[str, Any]] = parquet.read_table(path).to_pylist()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import cv2
 import numpy as np
@@ -26,9 +26,19 @@ _PNG_OPTIONS = (
     cv2.IMWRITE_PNG_STRATEGY_RLE,
 )
 """Higher levels save 3 % and take three times as long; other strategies are slower and larger."""
-_CODECS: dict[str, tuple[str, str, dict[str, str]]] = {
-    "lossless-video": ("libx264rgb", "rgb24", {"crf": "0"}),
-    "lossy-video": ("libx264", "yuv420p", {"crf": str(LOSSY_QUALITY)}),
+
+
+class _Codec(NamedTuple):
+    """How a video is encoded: by what, the pixels that go in, and the constant rate factor."""
+
+    name: str
+    pixels: str
+    quality: int
+
+
+_CODECS: dict[str, _Codec] = {
+    "lossless-video": _Codec("libx264rgb", "rgb24", quality=0),
+    "lossy-video": _Codec("libx264", "yuv420p", quality=LOSSY_QUALITY),
 }
 STORED_FORMATS = {"lossless-video": "gbrp", "lossy-video": "yuv420p"}
 """The pixel format that a stored video has."""
@@ -45,6 +55,7 @@ def encode_depth(depth: NDArray[np.int16]) -> bytes:
 
 
 def _png(image: NDArray[Any]) -> bytes:
+    """Return a picture in OpenCV's order of channels as PNG."""
     _, content = cv2.imencode(".png", image, _PNG_OPTIONS)
     return content.tobytes()
 
@@ -60,12 +71,19 @@ class VideoEncoder:
     def __init__(self, coding: PictureCoding, size: int) -> None:
         import av
 
-        codec, pixels, quality = _CODECS[coding]
+        codec = _CODECS[coding]
         self._file = io.BytesIO()
         self._container = av.open(self._file, "w", format="mp4")
-        stream: Any = self._container.add_stream(codec, rate=Fraction(CONTROL_RATE))
-        stream.pix_fmt, stream.width, stream.height = pixels, size, size
-        stream.options = {**quality, "preset": "veryfast", "g": str(KEY_FRAMES), "bf": "0"}
+        stream: Any = self._container.add_stream(codec.name, rate=Fraction(CONTROL_RATE))
+        stream.pix_fmt = codec.pixels
+        stream.width = size
+        stream.height = size
+        stream.options = {
+            "crf": str(codec.quality),
+            "preset": "veryfast",
+            "g": str(KEY_FRAMES),
+            "bf": "0",  # frames that depend on later ones
+        }
         stream.codec_context.thread_count = 1
         self._stream = stream
 
@@ -85,6 +103,6 @@ class VideoEncoder:
 
 def count_values(picture: Pixels) -> NDArray[np.int64]:
     """Return how often each value occurs in each channel of a picture, (3, 256)."""
-    found = [cv2.calcHist([picture], [one], None, [256], [0, 256]) for one in range(3)]
+    counts = [cv2.calcHist([picture], [channel], None, [256], [0, 256]) for channel in range(3)]
     # A vector or a column, by OpenCV's version.
-    return np.stack([np.ravel(one) for one in found]).astype(np.int64)
+    return np.stack([np.ravel(of_channel) for of_channel in counts]).astype(np.int64)

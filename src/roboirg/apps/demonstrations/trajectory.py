@@ -152,15 +152,16 @@ def load_trajectory(path: Path) -> Trajectory:
     """
     with _opened(path) as archive:
         facts = _read_facts(archive, path)
-        arrays = {
-            name.removesuffix(_ARRAY): _read_array(archive, name)
-            for name in archive.namelist()
-            if name.endswith(_ARRAY)
-        }
-    counted = [one for one in CAMERAS if f"{one}_histogram" in arrays]
-    histograms = {one: arrays.pop(f"{one}_histogram") for one in counted}
-    matrices = [name for name in arrays if name.endswith(("_extrinsic", "_intrinsic"))]
-    calibration = {name: arrays.pop(name) for name in matrices}
+        names = [name for name in archive.namelist() if name.endswith(_ARRAY)]
+        arrays = {name.removesuffix(_ARRAY): _read_array(archive, name) for name in names}
+    histograms = {}
+    for camera in CAMERAS:
+        if f"{camera}_histogram" in arrays:
+            histograms[camera] = arrays.pop(f"{camera}_histogram")
+    calibration = {}
+    for name in list(arrays):
+        if name.endswith(("_extrinsic", "_intrinsic")):
+            calibration[name] = arrays.pop(name)
     return Trajectory(path, facts, histograms=histograms, calibration=calibration, **arrays)
 
 
@@ -176,6 +177,7 @@ def load_facts(path: Path) -> TrajectoryFacts:
 
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open a trajectory's file; what goes wrong while it is read is one error."""
     try:
         with zipfile.ZipFile(path) as archive:
             yield archive

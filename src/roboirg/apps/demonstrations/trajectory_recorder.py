@@ -36,7 +36,7 @@ from roboirg.core.actions import (
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.observations import CAMERAS, Pixels
+from roboirg.core.observations import CAMERAS, FetchedDemonstration, Pixels
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.subgoal_text import split_point
 from roboirg.envs.factory import make
@@ -74,7 +74,15 @@ class RecordingSpec(NamedTuple):
 
 
 class _Row(NamedTuple):
-    """What one step of the policy gives; see `Trajectory`."""
+    """What one step of the policy gives; see `Trajectory`.
+
+    Attributes:
+        observation: after the step.
+        action: that was executed.
+        label: that is to be learned.
+        subgoal: what the robot was doing, with ``{at}`` for the pixel.
+        online: what was due, with its pixel.
+    """
 
     observation: Mapping[str, Any]
     action: CheckedActions
@@ -87,12 +95,14 @@ class PictureTracks:
     """Encodes the pictures of the cameras in the order of rows, into a trajectory's open file."""
 
     def __init__(self, archive: zipfile.ZipFile, spec: RecordingSpec) -> None:
-        self._archive, self._spec = archive, spec
+        self._archive = archive
+        self._spec = spec
         self._rows = 0
-        has_videos = spec.coding not in ("png", "none")
-        self._encoders = {
-            camera: VideoEncoder(spec.coding, spec.size) for camera in spec.cameras if has_videos
-        }
+        self._encoders: dict[str, VideoEncoder] = {}
+        if spec.coding not in ("png", "none"):
+            self._encoders = {
+                camera: VideoEncoder(spec.coding, spec.size) for camera in spec.cameras
+            }
         self.histograms = {camera: np.zeros((3, 256), np.int64) for camera in spec.cameras}
         self._uncounted: Mapping[str, Pixels] = {}
 
@@ -158,17 +168,7 @@ def record_trajectory(
             f"Policy {policy_name!r} acts in {actions!r}; these demonstrations are recorded in "
             f"{spec.actions!r}."
         )
-    said, is_drawn = options or InstructionOptions(), spec.coding != "none"
-    env = make(
-        episode,
-        **asdict(said),
-        actions=spec.actions,
-        cameras=CAMERAS if policy_name != "oracle" else spec.cameras if is_drawn else (),
-        depth=spec.depth,
-        calibration=spec.depth,
-        grounded=is_drawn,
-        demonstration_frames="none" if policy_name == "oracle" else "all",
-    )
+    env = _make_env(episode, spec, options or InstructionOptions(), policy_name)
     try:
         with replacing(path) as part:
             with zipfile.ZipFile(part, "w") as archive:
@@ -183,6 +183,27 @@ def record_trajectory(
     return facts
 
 
+def _make_env(
+    episode: Episode, spec: RecordingSpec, options: InstructionOptions, policy_name: str
+) -> RoboIRGEnv:
+    """Return the environment of an episode; the oracle looks at nothing, so only we do."""
+    is_drawn = spec.coding != "none"
+    is_oracle = policy_name == "oracle"
+    cameras: tuple[str, ...] = CAMERAS
+    if is_oracle:
+        cameras = spec.cameras if is_drawn else ()
+    return make(
+        episode,
+        **asdict(options),
+        actions=spec.actions,
+        cameras=cameras,
+        depth=spec.depth,
+        calibration=spec.depth,
+        grounded=is_drawn,
+        demonstration_frames="none" if is_oracle else "all",
+    )
+
+
 class _GivenUpError(Exception):
     """The policy found no motion; the message says why."""
 
@@ -194,7 +215,8 @@ class _Recorder(EpisodeLoop):
         self, env: RoboIRGEnv, policy: Policy, spec: RecordingSpec, archive: zipfile.ZipFile
     ) -> None:
         super().__init__(env, policy)
-        self._spec, self._archive = spec, archive
+        self._spec = spec
+        self._archive = archive
         self._tracks = PictureTracks(archive, spec)
         self._rows: list[_Row] = []
         self._video_session: object = None
@@ -224,11 +246,12 @@ class _Recorder(EpisodeLoop):
             )
         self._video_session = env.session
         cameras = env.session.world.cameras
-        pictures: dict[str, Any] = {
-            f"{name}_rgb": picture for name, picture in cameras.pictures(self._spec.cameras).items()
-        }
+        pictures: dict[str, Any] = {}
+        for name, picture in cameras.pictures(self._spec.cameras).items():
+            pictures[f"{name}_rgb"] = picture
         if self._spec.depth:
-            pictures |= {f"{name}_depth": cameras.depth(name) for name in CAMERAS}
+            for name in CAMERAS:
+                pictures[f"{name}_depth"] = cameras.depth(name)
         self._tracks.add(pictures)
 
     def begin(self) -> Moment:
@@ -236,8 +259,11 @@ class _Recorder(EpisodeLoop):
         from roboirg.simulation.physics_settings import HOME_ACTION
 
         observation, info = super().begin()
-        home = self._pose_actions(HOME_ACTION[None])[0] if self._is_waypoint else HOME_ACTION
-        self._add_row(home, home, observation, self.env.subgoal, self.env.subgoal)
+        home = HOME_ACTION
+        if self._is_waypoint:
+            home = self._pose_actions(HOME_ACTION[None])[0]
+        subgoal = self.env.subgoal
+        self._add_row(_Row(observation, home, home, subgoal, subgoal))
         return observation, info
 
     def act(self, observation: dict[str, Any]) -> ArrayLike:
@@ -254,17 +280,21 @@ class _Recorder(EpisodeLoop):
         heard: list[Mapping[str, Any]] = []
         chunk = check_chunk(actions, find_action_space(self.env.actions))
         labels = getattr(self.policy, "labels", chunk) if self._spec.disturbed else chunk
-        for exact, wanted in zip(chunk, labels, strict=True):
-            action, label = self._rounded(exact), self._rounded(wanted)
+        for exact_action, exact_label in zip(chunk, labels, strict=True):
+            action = self._rounded(exact_action)
+            label = self._rounded(exact_label)
             observation, info = super().execute(action[None])
             heard += info["heard"]
-            online = self.env.subgoal
-            stage = getattr(self.policy, "stage", None)
-            doing = online if stage is None else stage.subgoal
-            self._add_row(action, label, observation, doing, online)
+            due = self.env.subgoal
+            self._add_row(_Row(observation, action, label, self._doing(due), due))
             if info["status"] != "ongoing":
                 break
         return observation, {**info, "heard": heard}
+
+    def _doing(self, due: str) -> str:
+        """Return what the policy is doing: what is due, unless it knows better."""
+        stage = getattr(self.policy, "stage", None)
+        return due if stage is None else str(stage.subgoal)
 
     def _rounded(self, action: CheckedActions) -> CheckedActions:
         """Return an action in float32; a waypoint's angles near those of the one before."""
@@ -273,23 +303,20 @@ class _Recorder(EpisodeLoop):
             action = np.concatenate([action[:3], angles, action[POSE_SIZE:]])
         return action.astype(np.float32).astype(np.float64)
 
-    def _add_row(
-        self,
-        action: CheckedActions,
-        label: CheckedActions,
-        observation: Mapping[str, Any],
-        doing: str,
-        online: str,
-    ) -> None:
-        self._tracks.add(observation)
+    def _add_row(self, row: _Row) -> None:
+        """Keep a row without its pictures, which go into the file at once."""
+        self._tracks.add(row.observation)
         pictures = ("_rgb", "_depth")
-        kept = {key: value for key, value in observation.items() if not key.endswith(pictures)}
-        self._rows.append(_Row(kept, action, label, doing, online))
+        names = [name for name in row.observation if not name.endswith(pictures)]
+        kept = {name: row.observation[name] for name in names}
+        self._rows.append(row._replace(observation=kept))
 
     def _facts(
         self, policy_name: str, variation: int, info: Mapping[str, Any], cause: str
     ) -> TrajectoryFacts:
-        episode, status = self.env.episode, self.env.status
+        """Return what identifies the trajectory, and how it ended."""
+        episode = self.env.episode
+        status = self.env.status
         return TrajectoryFacts(
             task=episode.task,
             split=episode.split,
@@ -312,32 +339,48 @@ class _Recorder(EpisodeLoop):
 
     def _arrays(self, info: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
         """Return the arrays of a trajectory, the video's rows first."""
-        video = info["demonstration"]
-        length = video.length if self._spec.video else 0
-        observations, actions, wanted, subgoals, due = zip(*self._rows, strict=True)
+        length = info["demonstration"].length if self._spec.video else 0
+        arrays = self._observed_arrays(info["demonstration"], length)
+        arrays |= self._action_arrays(info["demonstration"].actions[:length])
+        arrays |= self._subgoal_arrays(info["demonstration_subgoals"][:length])
+        for camera, counts in self._tracks.histograms.items():
+            arrays[f"{camera}_histogram"] = counts
+        return arrays
+
+    def _observed_arrays(self, video: FetchedDemonstration, length: int) -> dict[str, NDArray[Any]]:
+        """Return states and, with depth, calibration."""
         names = ["joint_positions", "gripper", "end_effector"]
-        names += [f"{camera}_extrinsic" for camera in CAMERAS if self._spec.depth]
-        arrays = {
-            name: np.concatenate(
-                [video[name][:length], np.stack([one[name] for one in observations])]
-            )
-            for name in names
-        }
-        for name in [f"{camera}_intrinsic" for camera in CAMERAS if self._spec.depth]:
-            arrays[name] = observations[0][name]
-        arrays["actions"] = np.array([*video.actions[:length], *actions])
-        labels = np.array([*video.actions[:length], *wanted])
+        if self._spec.depth:
+            names += [f"{camera}_extrinsic" for camera in CAMERAS]
+        arrays = {}
+        for name in names:
+            observed = np.stack([row.observation[name] for row in self._rows])
+            arrays[name] = np.concatenate([video[name][:length], observed])
+        if self._spec.depth:
+            for camera in CAMERAS:
+                name = f"{camera}_intrinsic"
+                arrays[name] = self._rows[0].observation[name]
+        return arrays
+
+    def _action_arrays(self, of_video: CheckedActions) -> dict[str, NDArray[Any]]:
+        """Return what was executed, and what is to be learned."""
+        labels = np.array([*of_video, *(row.label for row in self._rows)])
+        arrays = {"actions": np.array([*of_video, *(row.action for row in self._rows)])}
         arrays["pose_actions"] = labels if self._is_waypoint else self._pose_actions(labels)
         if self._spec.disturbed:
             arrays["labels"] = labels
-        seen = list(info["demonstration_subgoals"][:length])
-        online = [*seen, *due]
-        doing = [*seen, *_with_pixels(subgoals, due)]
-        for name, texts in (("online_subgoals", online), ("subgoals", doing)):
+        return arrays
+
+    def _subgoal_arrays(self, of_video: Sequence[str]) -> dict[str, NDArray[Any]]:
+        """Return what the robot was doing, and what was due, with pixels and without."""
+        due = [row.online for row in self._rows]
+        doing = _with_pixels([row.subgoal for row in self._rows], due)
+        arrays = {}
+        for name, of_policy in (("online_subgoals", due), ("subgoals", doing)):
+            texts = [*of_video, *of_policy]
+            plain_texts = [without_pixel(text) for text in texts]
             arrays[f"grounded_{name}"] = np.array(texts, np.str_)
-            arrays[name] = np.array([without_pixel(text) for text in texts], np.str_)
-        for camera, counts in self._tracks.histograms.items():
-            arrays[f"{camera}_histogram"] = counts
+            arrays[name] = np.array(plain_texts, np.str_)
         return arrays
 
     def _pose_actions(self, actions: CheckedActions) -> CheckedActions:

@@ -1,24 +1,26 @@
-"""Answers of those who do not look: oracle, chance, the command alone, shortcuts, words alone."""
+"""Answers of those who do not look: oracle, chance, the command alone, shortcuts, words alone.
+
+Each is a floor: what a model must be above to have shown that it sees and understands.
+"""
 
 from __future__ import annotations
 
 import functools
 import json
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from roboirg.apps.grounding.answer_scores import OWN_WORDS
+from roboirg.apps.grounding.items.answer_file import Answer
+from roboirg.apps.grounding.items.grounding_item import LETTERS, QUESTION_KINDS, GroundingItem
+from roboirg.apps.grounding.items.verdicts import right_reply
 from roboirg.core.episode import Episode, Goal
-from roboirg.core.instruction_options import DEFAULT_LANGUAGE, InstructionOptions
-from roboirg.evaluation.grounding_items.answer_file import Answer
-from roboirg.evaluation.grounding_items.grounding_item import LETTERS, GroundingItem
-from roboirg.evaluation.grounding_items.verdicts import right_reply
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.generator import instruct_with
 from roboirg.policies.vlm.goal_schema import goal_schema
-from roboirg.reader import interpret
 from roboirg.shortcuts import SURFACE_RULES, draw_goal, guess_goal
 from roboirg.shortcuts.command_chance import goals_of_command
 from roboirg.shortcuts.goal_learner import Heard
@@ -28,7 +30,9 @@ from roboirg.tasks import goals_of
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.random_draws import draw
 
-ORACLE, CHANCE, COMMAND = "oracle", "chance", "command"
+ORACLE = "oracle"
+CHANCE = "chance"
+COMMAND = "command"
 TEXT_ONLY = "text-only"
 
 Guess = Callable[[GroundingItem, Episode, np.random.Generator], Goal | None]
@@ -49,25 +53,35 @@ def floor_answers(name: str, items: Sequence[GroundingItem], seed: int = 0) -> I
     Raises:
         MissingDependencyError: a learned floor is wanted, and scikit-learn is not installed.
     """
-    learned = _learn(items) if name == TEXT_ONLY else {}
+    if name == ORACLE:
+        yield from _right_answers(items)
+        return
+    guess = _learned_guess(items) if name == TEXT_ONLY else _GUESSES[name]
     for item in items:
         rng = np.random.default_rng([seed, zlib.crc32(f"{name} {item.id}".encode())])
-        if name == ORACLE:
-            for kind in ("slots", "choice", "points"):
-                yield Answer(item.id, kind, right_reply(item, kind))
-            continue
         episode = get_episode(item.task, item.split, item.episode)
-        if learned:
-            yield from _goal_answers(item, draw_goal(learned[item.id], episode, rng), rng)
-            continue
-        yield from _goal_answers(item, _GUESSES[name](item, episode, rng), rng)
+        yield from _goal_answers(item, guess(item, episode, rng), rng)
         if name == CHANCE:
             yield Answer(item.id, "points", _random_points(item, rng))
+
+
+def _right_answers(items: Iterable[GroundingItem]) -> Iterator[Answer]:
+    """Yield the right answers to all questions."""
+    for item in items:
+        for kind in QUESTION_KINDS:
+            yield Answer(item.id, kind, right_reply(item, kind))
+
+
+def _learned_guess(items: Sequence[GroundingItem]) -> Guess:
+    """Return the guess of the learner of words alone."""
+    learned = _learn(items)
+    return lambda item, episode, rng: draw_goal(learned[item.id], episode, rng)
 
 
 def _goal_answers(
     item: GroundingItem, goal: Goal | None, rng: np.random.Generator
 ) -> Iterator[Answer]:
+    """Yield the slots of a goal and its choice; a random choice if it is none of them."""
     answer = None if goal is None else goal_schema(item.task).answers[goal]
     yield Answer(item.id, "slots", answer or "")
     if answer in item.choice_answers:
@@ -78,6 +92,7 @@ def _goal_answers(
 
 
 def _random_points(item: GroundingItem, rng: np.random.Generator) -> str:
+    """Return a random pixel for each thing that is meant, as JSON."""
     found = []
     for point in item.points:
         height, width = point.size
@@ -95,8 +110,6 @@ def _command_goal(item: GroundingItem, episode: Episode, rng: np.random.Generato
 
 def _left_by_command(item: GroundingItem, episode: Episode) -> tuple[Goal, ...]:
     """Return the goals that fit the command alone; none if they are not known."""
-    if item.options.language == DEFAULT_LANGUAGE:
-        return interpret(item.turns[-1], episode.scene, item.task).goals
     wordings = None if item.wordings == OWN_WORDS else item.wordings
     instruction = instruct_with(episode, replace(item.options, wordings=wordings))
     return goals_of_command(instruction, episode)
@@ -125,9 +138,10 @@ def _learn(items: Sequence[GroundingItem]) -> dict[str, TextGuess]:
     for item in items:
         groups.setdefault((item.task, item.options), []).append(item)
     found: dict[str, TextGuess] = {}
-    for (task, options), members in groups.items():
+    for (task, options), of_group in groups.items():
         learner = learn_goals(task, options, scenes=0)
-        heard = [Heard(one.text, one.hidden_slots) for one in members]
+        heard = [Heard(item.text, item.hidden_slots) for item in of_group]
         guesses = learner.guesses("text-only", heard)
-        found |= {item.id: guess for item, guess in zip(members, guesses, strict=True)}
+        for item, guess in zip(of_group, guesses, strict=True):
+            found[item.id] = guess
     return found

@@ -10,21 +10,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from roboirg.core.arms import TOLD
-from roboirg.core.errors import InvalidValueError
-from roboirg.core.versions import Versions
-from roboirg.evaluation.analysis.results.frame import MISSING, Frame, as_column, task_order
-from roboirg.evaluation.analysis.results.option_labels import options_sort_key
-from roboirg.evaluation.analysis.results.policy_run import EvalConditions, PolicyRun
-from roboirg.evaluation.analysis.stats.cells import cells_of
-from roboirg.evaluation.analysis.stats.measure import ALL_TASKS, Measured, ScopeKey, summarize
-from roboirg.evaluation.grounding_items.answer_file import Answer
-from roboirg.evaluation.grounding_items.grounding_item import (
+from roboirg.analysis.measures.measure import ALL_TASKS, Measured, ScopeKey, summarize
+from roboirg.analysis.results.frame import MISSING, Frame, as_column, task_order
+from roboirg.analysis.results.option_labels import options_sort_key
+from roboirg.analysis.results.policy_run import EvalConditions, PolicyRun
+from roboirg.analysis.results.run_cells import cells_of
+from roboirg.apps.grounding.items.answer_file import Answer
+from roboirg.apps.grounding.items.grounding_item import (
     QUESTION_KINDS,
     GroundingItem,
     QuestionKind,
 )
-from roboirg.evaluation.grounding_items.verdicts import ReplyVerdict, guess_chance, judge_reply
+from roboirg.apps.grounding.items.verdicts import ReplyVerdict, guess_chance, judge_reply
+from roboirg.core.arms import TOLD
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.versions import Versions
 
 ANSWERS_VERSION = "answers"
 OWN_WORDS = "own"
@@ -57,7 +57,7 @@ class GroundingScore:
     @property
     def unparsed(self) -> int:
         """Number of unreadable replies."""
-        return sum(one.verdict.understood is None for one in self.judged)
+        return sum(judged.verdict.understood is None for judged in self.judged)
 
     @property
     def missing(self) -> int:
@@ -113,90 +113,127 @@ def score_answers(
     if not by_kind:
         raise InvalidValueError("There are no answers to score.")
     run = _policy_run(items, name)
-    return tuple(
-        _score(items, by_kind[kind], run, kind) for kind in QUESTION_KINDS if kind in by_kind
-    )
+    scores = []
+    for kind in QUESTION_KINDS:
+        replies = by_kind.get(kind)
+        if replies:
+            scores.append(_score(items, replies, run, kind))
+    return tuple(scores)
 
 
 def score_rows(score: GroundingScore) -> tuple[ScoreRow, ...]:
     """Return a row for each set of options, with intervals and corrected tests."""
-    found = summarize(cells_of(score.frame))
-    return tuple(_row(score, one) for key, one in found.items() if key.scope == ALL_TASKS)
+    summaries = summarize(cells_of(score.frame))
+    return tuple(
+        _row(score, summary) for key, summary in summaries.items() if key.scope == ALL_TASKS
+    )
 
 
 def _policy_run(items: Sequence[GroundingItem], name: str) -> PolicyRun:
-    sources = {
-        (one.split, one.wordings, one.language_version, one.environment_version) for one in items
-    }
-    if len(sources) != 1:
+    """Return a model's answers as a run, for the statistics of runs."""
+    runs = {_run_of(item, name) for item in items}
+    if len(runs) != 1:
         raise InvalidValueError(
             "The items come from several splits, wordings or versions, whose scores are not "
             "averaged; export and score each separately."
         )
-    ((split, wordings, language, environment),) = sources
-    conditions = EvalConditions(split, wordings=None if wordings == OWN_WORDS else wordings)
-    return PolicyRun(
-        name,
-        conditions,
-        Versions(
-            policy_version=ANSWERS_VERSION,
-            language_version=language,
-            environment_version=environment,
-        ),
+    return runs.pop()
+
+
+def _run_of(item: GroundingItem, name: str) -> PolicyRun:
+    """Return the run of an item, which is to be the same for all that are scored together."""
+    wordings = None if item.wordings == OWN_WORDS else item.wordings
+    versions = Versions(
+        policy_version=ANSWERS_VERSION,
+        language_version=item.language_version,
+        environment_version=item.environment_version,
     )
+    return PolicyRun(name, EvalConditions(item.split, wordings=wordings), versions)
 
 
 def _score(
     items: Sequence[GroundingItem], replies: Mapping[str, str], run: PolicyRun, kind: QuestionKind
 ) -> GroundingScore:
-    verdicts = {
-        item.id: judge_reply(item, kind, replies[item.id]) for item in items if item.id in replies
+    """Return the verdicts on a model's replies, given by the items' ids."""
+    verdicts: dict[str, ReplyVerdict] = {}
+    judged = []
+    for item in items:
+        if item.id in replies:
+            verdicts[item.id] = judge_reply(item, kind, replies[item.id])
+            judged.append(JudgedItem(item, verdicts[item.id]))
+    return GroundingScore(run.policy, kind, tuple(judged), _frame(items, verdicts, run))
+
+
+def _frame(
+    items: Sequence[GroundingItem], verdicts: Mapping[str, ReplyVerdict], run: PolicyRun
+) -> Frame:
+    """Return a row for each item, sorted by task, options and episode."""
+    columns: dict[str, list[Any]] = defaultdict(list)
+    for item in _sorted(items):
+        row = {"run": run, "item": item, **_frame_row(item, verdicts.get(item.id))}
+        for name, value in row.items():
+            columns[name].append(value)
+    return Frame({name: as_column(values) for name, values in columns.items()})
+
+
+def _sorted(items: Sequence[GroundingItem]) -> list[GroundingItem]:
+    """Return items by task, options and episode."""
+    tasks = task_order({item.task for item in items})
+
+    def place(item: GroundingItem) -> tuple[Any, ...]:
+        return tasks.index(item.task), options_sort_key(item.options), item.episode
+
+    return sorted(items, key=place)
+
+
+def _frame_row(item: GroundingItem, verdict: ReplyVerdict | None) -> dict[str, Any]:
+    """Return the columns of an item that the statistics need; items know no seed and no arm."""
+    return {
+        "options": item.options,
+        "task": item.task,
+        "episode": item.episode,
+        "policy_seed": 0,
+        "arm": TOLD,
+        "outcome": _outcome(verdict),
     }
-    judged = tuple(JudgedItem(one, verdicts[one.id]) for one in items if one.id in verdicts)
-    tasks = task_order({one.task for one in items})
-    ordered = sorted(
-        items, key=lambda one: (tasks.index(one.task), options_sort_key(one.options), one.episode)
-    )
-    columns: dict[str, list[Any]] = {
-        "run": [run] * len(ordered),
-        "item": ordered,
-        "options": [one.options for one in ordered],
-        "task": [one.task for one in ordered],
-        "episode": [one.episode for one in ordered],
-        "policy_seed": [0] * len(ordered),
-        "arm": [TOLD] * len(ordered),
-        "outcome": [_outcome(verdicts.get(one.id)) for one in ordered],
-    }
-    frame = Frame({name: as_column(values) for name, values in columns.items()})
-    return GroundingScore(run.policy, kind, judged, frame)
 
 
 def _outcome(verdict: ReplyVerdict | None) -> str:
-    return MISSING if verdict is None else "success" if verdict.right else "failure"
+    """Return how an item counts in the statistics; without an answer it is missing."""
+    if verdict is None:
+        return MISSING
+    return "success" if verdict.right else "failure"
 
 
 def _row(score: GroundingScore, summary: Measured[ScopeKey]) -> ScoreRow:
-    own = [one for one in score.judged if one.item.options == summary.key.options]
+    """Return the row of a set of options."""
+    options = summary.key.options
+    judged = [answered for answered in score.judged if answered.item.options == options]
+    chances: dict[str, list[float]] = defaultdict(list)
+    command_chances: dict[str, list[float]] = defaultdict(list)
+    for item, _ in judged:
+        chances[item.task].append(guess_chance(item, score.kind))
+        if item.command_chance is not None:
+            command_chances[item.task].append(item.command_chance)
     return ScoreRow(
         summary,
-        chance=_mean_over_tasks((item, guess_chance(item, score.kind)) for item, _ in own),
-        command_chance=_mean_over_tasks((item, item.command_chance) for item, _ in own),
-        hidden=_hidden_share(own) if score.kind == "slots" else None,
+        chance=_mean_over_tasks(chances),
+        command_chance=_mean_over_tasks(command_chances),
+        hidden=_hidden_share(judged) if score.kind == "slots" else None,
     )
 
 
-def _mean_over_tasks(values: Iterable[tuple[GroundingItem, float | None]]) -> float:
-    """Return the mean over tasks of the known means, weighted as the rates are; 0 without any."""
-    by_task: dict[str, list[float]] = defaultdict(list)
-    for item, value in values:
-        if value is not None:
-            by_task[item.task].append(value)
-    means = [float(np.mean(own)) for own in by_task.values()]
+def _mean_over_tasks(by_task: Mapping[str, Sequence[float]]) -> float:
+    """Return the mean over tasks of their means, weighted as the rates are; 0 without any."""
+    means = [float(np.mean(of_task)) for of_task in by_task.values()]
     return float(np.mean(means)) if means else 0.0
 
 
 def _hidden_share(judged: Iterable[JudgedItem]) -> float | None:
-    shares = [verdict.parts[field] for item, verdict in judged for field in hidden_fields(item)]
+    """Return the share of hidden slots that are right; None if nothing is hidden."""
+    shares: list[bool] = []
+    for item, verdict in judged:
+        shares += [verdict.parts[field] for field in hidden_fields(item)]
     return float(np.mean(shares)) if shares else None
 
 

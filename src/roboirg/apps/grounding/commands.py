@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,6 +22,12 @@ from roboirg.core.plain_text import counted
 
 if TYPE_CHECKING:
     from roboirg.apps.grounding.answer_scores import GroundingScore
+    from roboirg.apps.grounding.items.grounding_item import GroundingItem
+    from roboirg.apps.grounding.items.question_set import EpisodeName
+
+COMPARED = 2
+"""Files of answers that are compared."""
+MIB = 2**20
 
 # Heavy modules are imported inside the commands, so that --help is fast.
 
@@ -48,11 +55,8 @@ def export_grounding(
     Example: roboirg export grounding --split val --out grounding
     """
     from roboirg.apps.grounding.dataset_export import export_grounding
+    from roboirg.apps.grounding.items.question_set import ExportRequest
     from roboirg.cli.progress_bar import progress_bar
-    from roboirg.evaluation.grounding_items.question_set import (
-        ExportRequest,
-    )
-    from roboirg.evaluation.plan.option_parsing import parse_episodes, parse_splits
     from roboirg.language.generator import check_options
     from roboirg.util.parquet_support import check_parquet_support
     from roboirg.util.processor import worker_count
@@ -62,26 +66,34 @@ def export_grounding(
     options = words.options()
     check_options(options)
     request = ExportRequest(
-        episodes=tuple(
-            (task, one, index)
-            for task in words.tasks(tasks, options.wordings)
-            for one in parse_splits(words.given("split", split))
-            for index in parse_episodes(words.fields.get("episodes", "all"), one, [task])
-        ),
+        episodes=_episode_names(words, words.tasks(tasks, options.wordings), split),
         settings=words.settings(settings),
         forms=words.forms(),
         options=options,
         wordings_file=words.fields.get("wordings"),
         **words.choices(ExportRequest),
     )
-    count = worker_count()
     with progress_bar("episodes") as progress:
-        facts = export_grounding(request, out, count, progress)
-    typer.echo(
-        f"{counted(facts.items, 'item')}, {counted(facts.pictures, 'picture')}, "
-        f"{counted(facts.videos, 'video')}, {facts.size / 2**20:.1f} MiB: {out}\n"
-        f"sha256 {facts.sha256}"
-    )
+        facts = export_grounding(request, out, worker_count(), progress)
+    items = counted(facts.items, "item")
+    pictures = counted(facts.pictures, "picture")
+    videos = counted(facts.videos, "video")
+    typer.echo(f"{items}, {pictures}, {videos}, {facts.size / MIB:.1f} MiB: {out}")
+    typer.echo(f"sha256 {facts.sha256}")
+
+
+def _episode_names(words: PlanWords, tasks: Iterable[str], splits: str) -> tuple[EpisodeName, ...]:
+    """Return the episodes of tasks and splits; a plan may name other splits, and episodes."""
+    from roboirg.apps.grounding.items.question_set import EpisodeName
+    from roboirg.runs.plan.option_parsing import parse_episodes, parse_splits
+
+    chosen = words.fields.get("episodes", "all")
+    found: list[EpisodeName] = []
+    for task in tasks:
+        for split in parse_splits(words.given("split", splits)):
+            numbers = parse_episodes(chosen, split, [task])
+            found += [EpisodeName(task, split, number) for number in numbers]
+    return tuple(found)
 
 
 @score_app.command("grounding")
@@ -111,53 +123,68 @@ def score_grounding(
     """
     from rich.console import Console
 
-    from roboirg.apps.grounding.answer_floors import FLOORS, floor_answers
+    from roboirg.analysis.tables.rendering.terminal import print_tables
+    from roboirg.apps.grounding.answer_floors import FLOORS
     from roboirg.apps.grounding.answer_scores import score_answers
+    from roboirg.apps.grounding.items.answer_file import read_answers
+    from roboirg.apps.grounding.items.grounding_item import read_items
     from roboirg.apps.grounding.score_report import report_text
     from roboirg.apps.grounding.score_tables import score_table
     from roboirg.cli.names import known_names
-    from roboirg.evaluation.analysis.tables.rendering.terminal import print_tables
-    from roboirg.evaluation.grounding_items.answer_file import read_answers, write_answers
-    from roboirg.evaluation.grounding_items.grounding_item import read_items
     from roboirg.util.atomic_write import write_atomically
 
-    names = () if floor is None else known_names("floor", floor, FLOORS)
-    if not answers and not names:
+    paths = answers or []
+    floors = () if floor is None else known_names("floor", floor, FLOORS)
+    if not paths and not floors:
         raise InvalidValueError("There is nothing to score; give files of answers or --floor.")
     items = read_items(data)
-    scores = [
-        one
-        for path in answers or ()
-        for one in score_answers(items, read_answers(path, items), path.stem)
-    ]
-    compared = _comparisons(scores) if len(answers or ()) == 2 else []  # noqa: PLR2004
-    for name in names:
-        found = list(floor_answers(name, items))
-        if write_floors is not None:
-            write_answers(write_floors / f"{name}.jsonl", found)
-        scores += score_answers(items, found, name)
+    scores: list[GroundingScore] = []
+    for path in paths:
+        scores += score_answers(items, read_answers(path, items), path.stem)
+    comparisons = _comparisons(scores) if len(paths) == COMPARED else []
+    for name in floors:
+        scores += _floor_scores(name, items, write_floors)
+
     console = Console()
     print_tables([score_table(scores)], console)
-    for sentence in compared:
+    for sentence in comparisons:
         console.print(sentence, highlight=False, markup=False)
     if report is not None:
         write_atomically(report, report_text(scores, data, report))
         typer.echo(report)
 
 
+def _floor_scores(
+    name: str, items: Sequence[GroundingItem], folder: Path | None
+) -> tuple[GroundingScore, ...]:
+    """Return the scores of a floor, and write its answers to a folder if there is one."""
+    from roboirg.apps.grounding.answer_floors import floor_answers
+    from roboirg.apps.grounding.answer_scores import score_answers
+    from roboirg.apps.grounding.items.answer_file import write_answers
+
+    answers = list(floor_answers(name, items))
+    if folder is not None:
+        write_answers(folder / f"{name}.jsonl", answers)
+    return score_answers(items, answers, name)
+
+
 def _comparisons(scores: Sequence[GroundingScore]) -> list[str]:
     """Return the paired comparison of two models in each kind of question that both answered."""
-    from roboirg.evaluation.analysis.stats.comparison import compare
-    from roboirg.evaluation.analysis.stats.comparison_text import sentences
+    from roboirg.analysis.measures.comparison import compare
+    from roboirg.analysis.measures.comparison_text import sentences
 
-    found: list[str] = []
-    for place, first in enumerate(scores):
-        for second in scores[place + 1 :]:
-            if first.kind == second.kind:
-                names = f"{first.name} ({first.kind})", f"{second.name} ({second.kind})"
-                result = compare(first.frame, second.frame)
-                found += ["", *sentences(result, *names)]
-    return found
+    lines: list[str] = []
+    for first, second in itertools.combinations(scores, 2):
+        if first.kind == second.kind:
+            result = compare(first.frame, second.frame)
+            lines.append("")
+            lines += sentences(result, _title(first), _title(second))
+    return lines
+
+
+def _title(score: GroundingScore) -> str:
+    """Return for example ``my-model (slots)``."""
+    return f"{score.name} ({score.kind})"
 
 
 def add_commands(app: typer.Typer) -> None:

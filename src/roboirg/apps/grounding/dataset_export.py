@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.apps.grounding.dataset_tables import write_parquet
-from roboirg.core.version import __version__
-from roboirg.evaluation.grounding_items.grounding_item import (
+from roboirg.apps.grounding.items.grounding_item import (
     ITEMS_FILE,
     GroundingItem,
     write_items,
 )
-from roboirg.evaluation.grounding_items.question_set import ExportRequest, Progress, collect_items
+from roboirg.apps.grounding.items.question_set import ExportRequest, Progress, collect_items
+from roboirg.core.version import __version__
 from roboirg.language.settings import setting_names
 from roboirg.util.atomic_write import write_atomically
 
@@ -96,44 +96,74 @@ def export_grounding(
     """
     items = collect_items(request, folder, workers, progress)
     content = write_items(items, folder)
-    splits = tuple(dict.fromkeys(one.split for one in items))
-    for split in splits:
-        write_parquet([one for one in items if one.split == split], folder, split)
+    for split, of_split in _by_split(items).items():
+        write_parquet(of_split, folder, split)
     facts = DatasetFacts(
         items=len(items),
-        pictures=len({path for item in items for path in (item.picture, *item.frames)}),
-        videos=len({item.video for item in items} - {None}),
+        pictures=len(_pictures(items)),
+        videos=len({item.video for item in items if item.video is not None}),
         sha256=hashlib.sha256(content).hexdigest(),
         size=_size(folder),
     )
-    card = _CARD.format(
+    write_atomically(folder / CARD, _card(request, items, facts))
+    return facts
+
+
+def _by_split(items: Sequence[GroundingItem]) -> dict[str, list[GroundingItem]]:
+    """Return the items of each split, in order."""
+    found: dict[str, list[GroundingItem]] = {}
+    for item in items:
+        found.setdefault(item.split, []).append(item)
+    return found
+
+
+def _pictures(items: Sequence[GroundingItem]) -> set[str]:
+    """Return the paths of all pictures, those of videos too."""
+    found: set[str] = set()
+    for item in items:
+        found.add(item.picture)
+        found.update(item.frames)
+    return found
+
+
+def _size(folder: Path) -> int:
+    """Return the size of all files of the dataset but its card, bytes."""
+    size = 0
+    for path in folder.rglob("*"):
+        if path.is_file() and path.name != CARD:
+            size += path.stat().st_size
+    return size
+
+
+def _card(request: ExportRequest, items: Sequence[GroundingItem], facts: DatasetFacts) -> str:
+    """Return the page of the dataset in Markdown, with a head for Hugging Face."""
+    files = [f"  - split: {split}\n    path: data/{split}-*.parquet" for split in _by_split(items)]
+    return _CARD.format(
         facts=facts,
         first=items[0],
         size=facts.size / _MIB,
-        files="\n".join(f"  - split: {one}\n    path: data/{one}-*.parquet" for one in splits),
+        files="\n".join(files),
         counts=_counts(items),
         package=__version__,
         items_file=ITEMS_FILE,
         frames=request.frames,
         every=request.frames_every,
     )
-    write_atomically(folder / CARD, card)
-    return facts
-
-
-def _size(folder: Path) -> int:
-    """Return the size of all files of the dataset but its card, bytes."""
-    return sum(
-        path.stat().st_size for path in folder.rglob("*") if path.is_file() and path.name != CARD
-    )
 
 
 def _counts(items: Sequence[GroundingItem]) -> str:
     """Return a table of the numbers of items by task and setting."""
-    found = Counter((item.task, item.setting) for item in items)
-    settings = [name for name in setting_names() if any(name == one for _, one in found)]
-    lines = [f"| task | {' | '.join(settings)} |", f"| --- |{' ---: |' * len(settings)}"]
-    for task in dict.fromkeys(task for task, _ in found):
-        numbers = (str(found[task, setting] or "–") for setting in settings)
-        lines.append(f"| {task} | {' | '.join(numbers)} |")
+    counts: dict[str, Counter[str]] = {}
+    for item in items:
+        counts.setdefault(item.task, Counter())[item.setting] += 1
+    asked = {item.setting for item in items}
+    settings = [name for name in setting_names() if name in asked]
+    lines = [_table_line("task", settings), f"| --- |{' ---: |' * len(settings)}"]
+    for task, of_task in counts.items():
+        lines.append(_table_line(task, [str(of_task[name] or "–") for name in settings]))
     return "\n".join(lines)
+
+
+def _table_line(head: str, cells: Sequence[str]) -> str:
+    """Return for example ``| PickByColor | 4 | – |``."""
+    return f"| {head} | {' | '.join(cells)} |"

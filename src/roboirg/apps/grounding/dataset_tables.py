@@ -9,7 +9,7 @@ from typing import Any
 
 import msgspec
 
-from roboirg.evaluation.grounding_items.grounding_item import GroundingItem
+from roboirg.apps.grounding.items.grounding_item import GroundingItem
 from roboirg.util.atomic_write import replacing
 from roboirg.util.parquet_support import check_parquet_support
 
@@ -35,7 +35,7 @@ def write_parquet(items: Sequence[GroundingItem], folder: Path, split: str) -> N
 
     schema = _arrow_schema()
     path = folder / DATA / f"{split}-00000-of-00001.parquet"
-    contents: dict[str, bytes] = {}
+    pictures = _PictureFiles(folder)
     dictionaries = ["picture.bytes", "frames.list.element.bytes", *schema.names]
     with (
         replacing(path) as part,
@@ -48,26 +48,38 @@ def write_parquet(items: Sequence[GroundingItem], folder: Path, split: str) -> N
         ) as writer,
     ):
         for start in range(0, len(items), ROWS_PER_GROUP):
-            rows = [_row(one, folder, contents) for one in items[start : start + ROWS_PER_GROUP]]
+            group = items[start : start + ROWS_PER_GROUP]
+            rows = [_row(item, pictures) for item in group]
             writer.write_table(pa.Table.from_pylist(rows, schema=schema))
 
 
-def _row(item: GroundingItem, folder: Path, contents: dict[str, bytes]) -> dict[str, Any]:
+class _PictureFiles:
+    """The pictures of a dataset's folder, each read once."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._contents: dict[str, bytes] = {}
+
+    def value(self, path: str) -> Mapping[str, Any]:
+        """Return a picture as the type Image of `datasets`."""
+        if path not in self._contents:
+            self._contents[path] = (self._folder / path).read_bytes()
+        return {"bytes": self._contents[path], "path": path}
+
+
+def _row(item: GroundingItem, pictures: _PictureFiles) -> dict[str, Any]:
+    """Return an item with its pictures instead of their paths."""
     row: dict[str, Any] = msgspec.to_builtins(item)
-
-    def picture(path: str) -> Mapping[str, Any]:
-        if path not in contents:
-            contents[path] = (folder / path).read_bytes()
-        return {"bytes": contents[path], "path": path}
-
-    row["picture"], row["frames"] = picture(item.picture), list(map(picture, item.frames))
+    row["picture"] = pictures.value(item.picture)
+    row["frames"] = [pictures.value(path) for path in item.frames]
     return row
 
 
 def _arrow_schema() -> Any:  # noqa: ANN401 - pyarrow ships no types
     import pyarrow as pa
 
-    text, number = pa.string(), pa.int64()
+    text = pa.string()
+    number = pa.int64()
     picture = pa.struct([("bytes", pa.binary()), ("path", text)])
     point = pa.struct(
         [
@@ -88,9 +100,8 @@ def _arrow_schema() -> Any:  # noqa: ANN401 - pyarrow ships no types
         "points_in_order": pa.bool_(),
         "command_chance": pa.float64(),
     }
-    schema = pa.schema(
-        [(name, special.get(name, text)) for name in GroundingItem.__struct_fields__]
-    )
+    names = GroundingItem.__struct_fields__
+    schema = pa.schema([(name, special.get(name, text)) for name in names])
     return schema.with_metadata({"huggingface": json.dumps(_features(schema))})
 
 
@@ -98,7 +109,8 @@ def _features(schema: Any) -> dict[str, Any]:  # noqa: ANN401 - pyarrow ships no
     """Return the description of the columns that `datasets` reads."""
     image = {"_type": "Image"}
     found = {field.name: _feature(field.type) for field in schema}
-    found |= {"picture": image, "frames": {"feature": image, "_type": "List"}}
+    found["picture"] = image
+    found["frames"] = {"feature": image, "_type": "List"}
     return {"info": {"features": found}}
 
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
+from roboirg.analysis.tables.rendering.markdown import markdown
+from roboirg.analysis.tables.table import Column, Entry, Row, Table
 from roboirg.apps.grounding.answer_scores import GroundingScore, JudgedItem, hidden_fields
+from roboirg.apps.grounding.items.verdicts import right_reply
 from roboirg.apps.grounding.score_tables import QUESTIONS, breakdown_tables, score_table
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.tables.rendering.markdown import markdown
-from roboirg.evaluation.analysis.tables.table import Column, Entry, Row, Table
-from roboirg.evaluation.grounding_items.verdicts import right_reply
 
 NO_ANSWER = "no answer"
 MOST_MISTAKES = 40
@@ -21,6 +22,13 @@ _CONFUSION_NOTE = (
     "Number of instructions whose command leaves the slot to the context, by the value "
     "understood. Correct values are in bold."
 )
+
+
+class Confusion(NamedTuple):
+    """The value of a slot that was meant, and the one that was understood, in words."""
+
+    meant: str
+    understood: str
 
 
 def report_text(scores: Sequence[GroundingScore], data: Path, target: Path) -> str:
@@ -34,11 +42,13 @@ def report_text(scores: Sequence[GroundingScore], data: Path, target: Path) -> s
     parts = ["# Grounding: what was understood", markdown(score_table(scores))]
     for score in scores:
         parts.append(f"## {score.name}, {QUESTIONS[score.kind]}")
-        parts += map(markdown, breakdown_tables(score))
+        tables = list(breakdown_tables(score))
         if score.kind == "slots":
-            parts += map(markdown, confusion_tables(score))
+            tables += confusion_tables(score)
+        parts += [markdown(table) for table in tables]
         parts += _mistakes(score, Path(os.path.relpath(data, target.parent)))
-    return "\n\n".join(part.rstrip("\n") for part in parts) + "\n"
+    stripped = [part.rstrip("\n") for part in parts]
+    return "\n\n".join(stripped) + "\n"
 
 
 def confusion_tables(score: GroundingScore) -> Iterator[Table]:
@@ -47,69 +57,80 @@ def confusion_tables(score: GroundingScore) -> Iterator[Table]:
     Only instructions whose command leaves the field to its context count, those with an explicit
     command in none.
     """
-    found: dict[str, Counter[tuple[str, str]]] = {}
+    found: dict[str, Counter[Confusion]] = {}
     for item, verdict in score.judged:
         meant = json.loads(item.answer)
-        understood = None if verdict.understood is None else json.loads(verdict.understood)
+        understood = json.loads(verdict.understood or "{}")
         for field in hidden_fields(item):
-            value = NO_ANSWER if understood is None else _text(understood[field])
-            found.setdefault(field, Counter())[_text(meant[field]), value] += 1
+            value = _text(understood[field]) if understood else NO_ANSWER
+            counts = found.setdefault(field, Counter())
+            counts[Confusion(_text(meant[field]), value)] += 1
     for field, counts in sorted(found.items()):
         yield _confusion_table(field, counts)
 
 
-def _confusion_table(field: str, counts: Counter[tuple[str, str]]) -> Table:
-    meant = sorted({pair[0] for pair in counts})
-    understood = sorted({pair[1] for pair in counts} - {NO_ANSWER})
-    if any(pair[1] == NO_ANSWER for pair in counts):
-        understood.append(NO_ANSWER)
+def _confusion_table(field: str, counts: Counter[Confusion]) -> Table:
+    """Return a row for each value that was meant, and a column for each that was understood."""
+    every_meant = set()
+    every_understood = set()
+    for pair in counts:
+        every_meant.add(pair.meant)
+        every_understood.add(pair.understood)
+    columns = sorted(every_understood - {NO_ANSWER})
+    if NO_ANSWER in every_understood:
+        columns.append(NO_ANSWER)
+    rows = []
+    for meant in sorted(every_meant):
+        entries = []
+        for understood in columns:
+            count = counts[Confusion(meant, understood)]
+            entries.append(Entry(word=str(count or "–"), best=meant == understood))
+        rows.append(Row(field, meant, tuple(entries)))
     return Table(
         key=f"confusion_{field}",
         title=f"Confusion of {field}",
         heads=("slot", "meant"),
-        columns=tuple(map(Column, understood)),
-        rows=tuple(
-            Row(
-                field,
-                value,
-                tuple(
-                    Entry(word=str(counts[value, other] or "–"), best=value == other)
-                    for other in understood
-                ),
-            )
-            for value in meant
-        ),
+        columns=tuple(Column(value) for value in columns),
+        rows=tuple(rows),
         notes=(_CONFUSION_NOTE,),
     )
 
 
 def _text(value: object) -> str:
-    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+    """Return the value of a slot in words: ``["red", "blue"]`` is ``red, blue``."""
+    if isinstance(value, list):
+        return ", ".join(str(part) for part in value)
+    return str(value)
 
 
 def _mistakes(score: GroundingScore, pictures: Path) -> Iterator[str]:
-    wrong = [one for one in score.judged if not one.verdict.right]
+    """Yield some wrong answers, with links to what was seen."""
+    wrong = [answered for answered in score.judged if not answered.verdict.right]
     if not wrong:
         return
     shown = _spread(wrong)
     yield f"### What was understood instead: {len(shown)} of {counted(len(wrong), 'mistake')}"
     for item, verdict in shown:
         meant = right_reply(item, score.kind)
-        frames = "" if item.video is None else f", [video]({pictures / item.video})"
-        links = f"[picture]({pictures / item.picture}){frames}; `{item.id}`"
+        links = f"[picture]({pictures / item.picture})"
+        if item.video is not None:
+            links += f", [video]({pictures / item.video})"
         yield (
-            f"- {item.task}, {item.setting}, episode {item.episode} ({links}):\n"
+            f"- {item.task}, {item.setting}, episode {item.episode} ({links}; `{item.id}`):\n"
             f"  *{item.text}*\n"
             f"  meant `{meant}`, understood `{verdict.understood or NO_ANSWER}`"
         )
 
 
-def _spread(wrong: Sequence[JudgedItem]) -> list[JudgedItem]:
+def _spread(wrong: Iterable[JudgedItem]) -> list[JudgedItem]:
     """Return at most `MOST_MISTAKES`, the first of every task and setting, then the second, ..."""
-    ranks: Counter[tuple[str, str]] = Counter()
-    ranked = []
-    for place, one in enumerate(wrong):
-        key = (one.item.task, one.item.setting)
-        ranked.append((ranks[key], place, one))
-        ranks[key] += 1
-    return [one for _, _, one in sorted(ranked, key=lambda entry: entry[:2])[:MOST_MISTAKES]]
+    seen: Counter[tuple[str, str]] = Counter()
+    by_rank: dict[int, list[JudgedItem]] = {}
+    for answered in wrong:
+        group = answered.item.task, answered.item.setting
+        by_rank.setdefault(seen[group], []).append(answered)
+        seen[group] += 1
+    shown: list[JudgedItem] = []
+    for rank in sorted(by_rank):
+        shown += by_rank[rank]
+    return shown[:MOST_MISTAKES]

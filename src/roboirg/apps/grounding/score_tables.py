@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
+from roboirg.analysis.measures.breakdowns import BREAKDOWNS
+from roboirg.analysis.results.frame import as_column
+from roboirg.analysis.results.option_labels import options_label
+from roboirg.analysis.tables.diagnostic_tables import make_breakdown_table
+from roboirg.analysis.tables.table import Row, Table, named_columns
 from roboirg.apps.grounding.answer_scores import GroundingScore, ScoreRow, score_rows
+from roboirg.apps.grounding.items.grounding_item import GroundingItem
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.analysis.results.frame import as_column
-from roboirg.evaluation.analysis.results.option_labels import options_label
-from roboirg.evaluation.analysis.stats.breakdowns import BREAKDOWNS
-from roboirg.evaluation.analysis.stats.intervals import TOO_FEW, Interval
-from roboirg.evaluation.analysis.stats.rates import NOT_APPLICABLE, gap_words
-from roboirg.evaluation.analysis.tables.diagnostic_tables import make_breakdown_table
-from roboirg.evaluation.analysis.tables.table import Row, Table, named_columns
-from roboirg.evaluation.grounding_items.grounding_item import GroundingItem
+from roboirg.stats.intervals import TOO_FEW, Interval
+from roboirg.stats.rates import NOT_APPLICABLE, gap_words
 
 COLUMNS = named_columns(
     "items", "right", "95 % interval", "random", "above random", "command", "hidden slots", "gap",
@@ -25,22 +25,24 @@ QUESTIONS = {"slots": "slots", "choice": "choices", "points": "points"}
 def score_table(scores: Iterable[GroundingScore]) -> Table:
     """Return a table with a row for each model, kind of question and set of options."""
     scores = tuple(scores)
+    rows = []
+    for score in scores:
+        for row in score_rows(score):
+            label = options_label(row.summary.key.options)
+            rows.append(Row(_title(score), label, _words(row)))
     return Table(
         key="grounding",
         title="Grounding",
         heads=("model and question", "setting"),
         columns=COLUMNS,
-        rows=tuple(
-            Row(
-                f"{score.name}, {QUESTIONS[score.kind]}",
-                options_label(row.summary.key.options),
-                _words(row),
-            )
-            for score in scores
-            for row in score_rows(score)
-        ),
+        rows=tuple(rows),
         notes=tuple(_notes(scores)),
     )
+
+
+def _title(score: GroundingScore) -> str:
+    """Return the model and the question, as in ``my-model, choices``."""
+    return f"{score.name}, {QUESTIONS[score.kind]}"
 
 
 def breakdown_tables(score: GroundingScore) -> Iterator[Table]:
@@ -53,11 +55,13 @@ def breakdown_tables(score: GroundingScore) -> Iterator[Table]:
 
 
 def _words(row: ScoreRow) -> tuple[str, ...]:
+    """Return the cells of a row, in the order of `COLUMNS`."""
     summary = row.summary
     value, _, p_value = gap_words(summary.gap, summary.p_holm)
+    rate = None if summary.rate is None else float(summary.rate)
     return (
         str(summary.counts.trials),
-        _percent(None if summary.rate is None else float(summary.rate)),
+        _percent(rate),
         _interval(summary.interval),
         _percent(row.chance),
         _percent(row.corrected),
@@ -77,7 +81,7 @@ def _notes(scores: Sequence[GroundingScore]) -> Iterator[str]:
         "with the p-value of the exact paired test after Holm's correction."
     )
     for score in scores:
-        name = f"{score.name}, {QUESTIONS[score.kind]}"
+        name = _title(score)
         if score.unparsed:
             replies = counted(score.unparsed, "unreadable reply", "unreadable replies")
             yield f"{name}: {replies}, counted as wrong."
@@ -87,11 +91,18 @@ def _notes(scores: Sequence[GroundingScore]) -> Iterator[str]:
 
 
 def _percent(rate: float | None) -> str:
-    return NOT_APPLICABLE if rate is None else f"{100 * rate:.1f}".replace("-", "−")
+    """Return a rate in percent, as in ``−5.0``; a dash if there is none."""
+    if rate is None:
+        return NOT_APPLICABLE
+    return f"{100 * rate:.1f}".replace("-", "−")
 
 
 def _interval(interval: Interval | None) -> str:
-    return TOO_FEW if interval is None else " to ".join(map(_percent, interval))
+    """Return an interval in percent, as in ``40.0 to 60.0``."""
+    if interval is None:
+        return TOO_FEW
+    low, high = interval
+    return f"{_percent(low)} to {_percent(high)}"
 
 
 _LABELS: Mapping[str, Callable[[GroundingItem], Sequence[str]]] = {

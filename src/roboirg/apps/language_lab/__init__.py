@@ -1,1 +1,1 @@
-"""The instructions examined: validation, statistics, the card, exports, and others' sentences."""
+"""The instructions examined: statistics, scenarios, exports, and others' sentences."""

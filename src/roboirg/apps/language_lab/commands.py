@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -24,12 +25,11 @@ from roboirg.core.plain_text import counted
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from roboirg.language.scenarios.scenario import TaskScenarios
+
 # Heavy modules are imported inside the commands, so that --help is fast.
 
-MOST_FAILURES = 10
-"""Most broken rules to print."""
-
-language_app = typer.Typer(no_args_is_help=True, help="Count, validate and score the instructions.")
+language_app = typer.Typer(no_args_is_help=True, help="Count, check and score the instructions.")
 
 
 def export_instructions(
@@ -44,28 +44,20 @@ def export_instructions(
 
     Example: roboirg export instructions --split val --out words.parquet
     """
-    from roboirg.apps.language_lab.instruction_export import (
-        EXPORT_FORMATS,
-        check_export_support,
-        encode,
-    )
-    from roboirg.evaluation.plan.option_parsing import parse_splits
+    from roboirg.apps.language_lab.instruction_export import encode, format_of, rows_of
     from roboirg.language import FORMS
-    from roboirg.language.instruction_row import row
-    from roboirg.language.variants import instructions
+    from roboirg.runs.plan.option_parsing import parse_splits
     from roboirg.tasks.splits.splits import split_episodes
     from roboirg.util.atomic_write import write_atomically
 
     check_output_file(out)
-    kind = known_name("format", out.suffix.removeprefix("."), EXPORT_FORMATS)
-    check_export_support(kind)
+    kind = format_of(out)
     words = PlanWords(context, plan)
     options = words.options()
     names = words.tasks(tasks, options.wordings)
     chosen = words.settings(settings)
     episodes = list(split_episodes(names, parse_splits(words.given("split", split))))
-    said = instructions(episodes, chosen, words.forms(FORMS), options)
-    rows = [row(episode, instruction) for episode, instruction in said]
+    rows = rows_of(episodes, chosen, words.forms(FORMS), options)
     if not rows:
         raise InvalidValueError(f"None of these tasks has the setting {', '.join(chosen)}.")
     write_atomically(out, encode(rows, kind))
@@ -82,52 +74,16 @@ def stats(
     Example: roboirg language stats --split val
     """
     from roboirg.apps.language_lab.statistics_tables import overview_tables
-    from roboirg.evaluation.plan.option_parsing import parse_splits
     from roboirg.language import plain_settings
     from roboirg.language.variants import instructions
+    from roboirg.runs.plan.option_parsing import parse_splits
     from roboirg.tasks.splits.splits import split_episodes
 
     episodes = split_episodes(known_tasks(tasks), parse_splits(split))
-    said = [one for _, one in instructions(episodes, plain_settings(), ("implicit",))]
+    said = [
+        instruction for _, instruction in instructions(episodes, plain_settings(), ("implicit",))
+    ]
     _print(*overview_tables(said))
-
-
-@language_app.command("validate")
-def validate_instructions(
-    seeds: Annotated[
-        int, typer.Option(help="Random scenes for each task, beyond the splits.")
-    ] = 100,
-    tasks: Tasks = "all",
-    split: Annotated[str, typer.Option(help="train, val, test, all or none.")] = "all",
-) -> None:
-    """Read all instructions back and check their rules; exit code 2 if one is broken.
-
-    Example: roboirg language validate --seeds 10
-    """
-    from roboirg.apps.language_lab.validation.episode_checks import check_place, places_of
-    from roboirg.apps.language_lab.validation.validation_results import ValidationResults
-    from roboirg.apps.language_lab.validation.validation_tables import validation_tables
-    from roboirg.cli.progress_bar import progress_bars
-    from roboirg.evaluation.plan.option_parsing import parse_splits
-    from roboirg.util.parallel_map import parallel_map
-    from roboirg.util.processor import worker_count
-
-    names = known_tasks(tasks)
-    wanted = () if split.strip().lower() == "none" else parse_splits(split)
-    places, found = places_of(names, wanted, seeds), ValidationResults()
-    with progress_bars() as show:
-        for done, (_, results) in enumerate(parallel_map(check_place, places, worker_count()), 1):
-            found.add(results)
-            show("episodes", done, len(places), "")
-    for table in validation_tables(found):
-        _print(table, "")
-    for failure in found.failures[:MOST_FAILURES]:
-        where = f"{failure.episode}, seed {failure.seed}, {failure.setting}"
-        typer.echo(f"{failure.rule}: {where}: {failure.words}")
-    if found.failures:
-        texts = found.texts.total()
-        broken = counted(len(found.failures), "broken rule")
-        raise RoboIRGError(f"Found {broken} in {counted(texts, 'text')}.")
 
 
 @language_app.command("shortcuts")
@@ -149,40 +105,61 @@ def score_shortcuts(
 
     Example: roboirg language shortcuts --settings reasoning --by pattern
     """
-    from roboirg.evaluation.plan.option_parsing import parse_splits
-    from roboirg.shortcuts.goal_learner import check_learning_support
+    from roboirg.runs.plan.option_parsing import parse_splits
     from roboirg.shortcuts.shortcut_tables import (
         GROUPINGS,
-        JUDGING_SPLIT,
         LEARNING_SCENES,
-        TRAINING_SPLIT,
         shortcut_rows,
         shortcut_table,
     )
 
+    # What is not given here stands in the plan, if one is named.
     words = PlanWords(context, plan)
     split = words.given("split", split)
-    splits = () if split.strip().lower() == "none" else parse_splits(split)
-    grouping = None if by is None else known_name("row", by, GROUPINGS)
+    splits: Sequence[str] = ()
+    if split.strip().lower() != "none":
+        splits = parse_splits(split)
+    grouping = None
+    if by is not None:
+        grouping = known_name("row", by, GROUPINGS)
+    scenes = None
     if learned:
-        check_learning_support()
-        if not {TRAINING_SPLIT, JUDGING_SPLIT}.isdisjoint(splits):
-            raise InvalidValueError(
-                f"--learned trains on the splits {TRAINING_SPLIT} and {JUDGING_SPLIT}, so --split "
-                f"{split} would test it on what it has seen; choose --split test."
-            )
+        _check_learning(split, splits)
+        scenes = LEARNING_SCENES
     options = replace(words.options(), form=words.form())
     names = words.tasks(tasks, options.wordings)
     chosen = words.settings(settings)
-    scenes = LEARNING_SCENES if learned else None
     rows = shortcut_rows(names, splits, chosen, options, seeds=seeds, by=grouping, learning=scenes)
     if not rows:
         raise InvalidValueError(
             f"There is nothing to score: no episode of {', '.join(names)} in {', '.join(chosen)}."
         )
-    source = [*splits, *([f"{seeds:,} random scenes per task"] if seeds else [])]
-    title = f"Shortcuts, {options.form} form, {' and '.join(source)}"
+    title = f"Shortcuts, {options.form} form, {_sources(splits, seeds)}"
     _print(shortcut_table(rows, title, grouping))
+
+
+def _sources(splits: Sequence[str], seeds: int) -> str:
+    """Return from where scenes are: ``test and 200 random scenes per task``."""
+    sources = list(splits)
+    if seeds:
+        sources.append(f"{seeds:,} random scenes per task")
+    return " and ".join(sources)
+
+
+def _check_learning(split: str, splits: Sequence[str]) -> None:
+    """Check that learners can learn here, and are tested on other splits than they learn from.
+
+    `split` is what was typed for these splits.
+    """
+    from roboirg.shortcuts.goal_learner import check_learning_support
+    from roboirg.shortcuts.shortcut_tables import JUDGING_SPLIT, TRAINING_SPLIT
+
+    check_learning_support()
+    if TRAINING_SPLIT in splits or JUDGING_SPLIT in splits:
+        raise InvalidValueError(
+            f"--learned trains on the splits {TRAINING_SPLIT} and {JUDGING_SPLIT}, so --split "
+            f"{split} would test it on what it has seen; choose --split test."
+        )
 
 
 @language_app.command("check-scenarios")
@@ -199,20 +176,10 @@ def check_scenario_file(
 
     Example: roboirg language check-scenarios mine.toml --scenario "school trip"
     """
-    from roboirg.apps.language_lab.scenarios.explicit_check import (
-        check_explicit,
-        has_explicit_words,
-    )
-    from roboirg.apps.language_lab.scenarios.scenario_check import (
-        check_scenarios,
-        scenes_of,
-        unserved_settings,
-    )
-    from roboirg.apps.language_lab.scenarios.scenario_report import explicit_lines, report_lines
     from roboirg.language.scenarios.wording_file import read_words
 
     wordings = read_words(path)
-    if scenario is not None:
+    if scenario is not None:  # then it must be one of the file
         frames: set[str] = set()
         for words in wordings.tasks.values():
             frames.update(written.fields.frame for written in words.scenarios)
@@ -224,20 +191,59 @@ def check_scenario_file(
         )
     broken = 0
     for task, words in wordings.tasks.items():
-        if scenario is None and has_explicit_words(words, task):
-            explicit = check_explicit(words, scenes_of(task, 0))
-            typer.echo("\n".join(explicit_lines(explicit, task)))
-            broken += len(explicit.broken)
-        scenes = scenes_of(task, seeds)
-        reports = check_scenarios(words, scenario, scenes)
-        for report in reports:
-            typer.echo("\n".join(report_lines(report, task)))
-            broken += len(report.broken)
-        for complaint in unserved_settings(reports, scenes) if scenario is None else ():
-            typer.echo(f"BROKEN {task}: {complaint}.\n")
-            broken += 1
+        if scenario is None:
+            broken += _check_explicit(words, task)
+        broken += _check_scenarios(words, task, scenario, seeds, path)
     if broken:
         raise RoboIRGError(f"Found {counted(broken, 'broken rule')} in {path.name}.")
+
+
+def _check_explicit(words: TaskScenarios, task: str) -> int:
+    """Print what is found about a file's explicit words; return how many rules they break."""
+    from roboirg.apps.language_lab.scenarios.explicit_check import (
+        check_explicit,
+        has_explicit_words,
+    )
+    from roboirg.apps.language_lab.scenarios.scenario_check import scenes_of
+    from roboirg.apps.language_lab.scenarios.scenario_report import explicit_lines
+
+    if not has_explicit_words(words, task):
+        return 0
+    report = check_explicit(words, scenes_of(task, 0))
+    typer.echo("\n".join(explicit_lines(report, task)))
+    return len(report.broken)
+
+
+def _check_scenarios(
+    words: TaskScenarios, task: str, frame: str | None, seeds: int, path: Path
+) -> int:
+    """Print what is found about a file's scenarios of a task; return how many rules they break.
+
+    Args:
+        words: of the task.
+        task: its name.
+        frame: of the only scenario to check; None for all, which then must serve every scene.
+        seeds: number of random scenes.
+        path: of the file.
+    """
+    from roboirg.apps.language_lab.scenarios.scenario_check import (
+        check_scenarios,
+        scenes_of,
+        unserved_settings,
+    )
+    from roboirg.apps.language_lab.scenarios.scenario_report import report_lines
+
+    scenes = scenes_of(task, seeds)
+    reports = check_scenarios(words, frame, scenes)
+    broken = 0
+    for report in reports:
+        typer.echo("\n".join(report_lines(report, task)))
+        broken += len(report.broken)
+    if frame is None:
+        for complaint in unserved_settings(reports, scenes, path):
+            typer.echo(f"BROKEN {task}: {complaint}.\n")
+            broken += 1
+    return broken
 
 
 @language_app.command("sample")
@@ -245,19 +251,18 @@ def sample_texts(
     out: Annotated[Path, typer.Option(help="Folder for the sheets and their key.")],
     tasks: Tasks = "all",
     settings: Settings = "all",
-    anchors: Annotated[int, typer.Option(min=0, help="Texts of language 3 among them.")] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Other scenes for each seed, from 0.")] = 0,
 ) -> None:
-    """Write sheets of 44 texts a setting of language 4 to be rated blind, 1 to 5, and their key.
+    """Write sheets of 44 texts a setting to be rated blind, 1 to 5, and their key.
 
     Example: roboirg language sample --out rating --tasks PickXtimes,StopCube
     """
     from roboirg.apps.language_lab.scenarios.rating_sample import RATERS, draw_sample, key, sheet
     from roboirg.util.atomic_write import write_atomically
 
-    texts = draw_sample(known_tasks(tasks), known_settings(settings), anchors, seed)
+    texts = draw_sample(known_tasks(tasks), known_settings(settings), seed)
     if not texts:
-        raise InvalidValueError(f"Language 4 has no words for {tasks} in {settings}.")
+        raise InvalidValueError(f"There are no words of {tasks} in {settings}.")
     for rater in RATERS:
         write_atomically(out / f"sheet-{rater}.csv", sheet(texts, rater))
     write_atomically(out / "key.csv", key(texts))
@@ -298,5 +303,6 @@ def import_robomme(
 
 
 def add_commands(app: typer.Typer) -> None:
+    """Add the commands of this app to ``roboirg``."""
     export_app.command("instructions")(export_instructions)
     app.add_typer(language_app, name="language")

@@ -8,14 +8,34 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Literal, get_args
 
-from roboirg.language.instruction_row import ExportRow
+from roboirg.core.episode import Episode
+from roboirg.core.errors import known_name
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language.instruction_row import ExportRow, row
+from roboirg.language.variants import instructions
 from roboirg.util.parquet_support import check_parquet_support
 
 ExportFormat = Literal["jsonl", "parquet"]
 EXPORT_FORMATS: tuple[ExportFormat, ...] = get_args(ExportFormat)
+_NUMBERS = ("episode", "seed", "words", "tokens", "distractors")
+_NUMBER_LISTS = ("landmark_classes", "stages")
+_TEXT_LISTS = ("patterns", "references", "landmarks", "draws")
+"""Columns that are no texts; `turns` and `mentions` are lists of rows of their own."""
+
+
+def rows_of(
+    episodes: Iterable[Episode],
+    settings: Sequence[str],
+    forms: Sequence[str],
+    options: InstructionOptions,
+) -> list[ExportRow]:
+    """Return a row for each instruction that episodes have in some settings and forms."""
+    said = instructions(episodes, settings, forms, options)
+    return [row(episode, instruction) for episode, instruction in said]
 
 
 def encode(rows: Sequence[ExportRow], kind: ExportFormat) -> bytes:
@@ -23,42 +43,52 @@ def encode(rows: Sequence[ExportRow], kind: ExportFormat) -> bytes:
 
     In Parquet, the bytes also depend on the version of pyarrow.
     """
-    return _parquet(rows) if kind == "parquet" else _jsonl(rows)
+    if kind == "parquet":
+        return _parquet(rows)
+    return _jsonl(rows)
 
 
-def check_export_support(kind: ExportFormat) -> None:
-    """Check early that a format can be written."""
+def format_of(path: Path) -> ExportFormat:
+    """Return the format that the ending of a file names, if it can be written here."""
+    kind = known_name("format", path.suffix.removeprefix("."), EXPORT_FORMATS)
     if kind == "parquet":
         check_parquet_support()
+    return kind
 
 
 def _jsonl(rows: Sequence[ExportRow]) -> bytes:
-    return "".join(f"{json.dumps(one, ensure_ascii=False)}\n" for one in rows).encode()
+    """Return a line of JSON for each row."""
+    return "".join(f"{json.dumps(columns, ensure_ascii=False)}\n" for columns in rows).encode()
 
 
 def _parquet(rows: Sequence[ExportRow]) -> bytes:
-    check_export_support("parquet")
+    """Return the rows as Parquet; all rows have the columns of the first one."""
+    check_parquet_support()
     import pyarrow as pa
     from pyarrow import parquet
 
-    text, number = pa.string(), pa.int64()
-    texts, numbers = pa.list_(text), pa.list_(number)
-    special = {
-        **dict.fromkeys(("episode", "seed", "words", "tokens", "distractors"), number),
-        **dict.fromkeys(("landmark_classes", "stages"), numbers),
-        **dict.fromkeys(("patterns", "references", "landmarks", "templates"), texts),
-        "turns": pa.list_(pa.struct([("stage", text), ("start", number), ("text", text)])),
-        "mentions": pa.list_(
-            pa.struct(
-                [
-                    *((name, number) for name in ("turn", "start", "end")),
-                    *((name, text) for name in ("text", "role", "expression", "slot", "value")),
-                ]
-            )
-        ),
-    }
-    schema = pa.schema([(name, special.get(name, text)) for name in rows[0]])
-    file = io.BytesIO()
+    text = pa.string()
+    number = pa.int64()
+    turn = pa.struct({"stage": text, "start": number, "text": text})
+    mention = pa.struct(
+        {
+            "turn": number,
+            "start": number,
+            "end": number,
+            "text": text,
+            "role": text,
+            "expression": text,
+            "slot": text,
+            "value": text,
+        }
+    )
+    types = dict.fromkeys(rows[0], text)  # of each column, unless another one follows
+    types |= dict.fromkeys(_NUMBERS, number)
+    types |= dict.fromkeys(_NUMBER_LISTS, pa.list_(number))
+    types |= dict.fromkeys(_TEXT_LISTS, pa.list_(text))
+    types |= {"turns": pa.list_(turn), "mentions": pa.list_(mention)}
+    schema = pa.schema([(name, types[name]) for name in rows[0]])
     table = pa.Table.from_pylist(list(rows), schema=schema)
+    file = io.BytesIO()
     parquet.write_table(table, file, compression="zstd")
     return file.getvalue()

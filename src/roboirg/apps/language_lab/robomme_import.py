@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import runpy
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,7 +19,7 @@ from roboirg.core.word_pools import ROBOMME_NAME
 from roboirg.language.goal_fields import goal_fields
 from roboirg.language.scenarios.wording_file import Wordings, check_name, parse_wordings
 from roboirg.tasks import Task, all_tasks
-from roboirg.tasks.splits.published_episodes import published_episode
+from roboirg.tasks.splits.published_episodes import PublishedEpisode, published_episode
 from roboirg.tasks.splits.splits import SIZES
 
 FILE = Path("src/robomme/robomme_env/utils/task_goal.py")
@@ -48,16 +48,24 @@ def import_robomme(root: Path, name: str = ROBOMME_NAME) -> tuple[str, Wordings]
 
 
 def _wording_text(function: SentenceFunction, name: str) -> str:
-    source = f"The first sentences of {FUNCTION} in RoboMME's repository."
+    """Return a wording file, TOML, with the function's sentence for each goal."""
     tasks = all_tasks()
-    lines = [f"name = {json.dumps(name)}", f"source = {json.dumps(source)}"]
-    lines.append(f"tasks = {json.dumps(list(tasks))}")
+    source = f"The first sentences of {FUNCTION} in RoboMME's repository."
+    lines = [
+        f"name = {json.dumps(name)}",
+        f"source = {json.dumps(source)}",
+        f"tasks = {json.dumps(list(tasks))}",
+    ]
     for task in tasks.values():
         for goal, sentence in _sentences(function, task).items():
-            slots = (f"{slot} = {json.dumps(value)}" for slot, value in goal.slots)
-            lines += ["", "[[literal]]", f"task = {json.dumps(task.name)}"]
-            lines.append(f"when = {{ {', '.join(slots)} }}")
-            lines.append(f"text = {json.dumps(sentence)}")
+            slots = [f"{slot} = {json.dumps(value)}" for slot, value in goal.slots]
+            lines += [
+                "",
+                "[[literal]]",
+                f"task = {json.dumps(task.name)}",
+                f"when = {{ {', '.join(slots)} }}",
+                f"text = {json.dumps(sentence)}",
+            ]
     return "\n".join(lines) + "\n"
 
 
@@ -79,61 +87,79 @@ def _load_function(root: Path) -> SentenceFunction:
 
 
 def _sentences(function: SentenceFunction, task: Task) -> dict[Goal, str]:
-    """Return the sentence of every goal that the published scenes of a task allow."""
+    """Return RoboMME's sentence for every goal that the published scenes of a task allow."""
     found: dict[Goal, str] = {}
-    for split, size in SIZES.items():
-        for index in range(size):
-            episode = published_episode(task.name, split, index)
-            if episode is None:
+    for episode in _published_episodes(task):
+        number = len(goal_fields(episode.goal))
+        for goal in task.goals(episode.scene):
+            # A difficulty has as many picks or colors as its episodes.
+            if len(goal_fields(goal)) != number:
                 continue
-            fields = len(goal_fields(episode.goal))
-            for goal in task.goals(episode.scene):
-                # A difficulty has as many picks or colors as its episodes.
-                if len(goal_fields(goal)) == fields:
-                    said = _ask(function, task.name, goal, episode.difficulty)
-                    if found.setdefault(goal, said) != said:
-                        raise InvalidValueError(
-                            f"RoboMME has two sentences for a goal of {task.name} "
-                            f"({describe_goal(goal.as_mapping())}): {found[goal]!r} and {said!r}."
-                        )
+            said = _ask(function, task.name, goal, episode.difficulty)
+            if found.setdefault(goal, said) != said:
+                raise InvalidValueError(
+                    f"RoboMME has two sentences for a goal of {task.name} "
+                    f"({describe_goal(goal.as_mapping())}): {found[goal]!r} and {said!r}."
+                )
     return found
 
 
+def _published_episodes(task: Task) -> Iterator[PublishedEpisode]:
+    """Yield RoboMME's episodes of a task."""
+    for split, size in SIZES.items():
+        for index in range(size):
+            episode = published_episode(task.name, split, index)
+            if episode is not None:
+                yield episode
+
+
 def _ask(function: SentenceFunction, task: str, goal: Goal, difficulty: str) -> str:
-    """Return the first sentence for a goal."""
-    about = (
-        f"RoboMME's {FUNCTION}, asked for a goal of {task} ({describe_goal(goal.as_mapping())}),"
-    )
+    """Return the first sentence that RoboMME's function gives for a goal."""
+    words = describe_goal(goal.as_mapping())
+    about = f"RoboMME's {FUNCTION}, asked for a goal of {task} ({words}),"
     try:
         said = function(stand_in(goal, difficulty), task)
     except Exception as error:
         raise InvalidValueError(f"{about} raised {one_line(error)}.") from error
-    first = said[0] if isinstance(said, (list, tuple)) and said else said
+    first = said
+    if isinstance(said, (list, tuple)) and said:
+        first = said[0]
     if not isinstance(first, str):
         raise InvalidValueError(f"{about} returned {said!r}; it must be a list of sentences.")
     return first
 
 
+_ATTRIBUTES = {
+    "color": "target_color_name",
+    "repeats": "num_repeats",
+    "visit": "stop_time",
+    "relation": "target_target_language",
+    "placement": "which_in_subset",
+}
+"""RoboMME's attribute for the value of each slot of ours with a single value."""
+
+
 def stand_in(goal: Goal, difficulty: str) -> SimpleNamespace:
-    """Return an object with what RoboMME's function reads of a task, for a goal of ours."""
+    """Return an object with what RoboMME's function reads of a task, for a goal of ours.
+
+    The color red becomes ``target_color_name = "red"``.
+    """
     slots = goal.as_mapping()
-    found: dict[str, object] = {"difficulty": difficulty}
+    task = SimpleNamespace(difficulty=difficulty)
     if "counts" in slots:
         counts = dict(goal.amounts)
-        found |= {f"{color}_cubes_target_number": counts.get(color, 0) for color in COLORS}
+        for color in COLORS:
+            setattr(task, f"{color}_cubes_target_number", counts.get(color, 0))
     elif "colors" in slots:
         colors = goal.texts("colors")
-        found["color_names"] = [*colors, *(one for one in COLORS if one not in colors)]
-        found["pick_times"] = len(colors)
-        found["configs"] = {one: {"pick": len(colors)} for one in DIFFICULTIES}
-    names = {
-        "color": "target_color_name",
-        "repeats": "num_repeats",
-        "visit": "stop_time",
-        "relation": "target_target_language",
-        "placement": "which_in_subset",
-    }
-    found |= {names[slot]: value for slot, value in slots.items() if slot in names}
-    task = SimpleNamespace(**found)
-    task.env = task.unwrapped = task
+        others = [color for color in COLORS if color not in colors]
+        task.color_names = [*colors, *others]
+        task.pick_times = len(colors)
+        task.configs = {name: {"pick": len(colors)} for name in DIFFICULTIES}
+    for slot, value in slots.items():
+        if slot in _ATTRIBUTES:
+            setattr(task, _ATTRIBUTES[slot], value)
+    # The function may reach the task through wrappers: here, it is its own.
+    task.env = task
+    task.unwrapped = task
     return task

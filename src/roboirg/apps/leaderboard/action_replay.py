@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import msgspec
@@ -13,13 +15,15 @@ from roboirg.core.arms import OTHER_GOAL, TOLD
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.observations import Observation
 from roboirg.core.policy_needs import PolicyNeeds
-from roboirg.evaluation.episode_errors import EpisodeError
-from roboirg.evaluation.play.call_guard import CallGuard
-from roboirg.evaluation.play.episode_record import begin_record
-from roboirg.evaluation.play.job_instruction import PreparedJob, has_other_words
-from roboirg.evaluation.play.rollout import play_with
-from roboirg.evaluation.records.action_log import ActionLog
-from roboirg.evaluation.records.record import Job, Record
+from roboirg.language.arms import TrialWords, word_trial
+from roboirg.language.instruction import Mention, Utterance
+from roboirg.records.action_log import ActionLog
+from roboirg.records.record import Record
+from roboirg.runs.episode_errors import EpisodeError
+from roboirg.runs.job_instruction import PreparedJob, has_other_words
+from roboirg.runs.play.call_guard import CallGuard
+from roboirg.runs.play.episode_record import begin_record
+from roboirg.runs.play.rollout import play_with
 
 
 class ReplayPolicy:
@@ -43,10 +47,10 @@ class ReplayPolicy:
         """Start an episode."""
 
     def act(self, observation: Observation) -> NDArray[np.float64]:  # noqa: ARG002
-        """Return the next answer.
+        """Return the next recorded answer, whatever is observed.
 
         Raises:
-            EOFError: there is none.
+            EOFError: all have been given.
         """
         answer = next(self._answers, None)
         if answer is None:
@@ -56,22 +60,23 @@ class ReplayPolicy:
 
 
 def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
-    """Play the actions of a record; return the record that they lead to, and its own actions.
+    """Play the actions of a record again; return the new record, and the actions that it took.
 
-    Nothing is drawn. If the record is an error, the actions are played as far as they go, and
-    error and cause are taken over: whether a policy raised cannot be played again.
+    The actions are None if the episode did not begin. No picture is drawn. If the record is an
+    error, its actions are played as far as they go, and the new record gets the same error and
+    cause: actions do not show whether a policy raised.
 
     Raises:
         InvalidValueError: the job's wording file is missing or has changed.
     """
-    prepared = PreparedJob(job_of(record))
+    prepared = prepared_job(record)
     policy = ReplayPolicy(log)
     again = begin_record(prepared)
     played = None
     needs = PolicyNeeds(cameras=(), actions=log.space)
     try:
         loop = play_with(policy, prepared, needs, again, CallGuard(again.timings, None))
-        # What was declared is taken over: the attribution of a failure begins with it.
+        # Copied before `conclude`, which explains a failure by what the policy had declared.
         again.policy_metadata = record.policy_metadata
         again.subgoals = record.subgoals
         loop.conclude()
@@ -85,14 +90,41 @@ def replay(record: Record, log: ActionLog) -> tuple[Record, ActionLog | None]:
     return again, played
 
 
-def job_of(record: Record) -> Job:
-    """Return what was played, without the address of the policy.
+@dataclass(frozen=True)
+class RecordedJob(PreparedJob):
+    """A job with the words of its record, which are not those of this package.
 
-    The explicit command of the goal stands for words that are not installed: no action depends on
-    what is said, and the installed words may not be able to say it.
+    Only the goals come from this package.
     """
+
+    record: Record
+
+    @cached_property
+    def words(self) -> TrialWords:
+        """The words of the trial, with those of the record in place of those made from its job.
+
+        What they mean (`meaning`) stays open: the record does not hold it.
+        """
+        arm = OTHER_GOAL if self.job.arm == OTHER_GOAL else TOLD
+        explicit = word_trial(self.scene_episode, InstructionOptions(), arm)
+        # Typed Any, as stages and roles of a stranger's record may be any text; none are read here.
+        said: list[Any] = list(self.record.instruction)
+        utterances = [Utterance(utterance.stage, utterance.text) for utterance in said]
+        spans: list[Any] = [msgspec.structs.asdict(span) for span in self.record.mentions]
+        mentions = [Mention(**span) for span in spans]
+        instruction = replace(
+            explicit.instruction,
+            setting=self.job.setting,
+            utterances=tuple(utterances),
+            mentions=tuple(mentions),
+            meaning=None,
+        )
+        return explicit._replace(instruction=instruction, command=self.record.command)
+
+
+def prepared_job(record: Record) -> PreparedJob:
+    """Return what was played, without the address of the policy, and what was said."""
     job = msgspec.structs.replace(record.identity, wordings_file=record.wordings_file)
     if has_other_words(record):
-        arm = OTHER_GOAL if job.arm == OTHER_GOAL else TOLD
-        return msgspec.structs.replace(job, options=InstructionOptions(), arm=arm)
-    return job
+        return RecordedJob(job, record)
+    return PreparedJob(job)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from roboirg.apps.leaderboard.run_verification import Verification
 
 _MOST_SHOWN = 20
+"""Records of each kind of finding that are printed."""
 
 RunOrPack = Annotated[str, typer.Argument(help="Output folder of a run, or its packed file.")]
 SampleShare = Annotated[
@@ -39,20 +40,20 @@ def verify(
     Example: roboirg leaderboard verify runs/first --sample 10%
     """
     from roboirg.apps.leaderboard.run_verification import verify_run
-    from roboirg.evaluation.records.packs import opened_run
-    from roboirg.evaluation.records.run_files import run_folder
+    from roboirg.records.packs import opened_run
+    from roboirg.records.run_files import run_folder
     from roboirg.util.processor import worker_count
 
     with opened_run(run_folder(run)) as folder, progress_bar("records") as show:
-        found = verify_run(
+        verification = verify_run(
             folder,
             sample=_share(sample),
             seed=sample_seed,
             workers=worker_count(),
             progress=show,
         )
-    _print(found)
-    if not found.holds:
+    _print(verification)
+    if not verification.holds:
         sys.exit(USAGE_ERROR)
 
 
@@ -67,7 +68,7 @@ def pack(
     Example: roboirg leaderboard pack runs/first --out first.roboirg.zip
     """
     from roboirg.apps.leaderboard.packing import pack_run
-    from roboirg.evaluation.records.run_files import run_folder
+    from roboirg.records.run_files import run_folder
 
     check_output_file(out)
     manifest = pack_run(run_folder(run), out, videos=videos, logs=logs)
@@ -76,51 +77,72 @@ def pack(
 
 
 def _share(text: str) -> float:
-    """Return a share such as 5% or 0.05."""
+    """Return the share that a text says, above 0 and at most 1: ``5%`` and ``0.05`` give 0.05."""
     number = text.strip().removesuffix("%")
+    whole = 100 if "%" in text else 1
     with contextlib.suppress(ValueError):
-        share = float(number) / (100 if "%" in text else 1)
+        share = float(number) / whole
         if 0 < share <= 1:
             return share
     raise InvalidValueError(f"The share of episodes is {text!r}; give one such as 5%.")
 
 
-def _print(found: Verification) -> None:
-    from roboirg.apps.leaderboard.record_check import TOLERANCE
+def _print(verification: Verification) -> None:
+    """Print what was found in a run, and last one sentence: whether all that was checked holds.
 
-    played = found.records - found.verdicts["not replayed"]
-    verb = verb_for(played, "were")
-    typer.echo(
-        f"{counted(found.records, 'record')}; {played:,} {verb} played again from stored actions."
-    )
-    typer.echo(f"End states equal bit for bit: {found.verdicts['exact']:,}.")
-    if tolerant := found.verdicts["tolerant"]:
-        typer.echo(
-            f"End states from other processors equal within {TOLERANCE:g} (m, rad, s): "
-            f"{tolerant:,}; the largest difference is {found.deviation:.1g}."
-        )
-    if found.errors:
-        typer.echo(
-            f"{counted(found.errors, 'record')} ended in an error: actions do not show whether a "
-            "policy raised one, and the rates leave such episodes out."
-        )
-    for note in found.notes:
+    Of records with faults, and of missing ones, only the first are listed.
+    """
+    played = verification.records - verification.verdicts["not replayed"]
+    _print_played(verification, played)
+    for note in verification.notes:
         typer.echo(note)
-    for check in found.checks[:_MOST_SHOWN]:
+    for fault in verification.faults:
+        typer.echo(f"does not hold: {printable(fault)}")
+    for check in verification.checks[:_MOST_SHOWN]:
         for sentence in check.findings:
             typer.echo(f"does not hold: {check.slug}: {printable(sentence)}")
-    for slug in found.missing[:_MOST_SHOWN]:
+    for slug in verification.missing[:_MOST_SHOWN]:
         typer.echo(f"has no record: {printable(slug)}")
-    if len(found.missing) > _MOST_SHOWN:
-        typer.echo(f"… and {len(found.missing) - _MOST_SHOWN:,} more.")
-    if len(found.checks) > _MOST_SHOWN:
-        typer.echo(f"… and {counted(len(found.checks) - _MOST_SHOWN, 'more record')}.")
-    wrong = len(found.checks) + len(found.missing)
-    fails = f"{counted(wrong, 'thing')} {verb_for(wrong, 'do')} not hold."
-    all_hold = "All that was checked holds."
-    if played == found.records and not found.notes:
-        all_hold = "Everything holds."
-    typer.echo(all_hold if found.holds else fails)
+    if len(verification.missing) > _MOST_SHOWN:
+        typer.echo(f"… and {len(verification.missing) - _MOST_SHOWN:,} more.")
+    if len(verification.checks) > _MOST_SHOWN:
+        typer.echo(f"… and {counted(len(verification.checks) - _MOST_SHOWN, 'more record')}.")
+
+    if not verification.holds:
+        wrong = len(verification.checks) + len(verification.missing) + len(verification.faults)
+        typer.echo(f"{counted(wrong, 'thing')} {verb_for(wrong, 'do')} not hold.")
+    elif played == verification.records and not verification.notes:
+        typer.echo("Everything holds.")
+    else:
+        typer.echo("All that was checked holds.")
+
+
+def _print_played(verification: Verification, played: int) -> None:
+    """Print how many records were played again, and how often their end states were equal.
+
+    Args:
+        verification: of the run.
+        played: number of records that were played again.
+    """
+    from roboirg.apps.leaderboard.record_check import TOLERANCE
+
+    verb = verb_for(played, "were")
+    typer.echo(
+        f"{counted(verification.records, 'record')}; {played:,} {verb} played again from stored "
+        "actions."
+    )
+    typer.echo(f"End states equal bit for bit: {verification.verdicts['exact']:,}.")
+    tolerant = verification.verdicts["tolerant"]
+    if tolerant:
+        typer.echo(
+            f"End states from other processors equal within {TOLERANCE:g} (m, rad, s): "
+            f"{tolerant:,}; the largest difference is {verification.deviation:.1g}."
+        )
+    if verification.errors:
+        typer.echo(
+            f"{counted(verification.errors, 'record')} ended in an error: actions do not show "
+            "whether a policy raised one, and the rates leave such episodes out."
+        )
 
 
 def add_commands(app: typer.Typer) -> None:

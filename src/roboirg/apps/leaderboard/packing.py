@@ -9,22 +9,29 @@ from pathlib import Path
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.version import __version__
-from roboirg.evaluation.records.action_log import ACTION_FOLDER
-from roboirg.evaluation.records.episode_log import LOG_FOLDER
-from roboirg.evaluation.records.film import VIDEO_FOLDER
-from roboirg.evaluation.records.packs import MANIFEST, MOST_PACKED_BYTES, PackManifest
-from roboirg.evaluation.records.record_codec import StoreError, read_summary
-from roboirg.evaluation.records.run_files import plan_names, run_file
-from roboirg.evaluation.records.store import RECORDS_FILE, StoredRun
+from roboirg.records.action_log import ACTION_FOLDER
+from roboirg.records.episode_log import LOG_FOLDER
+from roboirg.records.film import VIDEO_FOLDER
+from roboirg.records.packs import MANIFEST, MOST_PACKED_BYTES, PackManifest
+from roboirg.records.record_codec import StoreError, read_summary
+from roboirg.records.run_files import plan_names, run_file
+from roboirg.records.store import RECORDS_FILE, StoredRun
 from roboirg.util.atomic_write import replacing
 from roboirg.util.regular_file import file_hash
 
 _EPOCH = (1980, 1, 1, 0, 0, 0)
-_BLOCK = 1 << 20
+"""The time of every file in a pack, the earliest that the format has."""
+_BLOCK = 2**20
+"""Bytes of a file that are copied at once."""
+_COMPRESSED = (".npz", ".mp4", ".jpg")
+"""Ends the names of files that would not become smaller."""
+_GIB = 2**30
 
 
 def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = False) -> PackManifest:
-    """Write a run into one file.
+    """Write the records, plans and actions of a run into one file, a pack; return its manifest.
+
+    The manifest lists every file with its hash, so that a reader can check that none was changed.
 
     Args:
         folder: of the run.
@@ -39,40 +46,58 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
     """
     run = StoredRun(folder, read_summary)
     run.file.refuse_damage()
-    entries = run.newest
-    wanted = [ACTION_FOLDER, *[LOG_FOLDER] * logs, *[VIDEO_FOLDER] * videos]
-    names = [RECORDS_FILE, *plan_names(folder)]
-    for name in wanted:
-        found = (folder / name).rglob("[!.]*")
-        names += sorted(path.relative_to(folder).as_posix() for path in found if path.is_file())
+    names = [RECORDS_FILE, *plan_names(folder), *_names_below(folder, ACTION_FOLDER)]
+    if logs:
+        names += _names_below(folder, LOG_FOLDER)
+    if videos:
+        names += _names_below(folder, VIDEO_FOLDER)
     paths = {name: run_file(folder, name) for name in names}
     _check_size(paths, folder)
+    policies = {entry.policy for entry in run.newest}
     manifest = PackManifest(
         package_version=__version__,
-        records=len(entries),
-        policies=tuple(sorted({one.policy for one in entries})),
+        records=len(run.newest),
+        policies=tuple(sorted(policies)),
         files={name: _file_hash(path) for name, path in paths.items()},
     )
+    _write(out, manifest, paths)
+    return manifest
+
+
+def _names_below(folder: Path, name: str) -> list[str]:
+    """Return the files in a folder of a run, but no hidden ones, by their paths in the run."""
+    names: list[str] = []
+    for path in (folder / name).rglob("[!.]*"):
+        if path.is_file():
+            names.append(path.relative_to(folder).as_posix())
+    return sorted(names)
+
+
+def _write(out: Path, manifest: PackManifest, paths: Mapping[str, Path]) -> None:
+    """Write manifest and files into a pack, a ZIP file.
+
+    Every entry gets the same date, so that the same files give the same bytes.
+    """
     with replacing(out) as part, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr(zipfile.ZipInfo(MANIFEST, _EPOCH), manifest.model_dump_json(indent=1))
         for name, path in paths.items():
             entry = zipfile.ZipInfo(name, _EPOCH)
-            # Actions and videos are compressed already.
-            packed = name.endswith((".npz", ".mp4", ".jpg"))
-            entry.compress_type = zipfile.ZIP_STORED if packed else zipfile.ZIP_DEFLATED
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            if name.endswith(_COMPRESSED):  # packing it again would save nothing
+                entry.compress_type = zipfile.ZIP_STORED
             with path.open("rb") as file, archive.open(entry, "w", force_zip64=True) as target:
                 shutil.copyfileobj(file, target, _BLOCK)
-    return manifest
 
 
 def _check_size(paths: Mapping[str, Path], folder: Path) -> None:
-    """Refuse a run whose pack could not be opened again."""
+    """Raise if the files are larger in all than the most that is unpacked from a pack."""
     sizes = {name: path.stat().st_size for name, path in paths.items()}
-    if sum(sizes.values()) > MOST_PACKED_BYTES:
+    total = sum(sizes.values())
+    if total > MOST_PACKED_BYTES:
         largest = max(sizes, key=lambda name: sizes[name])
         raise StoreError(
-            f"The files of {folder} have {sum(sizes.values()):,} bytes (the largest, {largest}, "
-            f"has {sizes[largest]:,}); a pack holds at most {MOST_PACKED_BYTES >> 30} GiB."
+            f"The files of {folder} have {total:,} bytes (the largest, {largest}, "
+            f"has {sizes[largest]:,}); a pack holds at most {MOST_PACKED_BYTES // _GIB} GiB."
         )
 
 

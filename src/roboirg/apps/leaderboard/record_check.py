@@ -1,4 +1,8 @@
-"""Compare a record with what its actions and this version of the benchmark lead to."""
+"""Compare a record with what its actions and this version of the benchmark lead to.
+
+What follows from the job alone, such as the words, is made again; what follows from the actions is
+checked by playing them again. Each difference is a *finding*, one sentence.
+"""
 
 from __future__ import annotations
 
@@ -9,20 +13,19 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from roboirg.apps.leaderboard.action_replay import job_of, replay
+from roboirg.apps.leaderboard.action_replay import prepared_job, replay
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.versions import WORDS
-from roboirg.evaluation.play.episode_record import begin_record
-from roboirg.evaluation.play.job_instruction import (
-    PreparedJob,
+from roboirg.records.action_log import ActionLog, read_actions
+from roboirg.records.record import Record
+from roboirg.records.record_codec import read_record
+from roboirg.records.store import RECORDS_FILE
+from roboirg.runs.job_instruction import (
     has_other_words,
     installed_words,
     other_versions,
 )
-from roboirg.evaluation.records.action_log import ActionLog, read_actions
-from roboirg.evaluation.records.record import Record
-from roboirg.evaluation.records.record_codec import read_record
-from roboirg.evaluation.records.store import RECORDS_FILE
+from roboirg.runs.play.episode_record import begin_record
 
 TOLERANCE = 0.02
 """Largest difference of an end state, in m, rad and s, that is granted to a record from another
@@ -41,14 +44,16 @@ PLAYED_FIELDS = (
     "demonstration_source",
     "events",
     "instruction",
+    "attempts",
+    "attribution",
 )
-"""Fields that follow from the job and the actions."""
-ATTRIBUTED_FIELDS = ("attribution", "attempts")
-"""Those that do only if attempts were watched for, and given what the policy declared."""
-# Of all these, those that follow from words, which cannot be checked if others are installed.
-_HEARD_FIELDS = ("mentions", "command", "metadata", "words", "instruction", "attribution")
+"""Fields that follow from the job, the actions, and what the policy declared."""
+_WORD_FACTS = ("metadata", "words", "attribution")
+"""Of all these, those that follow from words, which cannot be checked if others are installed. What
+was said is then taken from the record, and only when it was heard is checked."""
 
 _MOST_SHOWN = 160
+"""Characters of a value in a finding."""
 
 
 ReplayVerdict = Literal["exact", "tolerant", "different", "not replayed"]
@@ -84,15 +89,15 @@ class LineToCheck(NamedTuple):
     play: bool
 
 
-def check_line(one: LineToCheck, folder: Path) -> RecordCheck:
+def check_line(line: LineToCheck, folder: Path) -> RecordCheck:
     """Check one record of a run's folder.
 
     Raises:
         StoreError: the line is not a record.
     """
-    record = read_record(one.line, folder / RECORDS_FILE, one.number)
+    record = read_record(line.line, folder / RECORDS_FILE, line.number)
     try:
-        return _check(record, folder, play=one.play)
+        return _check(record, folder, play=line.play)
     except RoboIRGError as error:
         return RecordCheck(record.slug, (str(error),))
 
@@ -100,51 +105,80 @@ def check_line(one: LineToCheck, folder: Path) -> RecordCheck:
 def _names_words(record: Record) -> bool:
     """Return whether a record names the words that it should have, of whatever version.
 
-    Only these excuse from checking what was said; a language whose words are code has none.
+    Only these excuse from checking what was said.
     """
-    installed = installed_words(record)
-    if not installed:
-        return False
+    installed = installed_words(record) or ""
     name, _, _ = installed.partition("@")
-    return re.fullmatch(rf"{re.escape(name)}@[0-9a-f]+", record.words_version) is not None
+    return re.fullmatch(rf"{re.escape(name)}@[0-9a-f]+", record.words) is not None
 
 
 def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
-    findings = [
-        f"{what.replace(' ', '_')}: the record says {recorded}; this roboirg checks {installed}."
-        for what, recorded, installed in other_versions(record)
-        if what != WORDS
-    ]
-    other_words = has_other_words(record)
-    if other_words and not _names_words(record):
-        findings.append(
-            f"words: the record says {record.words_version!r}, which are no words of "
-            f"{record.words_owner}."
-        )
-    if findings:
-        return RecordCheck(record.slug, tuple(findings))
+    """Check a record.
+
+    Args:
+        record: of the run.
+        folder: of the run, which has the actions.
+        play: whether to play its actions again, if it has any.
+    """
+    findings = tuple(_version_findings(record))
+    if findings:  # other versions have other worlds and words, so nothing else can be compared
+        return RecordCheck(record.slug, findings)
     log = None if record.action_log is None else read_actions(folder, record.action_log)
-    if log is not None and play:
-        again, played = replay(record, log)
-    else:
-        again = begin_record(PreparedJob(job_of(record)))
-        played = None
-    if other_words:
-        for name in _HEARD_FIELDS:
-            setattr(record, name, getattr(again, name))
-    findings = list(_differences(record, again, WORD_FIELDS))
-    if log is None and record.outcome != "error":
-        findings.append("Its actions were not kept, so the verdict cannot be checked.")
     if log is None or not play:
-        return RecordCheck(record.slug, (*findings, *_words(record, again)))
-    elsewhere = record.processor != again.processor
-    may_move_differently = elsewhere and not findings
-    watched = ATTRIBUTED_FIELDS if record.attempts is not None else ()
-    findings += _differences(record, again, (*PLAYED_FIELDS, *watched))
+        return _check_unplayed(record, has_actions=log is not None)
+    return _check_played(record, log)
+
+
+def _version_findings(record: Record) -> Iterator[str]:
+    """Yield a sentence for each version of a record that is not the installed one.
+
+    Words may be those of another version, which are then not checked, but they must be words of the
+    record's own task and pool.
+    """
+    for what, recorded, installed in other_versions(record):
+        if what != WORDS:
+            name = what.replace(" ", "_")
+            yield f"{name}: the record says {recorded}; this roboirg checks {installed}."
+    if has_other_words(record) and not _names_words(record):
+        yield (
+            f"words: the record says {record.words!r}, which are no words of {record.words_owner}."
+        )
+    if record.words != record.metadata.get("words"):
+        yield "words: the record and its metadata name different ones."
+
+
+def _check_unplayed(record: Record, *, has_actions: bool) -> RecordCheck:
+    """Check what follows from the job of a record alone, such as its scene and its words."""
+    expected = begin_record(prepared_job(record))
+    _excuse_words(record, expected)
+    findings = list(_differences(record, expected, WORD_FIELDS))
+    if not has_actions and record.outcome != "error":
+        findings.append("Its actions were not kept, so the verdict cannot be checked.")
+    # Compared without the steps at which they are heard, which only playing would show.
+    said = _utterances(record)
+    to_say = _utterances(expected)
+    if said != to_say:
+        findings.append(_difference("instruction", said, to_say))
+    return RecordCheck(record.slug, tuple(findings))
+
+
+def _check_played(record: Record, log: ActionLog) -> RecordCheck:
+    """Play the actions of a record again, and check all that follows from job and actions."""
+    again, played = replay(record, log)
+    _excuse_words(record, again)
+    findings = list(_differences(record, again, WORD_FIELDS))
+    # On another kind of processor contacts can end differently. That excuses what follows from
+    # the motion, but no other finding, so it is decided before the motion is compared.
+    is_elsewhere = record.processor != again.processor
+    may_move_differently = is_elsewhere and not findings
+    findings += _differences(record, again, PLAYED_FIELDS)
     if played is None:
         findings.append("actions: when played again, the episode takes none.")
         return RecordCheck(record.slug, tuple(findings), "different", float("inf"))
-    verdict, deviation = _compare_ends(record, again, log, played, elsewhere=elsewhere)
+
+    deviation = _deviation(log, played)
+    has_same_hash = record.end_state == again.end_state
+    verdict = _verdict(deviation, has_same_hash=has_same_hash, is_elsewhere=is_elsewhere)
     if verdict == "different":
         findings.append(f"end_state: when played again, it differs by {deviation:.2g} (m, rad, s).")
     is_as_long = len(played.rows) == len(log.rows)
@@ -153,21 +187,51 @@ def _check(record: Record, folder: Path, *, play: bool) -> RecordCheck:
     return RecordCheck(record.slug, tuple(findings), verdict, deviation, may_move_differently)
 
 
-def _words(record: Record, unplayed: Record) -> Iterator[str]:
-    """Yield where the utterances differ; not played, the steps at which they are heard are open."""
-    recorded, expected = (
-        tuple((one.stage, one.text) for one in each.instruction) for each in (record, unplayed)
-    )
-    if recorded != expected:
-        yield _difference("instruction", recorded, expected)
+def _excuse_words(record: Record, expected: Record) -> None:
+    """Set what a record says of other words than the installed ones to what is expected."""
+    if has_other_words(record):
+        for name in _WORD_FACTS:
+            setattr(record, name, getattr(expected, name))
 
 
-def _differences(record: Record, again: Record, fields: tuple[str, ...]) -> Iterator[str]:
+def _deviation(log: ActionLog, played: ActionLog) -> float:
+    """Return the largest difference of two end states, in m, rad and s."""
+    if played.end_state.shape != log.end_state.shape:
+        return float("inf")
+    return float(np.max(np.abs(played.end_state - log.end_state), initial=0.0))
+
+
+def _verdict(deviation: float, *, has_same_hash: bool, is_elsewhere: bool) -> ReplayVerdict:
+    """Return how the end state of a record compares with that of its actions played again.
+
+    Numbers and hash of an end state are stored next to each other, and both are compared: the hash
+    covers more than the numbers, and in a forged record it may stay while the numbers change.
+
+    Args:
+        deviation: largest difference of the numbers.
+        has_same_hash: whether the hashes are equal.
+        is_elsewhere: whether the record is of another kind of processor; only then may the numbers
+            differ by up to `TOLERANCE`.
+    """
+    if deviation == 0.0 and has_same_hash:
+        return "exact"
+    if 0.0 < deviation <= TOLERANCE and is_elsewhere and not has_same_hash:
+        return "tolerant"
+    return "different"
+
+
+def _utterances(record: Record) -> tuple[tuple[str, str], ...]:
+    """Return the stage and the text of each utterance of a record."""
+    return tuple((utterance.stage, utterance.text) for utterance in record.instruction)
+
+
+def _differences(record: Record, expected: Record, fields: tuple[str, ...]) -> Iterator[str]:
+    """Yield a finding for each field in which a record is not as expected."""
     for name in fields:
-        recorded = getattr(record, name)
-        expected = getattr(again, name)
-        if recorded != expected:
-            yield _difference(name, recorded, expected)
+        value = getattr(record, name)
+        expected_value = getattr(expected, name)
+        if value != expected_value:
+            yield _difference(name, value, expected_value)
 
 
 def _difference(name: str, recorded: object, expected: object) -> str:
@@ -175,24 +239,8 @@ def _difference(name: str, recorded: object, expected: object) -> str:
 
 
 def _short(value: object) -> str:
+    """Return a value as a text of limited length; of several entries, their number and the last."""
     if isinstance(value, tuple) and len(value) > 1:
         return f"{len(value)} entries, the last {_short(value[-1])}"
     text = repr(value)
     return text if len(text) <= _MOST_SHOWN else f"{text[:_MOST_SHOWN]}…"
-
-
-def _compare_ends(
-    record: Record, again: Record, log: ActionLog, played: ActionLog, *, elsewhere: bool
-) -> tuple[ReplayVerdict, float]:
-    """Return how the ends compare, and their largest difference.
-
-    The numbers of the log can be equal where the hash, which covers more, is not, and the reverse
-    where a record was forged; both are a different end.
-    """
-    if played.end_state.shape != log.end_state.shape:
-        return "different", float("inf")
-    deviation = float(np.max(np.abs(played.end_state - log.end_state), initial=0.0))
-    if deviation == 0.0:
-        return "exact" if record.end_state == again.end_state else "different", 0.0
-    within = deviation <= TOLERANCE and record.end_state != again.end_state
-    return "tolerant" if elsewhere and within else "different", deviation

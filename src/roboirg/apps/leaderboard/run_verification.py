@@ -5,9 +5,10 @@ from __future__ import annotations
 import functools
 import random
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from roboirg.apps.leaderboard.record_check import (
     LineToCheck,
@@ -17,15 +18,18 @@ from roboirg.apps.leaderboard.record_check import (
 )
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
-from roboirg.evaluation.plan.stored_plans import read_plans
-from roboirg.evaluation.play.job_instruction import has_other_words
-from roboirg.evaluation.records.record import Summary
-from roboirg.evaluation.records.record_codec import identity_key, read_summary
-from roboirg.evaluation.records.store import StoredRun
+from roboirg.records.record import Summary
+from roboirg.records.record_codec import RecordKey, identity_key, read_summary
+from roboirg.records.store import StoredRun
+from roboirg.runs.job_instruction import has_other_words
+from roboirg.runs.plan.plan import Plan
+from roboirg.runs.plan.stored_plans import read_kept_plans, read_plans
 from roboirg.tasks.splits.private_splits import check_salt
 from roboirg.util.parallel_map import parallel_map
 
 Progress = Callable[[int, int], object]
+Plans = Mapping[str | None, Plan]
+"""Of all commands that wrote to a run, by their fingerprints."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,7 @@ class Verification:
         errors: number of records that are errors: never counted as failures, so too many of them
             would embellish the rates.
         notes: what is worth knowing and not wrong.
+        faults: what does not hold of the run as a whole, in sentences.
     """
 
     records: int
@@ -50,11 +55,12 @@ class Verification:
     deviation: float = 0.0
     errors: int = 0
     notes: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
 
     @property
     def holds(self) -> bool:
         """Whether nothing was found."""
-        return not (self.checks or self.missing)
+        return not (self.checks or self.missing or self.faults)
 
 
 def verify_run(
@@ -83,63 +89,153 @@ def verify_run(
         raise InvalidValueError(f"sample is {sample}; it must be between 0 % and 100 %.")
     run = StoredRun(folder, read_summary)
     run.file.refuse_damage()
-    for split in sorted({one.split for one in run.newest}):
+    entries = run.newest
+    for split in sorted({entry.split for entry in entries}):
         check_salt(split)
-    checks: list[RecordCheck] = []
-    verdicts: Counter[ReplayVerdict] = Counter()
-    deviation = 0.0
-    work = functools.partial(check_line, folder=folder)
-    results = parallel_map(work, _lines(run, sample, seed), workers)
-    for done, (_, check) in enumerate(results, start=1):
-        if progress is not None:
-            progress(done, len(run.newest))
-        verdicts[check.replayed] += 1
-        if check.replayed == "tolerant":
-            deviation = max(deviation, check.deviation)
-        if check.findings:
-            checks.append(check)
-    missing, notes = _completeness(folder, run.newest)
-    if moved := sum(one.elsewhere for one in checks):
-        notes.append(
-            f"Of those that do not hold, {moved:,} were played on another kind of processor, where "
-            "contacts can end differently: verify them on a machine of that kind."
-        )
-    if unread := sum(map(has_other_words, run.newest)):
-        notes.append(
-            f"Words, and why episodes failed, were not checked in {unread} of the records: this "
-            "roboirg has other words."
-        )
+
+    checks = _check_lines(_lines(run, sample, seed), folder, workers, progress)
+    return _summed_up(folder, entries, checks)
+
+
+def _summed_up(
+    folder: Path, entries: Sequence[Summary], checks: Sequence[RecordCheck]
+) -> Verification:
+    """Return the result of a verification: of the checks of all records, and of the run's plans.
+
+    Args:
+        folder: of the run, which has the plans.
+        entries: all records.
+        checks: of each record, in any order.
+    """
+    kept: Plans = {plan.fingerprint: plan for plan in read_kept_plans(folder)}
+    completeness = _completeness(read_plans(folder), kept, entries)
+    failed = [result for result in checks if result.findings]
+    tolerated = [result.deviation for result in checks if result.replayed == "tolerant"]
+    outcomes = [entry.outcome for entry in entries]
     return Verification(
-        records=len(run.newest),
-        checks=tuple(sorted(checks)),
-        missing=missing,
-        verdicts=verdicts,
-        deviation=deviation,
-        errors=sum(one.outcome == "error" for one in run.newest),
-        notes=tuple(notes),
+        records=len(entries),
+        checks=tuple(sorted(failed)),
+        missing=completeness.missing,
+        verdicts=Counter(result.replayed for result in checks),
+        deviation=max(tolerated, default=0.0),
+        faults=tuple(_faults(kept, entries)),
+        errors=outcomes.count("error"),
+        notes=(*completeness.notes, *_excuses(failed, entries)),
     )
 
 
+def _excuses(failed: Sequence[RecordCheck], entries: Sequence[Summary]) -> Iterator[str]:
+    """Yield why a record may not hold here, or was not checked, without being wrong."""
+    elsewhere = [result for result in failed if result.elsewhere]
+    if elsewhere:
+        yield (
+            f"Of those that do not hold, {len(elsewhere):,} were played on another kind of "
+            "processor, where contacts can end differently: verify them on a machine of that kind."
+        )
+    unread = sum(map(has_other_words, entries))
+    if unread:
+        yield (
+            f"Words, and why episodes failed, were not checked in {unread} of the records: this "
+            "roboirg has other words."
+        )
+
+
 def _lines(run: StoredRun[Summary], sample: float, seed: int | None) -> Sequence[LineToCheck]:
-    """Return the newest lines, with a share of them to play."""
-    count = round(sample * len(run.newest))
+    """Return the newest line of each episode; a random share of them is marked to be played."""
+    total = len(run.newest)
+    count = round(sample * total)
     if sample > 0:
-        count = max(count, 1)
-    drawn = set(random.Random(seed).sample(range(len(run.newest)), count))
-    return [
-        LineToCheck(index + 1, line, index in drawn)
-        for index, line in enumerate(run.lines(run.newest))
-    ]
+        count = max(count, 1)  # a small share of a small run plays one, not none
+    drawn = set(random.Random(seed).sample(range(total), count))
+    lines: list[LineToCheck] = []
+    for index, line in enumerate(run.lines(run.newest)):
+        lines.append(LineToCheck(index + 1, line, index in drawn))
+    return lines
 
 
-def _completeness(folder: Path, entries: Sequence[Summary]) -> tuple[tuple[str, ...], list[str]]:
-    """Return which episodes are missing, and notes about the plan."""
-    plans = read_plans(folder)
-    jobs = {identity_key(job): job.slug for plan in plans for job in plan.jobs()}
-    there = {identity_key(one) for one in entries}
-    missing = {slug for key, slug in jobs.items() if key not in there}
-    notes = []
-    if outside := len(there - jobs.keys()):
-        whose = "an earlier plan" if plans else "no plan that is kept"
-        notes.append(f"From {whose}: {counted(outside, 'record')}.")
-    return tuple(sorted(missing)), notes
+def _check_lines(
+    lines: Sequence[LineToCheck], folder: Path, workers: int, progress: Progress | None
+) -> list[RecordCheck]:
+    """Check the records in some lines; the results are in the order in which the checks end.
+
+    Args:
+        lines: of the records, each marked whether its actions are to be played.
+        folder: of the run.
+        workers: number of processes; 0 uses this one only.
+        progress: is called with the number of checked lines, and of all.
+    """
+    checks: list[RecordCheck] = []
+    check = functools.partial(check_line, folder=folder)
+    for _, result in parallel_map(check, lines, workers):
+        checks.append(result)
+        if progress is not None:
+            progress(len(checks), len(lines))
+    return checks
+
+
+class _Completeness(NamedTuple):
+    """Which episodes of the newest plans are missing, and notes about earlier plans."""
+
+    missing: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def _completeness(plans: Sequence[Plan], kept: Plans, entries: Sequence[Summary]) -> _Completeness:
+    """Return the episodes of the newest plans that have no record, and notes about earlier plans.
+
+    A plan may be changed and the run continued. So records that only an earlier plan names, and
+    episodes of an earlier plan that were never played, are no faults: the notes count them.
+
+    Args:
+        plans: the newest ones of the run.
+        kept: all plans of the run by fingerprint, which records name.
+        entries: all records.
+    """
+    planned = _slugs(plans)
+    recorded = {identity_key(entry) for entry in entries}
+    missing = {slug for key, slug in planned.items() if key not in recorded}
+
+    notes: list[str] = []
+    earlier = recorded.difference(planned)
+    if plans and earlier:
+        notes.append(f"From an earlier plan: {counted(len(earlier), 'record')}.")
+    earlier_plans = {entry.plan for entry in entries} & kept.keys()
+    unplayed = _slugs([kept[name] for name in earlier_plans]).keys() - recorded - planned.keys()
+    if unplayed:
+        notes.append(f"Earlier plans name {counted(len(unplayed), 'more episode')}, not played.")
+    return _Completeness(tuple(sorted(missing)), tuple(notes))
+
+
+def _slugs(plans: Sequence[Plan]) -> dict[RecordKey, str]:
+    """Return the names of the episodes of some plans, by what identifies them."""
+    slugs: dict[RecordKey, str] = {}
+    for plan in plans:
+        for job in plan.jobs():
+            slugs[identity_key(job)] = job.slug
+    return slugs
+
+
+def _faults(kept: Plans, entries: Sequence[Summary]) -> Iterator[str]:
+    """Yield a sentence for each way in which records contradict their plans or each other.
+
+    A record names its plan and its words. The plan must be kept in the run, and name these words;
+    and all records of one task and pool (`words_owner`) must have the same words.
+    """
+    unplanned = 0  # records whose plan is not kept
+    unnamed = 0  # records with words that their plan does not name
+    words_by_owner: dict[str, set[str]] = {}
+    for entry in entries:
+        plan = kept.get(entry.plan)
+        if entry.plan not in kept:
+            unplanned += 1
+        if plan and plan.words and entry.words not in plan.words:
+            unnamed += 1
+        words_by_owner.setdefault(entry.words_owner, set()).add(entry.words)
+
+    if unplanned:
+        yield f"{counted(unplanned, 'record')} from no plan that is kept."
+    if unnamed:
+        yield f"{counted(unnamed, 'record')} in words that the plan does not name."
+    for owner, words in sorted(words_by_owner.items()):
+        if len(words) > 1:
+            yield f"The records have several words of {owner}: {', '.join(sorted(words))}."

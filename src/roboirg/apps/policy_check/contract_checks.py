@@ -36,7 +36,7 @@ def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
     """Check that the policy can be made and needs no simulator."""
     try:
         policy = player.make_fresh()
-        missing = [name for name in ("reset", "act") if not callable(getattr(policy, name, 0))]
+        missing = [name for name in ("reset", "act") if not callable(getattr(policy, name, None))]
     except MissingDependencyError:
         raise
     except (Exception, SystemExit) as error:  # the policy's own code runs here
@@ -52,38 +52,46 @@ def check_loading(player: PolicyPlayer) -> Iterator[CheckResult]:
 
 
 def check_requirements(player: PolicyPlayer) -> Iterator[CheckResult]:
-    """Read what the policy requires."""
+    """Read what the policy requires of an environment, and keep it for the later checks."""
     try:
-        player.needs = needs = PolicyNeeds.of(player.policy)
+        needs = PolicyNeeds.of(player.policy)
     except RoboIRGError as error:
         raise CheckAbortedError("requirements", "fail", str(error)) from error
-    more = ", depth" * needs.depth + ", calibration" * needs.calibration
-    yield CheckResult(
-        "requirements",
-        "pass",
+    player.needs = needs
+    words = (
         f"Actions {needs.actions}, cameras {', '.join(needs.cameras) or 'none'}, demonstration "
-        f"frames {needs.demonstration_frames}, observations every "
-        f"{needs.observe_every or 'chunk'}{more}.",
+        f"frames {needs.demonstration_frames}, observations every {needs.observe_every or 'chunk'}"
     )
+    if needs.depth:
+        words += ", depth"
+    if needs.calibration:
+        words += ", calibration"
+    yield CheckResult("requirements", "pass", f"{words}.")
 
 
 def check_version(player: PolicyPlayer) -> Iterator[CheckResult]:
-    """Check that records distinguish the policy from an earlier one of the same name."""
+    """Check that records distinguish the policy from an earlier one of the same name.
+
+    They do by the policy's own ``version``, or else by a fingerprint of the file that defines it.
+    """
     source = player.source
+    # First a reset, as a policy may set its version until that ends.
     with ending_checks("version", "reset(): "):
         episode = copy.deepcopy(player.without_video)
         player.policy.reset(episode.instruction, episode.demonstration)
     with ending_checks("version"):
-        own = read_version(player.policy)
-    known = look_up(read_policy(source)).version if isinstance(source, str) else UNKNOWN_VERSION
-    if own is not None and own != UNKNOWN_VERSION:
-        yield CheckResult("version", "pass", f"Records name the version that it has: {own}.")
-    elif known != UNKNOWN_VERSION:
+        version = read_version(player.policy)
+    fingerprint = UNKNOWN_VERSION
+    if isinstance(source, str):
+        fingerprint = look_up(read_policy(source)).version
+    if version is not None and version != UNKNOWN_VERSION:
+        yield CheckResult("version", "pass", f"Records name the version that it has: {version}.")
+    elif fingerprint != UNKNOWN_VERSION:
         yield CheckResult(
             "version",
             "pass",
-            f"It has no version, so records name a fingerprint of its file: {known}. A policy that "
-            "loads a checkpoint needs the checkpoint's name as its version.",
+            f"It has no version, so records name a fingerprint of its file: {fingerprint}. A "
+            "policy that loads a checkpoint needs the checkpoint's name as its version.",
         )
     else:
         yield CheckResult(
@@ -103,11 +111,18 @@ def check_acting(player: PolicyPlayer) -> Iterator[CheckResult]:
 def _describe_actions(
     when: str, space: ActionSpace, rollout: SyntheticRollout
 ) -> Iterator[CheckResult]:
+    """Yield the shape of a policy's actions, and how many have a number outside the usual range.
+
+    Args:
+        when: which of the episodes was played, for the names of the results.
+        space: of the actions.
+        rollout: what the policy returned.
+    """
     sizes = [len(chunk) for chunk in rollout.chunks]
-    outside = sum(
-        int(((chunk < space.low) | (chunk > space.high)).any(axis=1).sum())
-        for chunk in rollout.chunks
-    )
+    outside = 0
+    for chunk in rollout.chunks:
+        is_outside = (chunk < space.low) | (chunk > space.high)
+        outside += int(is_outside.any(axis=1).sum())
     yield CheckResult(
         f"acts {when}",
         "pass",
@@ -125,13 +140,13 @@ def _describe_actions(
 
 
 def check_reports(player: PolicyPlayer) -> Iterator[CheckResult]:
-    """Check what records get from the policy besides its actions."""
+    """Check what records take from the policy besides its actions: metadata, subgoal and costs."""
     policy = player.policy
     source = player.source
     is_ours = isinstance(source, str) and not read_policy(source).is_foreign
     try:
         metadata = policy_metadata(policy, is_ours=is_ours)
-        policy_subgoal(policy)
+        policy_subgoal(policy)  # raises if it is malformed, and so do the costs
         policy_usage(policy)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - a property may raise anything
         yield CheckResult("reports", "fail", describe_error(error))
@@ -172,9 +187,10 @@ def check_reset(player: PolicyPlayer) -> Iterator[CheckResult]:
     if are_equal(expected, after):
         yield CheckResult(name, "pass", "An episode does not depend on the one before it.")
         return
-    # What the policy would have answered next, and what it had answered, in the episode before.
+    # The usual fault is a queue of actions that outlives its episode. Then the first answer after
+    # reset() is one that a longer first episode would have had; so that is played, twice as long.
     before = player.play(name, player.without_video, calls=2 * CALLS).chunks
-    if _holds(before, after.chunks[0]) and not _holds(before, expected.chunks[0]):
+    if _has(before, after.chunks[0]) and not _has(before, expected.chunks[0]):
         message = (
             "The first answer after reset() belongs to the previous episode: a queue of actions "
             "outlives the episode; empty it in reset()."
@@ -187,5 +203,6 @@ def check_reset(player: PolicyPlayer) -> Iterator[CheckResult]:
     yield CheckResult(name, "fail", message)
 
 
-def _holds(chunks: list[Any], chunk: Any) -> bool:  # noqa: ANN401 - arrays
-    return any(np.array_equal(one, chunk) for one in chunks)
+def _has(chunks: list[Any], chunk: Any) -> bool:  # noqa: ANN401 - arrays
+    """Return whether a chunk is one of several."""
+    return any(np.array_equal(other, chunk) for other in chunks)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from roboirg.apps.policy_check.check_result import CheckResult, describe_error, ending_checks
-from roboirg.apps.policy_check.expert_episode import ExpertMoment, RecordExpert, Rows
+from roboirg.apps.policy_check.expert_episode import ExpertMoment, RecordExpert
 from roboirg.apps.policy_check.policy_player import Chunks, PolicyPlayer
 from roboirg.core.actions import ARM_JOINTS, JOINT_ANGLE
 
@@ -24,7 +24,10 @@ _NAME = "expert"
 
 
 def check_expert(player: PolicyPlayer, record: RecordExpert | None) -> Iterator[CheckResult]:
-    """Check the answers of a policy that acts at control rate.
+    """Compare a policy's answers with what the expert did at the same moments of an episode.
+
+    Holding still is the yardstick: answers that are hardly nearer to the expert's actions get a
+    note. Policies whose actions take many control steps are not compared.
 
     Args:
         player: of the policy.
@@ -46,41 +49,53 @@ def check_expert(player: PolicyPlayer, record: RecordExpert | None) -> Iterator[
     with ending_checks(_NAME, "act(): "):
         answers = player.ask(episode)
     yield from _check_gripper(answers, moments)
-    still = _error([np.tile(moment.still, (len(moment.actions), 1)) for moment in moments], moments)
-    as_is = _error(answers, moments)
+    holding_still = [np.tile(moment.still, (len(moment.actions), 1)) for moment in moments]
+    still_error = _error(holding_still, moments)
+    answer_error = _error(answers, moments)
     unit = "rad" if player.space is JOINT_ANGLE else "m"
     yield CheckResult(
         _NAME,
-        "pass" if as_is <= FITS * still else "note",
-        f"At {len(moments)} moments of an expert's episode the answers are {as_is:.3g} {unit} from "
-        f"what it did; holding still would be {still:.3g}.",
+        "pass" if answer_error <= FITS * still_error else "note",
+        f"At {len(moments)} moments of an expert's episode the answers are {answer_error:.3g} "
+        f"{unit} from what it did; holding still would be {still_error:.3g}.",
     )
 
 
 def _error(chunks: Chunks, moments: Sequence[ExpertMoment]) -> float:
-    """Return the mean distance of the farthest joint, or coordinate, from the expert's.
+    """Return how far chunks of actions are from the expert's, on average over the moments.
 
-    A pose's angles have many names, so they are left out.
+    The distance of an action is that of its farthest joint, rad, or coordinate, m. A pose's angles
+    are left out, as different numbers can mean the same rotation.
+
+    Args:
+        chunks: one for each moment; rows beyond the expert's do not count.
+        moments: of the expert's episode.
     """
-    return float(np.mean([_distance(*one) for one in zip(chunks, moments, strict=True)]))
-
-
-def _distance(chunk: Rows, moment: ExpertMoment) -> float:
-    size = len(moment.still)
-    columns = size if size == ARM_JOINTS else POSITION_SIZE
-    rows = min(len(chunk), len(moment.actions))
-    difference: Rows = np.abs(chunk[:rows, :columns] - moment.actions[:rows, :columns])
-    return float(difference.max(axis=1).mean())
+    distances: list[float] = []
+    for chunk, moment in zip(chunks, moments, strict=True):
+        size = len(moment.still)
+        columns = size if size == ARM_JOINTS else POSITION_SIZE  # joints, or a pose's position
+        rows = min(len(chunk), len(moment.actions))
+        difference = np.abs(chunk[:rows, :columns] - moment.actions[:rows, :columns])
+        farthest = difference.max(axis=1)
+        distances.append(float(farthest.mean()))
+    return float(np.mean(distances))
 
 
 def _check_gripper(answers: Chunks, moments: list[ExpertMoment]) -> Iterator[CheckResult]:
-    """Check the gripper's numbers: +1 opens, -1 closes."""
+    """Warn if the gripper's numbers have the wrong sign or range: +1 opens, -1 closes.
+
+    The numbers at moments where the expert's gripper opens are compared with those where it closes.
+    If they lie clearly apart the wrong way round, the sign is wrong. If they lie the right way
+    round, but closing is not below 0, the range is 0 to 1 and not -1 to +1.
+    """
     given = np.array([chunk[0, -1] for chunk in answers])
-    opens = np.array([moment.actions[0, -1] > 0 for moment in moments])
-    if min(opens.sum(), (~opens).sum()) < MIN_MOMENTS:
+    expert_opens = np.array([moment.actions[0, -1] > 0 for moment in moments])
+    opened = given[expert_opens]
+    closed = given[~expert_opens]
+    if min(len(opened), len(closed)) < MIN_MOMENTS:
         return
-    opened = given[opens]
-    closed = given[~opens]
+    # By how much the two must be apart.
     gap = GRIPPER_GAP * (given.max() - given.min())
     if gap > 0 and opened.max() + gap < closed.min():
         message = (

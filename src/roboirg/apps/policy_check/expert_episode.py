@@ -17,8 +17,12 @@ from roboirg.policies.contract.base import Policy
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv
+    from roboirg.simulation.proprioception import Proprioception
 
-TASK, SETTING, SPLIT, EPISODE = "PickXtimes", "explicit", "train", 0
+TASK = "PickXtimes"
+SETTING = "explicit"
+SPLIT = "train"
+EPISODE = 0
 MAX_STEPS = 140
 """Control steps: the expert takes a cube at step 84 and carries it until step 164."""
 MAX_ROWS = 16
@@ -44,10 +48,9 @@ class ExpertMoment(NamedTuple):
     @property
     def still(self) -> Rows:
         """The joints (7,) or the pose (6,) of the robot at this moment, without the gripper."""
-        joints = self.actions.shape[1] == JOINT_ANGLE.size
-        return np.asarray(
-            self.observation["joint_positions" if joints else "end_effector"], np.float64
-        )
+        if self.actions.shape[1] == JOINT_ANGLE.size:
+            return np.asarray(self.observation["joint_positions"], np.float64)
+        return np.asarray(self.observation["end_effector"], np.float64)
 
 
 class ExpertEpisode(NamedTuple):
@@ -84,30 +87,50 @@ def record_expert(policy: Policy, rows: int) -> ExpertEpisode:
     needs = PolicyNeeds.of(policy)
     shown = replace(needs, actions=JOINT_ANGLE.name, grounded=False).env_options
     env = make(TASK, setting=SETTING, split=SPLIT, episode=EPISODE, **shown)
-    poses: list[Rows] = []
+    keeper = None
     if needs.actions != JOINT_ANGLE.name:
-        _keep_poses(env, poses)
+        keeper = _PoseKeeper()
+        env.set_frame_hook(keeper.keep)
     try:
-        observation, info = env.reset()
-        expert = OraclePolicy()
-        expert.attach(env)
-        expert.reset(observation["instruction"], info["demonstration"])
-        moments = []
-        for piece in _pieces(expert, min(rows, MAX_ROWS)):
-            poses.clear()
-            before = cast("Observation", observation)
-            observation, _, ended, late, _ = env.step_chunk(piece)
-            actions = np.column_stack([poses, piece[: len(poses), -1:]]) if poses else piece
-            moments.append(ExpertMoment(before, actions))
-            if ended or late:
-                break
-        return ExpertEpisode(before["instruction"], info["demonstration"], moments)
+        return _play(env, min(rows, MAX_ROWS), keeper)
     finally:
         env.close()
 
 
+def _play(env: RoboIRGEnv, rows: int, keeper: _PoseKeeper | None) -> ExpertEpisode:
+    """Play the expert, and keep the moments at which the policy would have been asked.
+
+    Args:
+        env: where it plays.
+        rows: the expert's actions from one moment to the next.
+        keeper: notes the tool's poses, for a policy whose actions are poses; None for one whose
+            actions are joint angles, as the expert's are.
+    """
+    observation, info = env.reset()
+    instruction = observation["instruction"]
+    demonstration = info["demonstration"]
+    expert = OraclePolicy()
+    expert.attach(env)
+    expert.reset(instruction, demonstration)
+    moments: list[ExpertMoment] = []
+    for piece in _pieces(expert, rows):
+        before = cast("Observation", observation)
+        if keeper is not None:
+            keeper.poses.clear()
+        observation, _, is_over, is_late, _ = env.step_chunk(piece)
+        actions = piece if keeper is None else keeper.with_gripper(piece)
+        moments.append(ExpertMoment(before, actions))
+        if is_over or is_late:
+            break
+    return ExpertEpisode(instruction, demonstration, moments)
+
+
 def _pieces(expert: OraclePolicy, rows: int) -> Iterator[Rows]:
-    """Yield what the expert does, some rows at a time; it plans after the ones before."""
+    """Yield the expert's actions, at most `rows` at a time.
+
+    The caller executes each piece before it takes the next one, as the expert plans by the state
+    of the world.
+    """
     steps = 0
     while steps < MAX_STEPS:
         # The expert knows where everything is, so it looks at no observation.
@@ -117,15 +140,26 @@ def _pieces(expert: OraclePolicy, rows: int) -> Iterator[Rows]:
         steps += len(chunk)
 
 
-def _keep_poses(env: RoboIRGEnv, poses: list[Rows]) -> None:
-    from roboirg.simulation.proprioception import Proprioception
+class _PoseKeeper:
+    """Keeps the tool's pose after each control step.
 
-    reader: list[Proprioception] = []
+    Attributes:
+        poses: (6,) each.
+    """
 
-    def keep(env: RoboIRGEnv, is_demonstration: bool) -> None:  # noqa: ARG001 - a hook
-        if not reader:
-            reader.append(Proprioception(env.session.world.robot))
-        reader[0].update()
-        poses.append(reader[0].read()["end_effector"])
+    def __init__(self) -> None:
+        self.poses: list[Rows] = []
+        self._reader: Proprioception | None = None
 
-    env.set_frame_hook(keep)
+    def keep(self, env: RoboIRGEnv, is_demonstration: bool) -> None:  # noqa: ARG002 - a hook
+        """Keep the pose of the tool now."""
+        if self._reader is None:
+            from roboirg.simulation.proprioception import Proprioception
+
+            self._reader = Proprioception(env.session.world.robot)
+        self._reader.update()
+        self.poses.append(self._reader.read()["end_effector"])
+
+    def with_gripper(self, actions: Rows) -> Rows:
+        """Return the poses, each with the gripper of the action that led to it."""
+        return np.column_stack([self.poses, actions[: len(self.poses), -1:]])

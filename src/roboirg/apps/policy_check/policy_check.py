@@ -83,15 +83,21 @@ def print_check_results(results: list[CheckResult], console: Console) -> None:
     for heading in ("check", "", "result"):
         table.add_column(heading)
     for result in results:
-        table.add_row(
-            result.check,
-            f"[{styles[result.verdict]}]{result.verdict}[/]",
-            escape(printable(result.message)),
-        )
+        verdict = f"[{styles[result.verdict]}]{result.verdict}[/]"
+        table.add_row(result.check, verdict, escape(printable(result.message)))
     console.print(table, highlight=False)
+    console.print(_summary(results))
+
+
+def _summary(results: list[CheckResult]) -> str:
+    """Return how many checks failed or warn: ``9 checks, none failed, 1 warning.`` is one."""
     verdicts = [result.verdict for result in results]
     failed = verdicts.count("fail")
     warned = verdicts.count("warn")
     checks = counted(len(results), "check")
-    summary = f"{failed} of {checks} failed" if failed else f"{checks}, none failed"
-    console.print(f"{summary}, {counted(warned, 'warning')}." if warned else f"{summary}.")
+    summary = f"{checks}, none failed"
+    if failed:
+        summary = f"{failed} of {checks} failed"
+    if warned:
+        summary += f", {counted(warned, 'warning')}"
+    return f"{summary}."

@@ -20,7 +20,8 @@ CALLS = 3
 """Calls of `act` in a synthetic episode."""
 VIDEO_STEPS = 40
 Chunks = list[Rows]
-FIRST, SECOND = "Put the red cube on the target.", "Press the second button from the left."
+FIRST = "Put the red cube on the target."
+SECOND = "Press the second button from the left."
 
 
 class SyntheticRollout(NamedTuple):
@@ -90,7 +91,10 @@ class PolicyPlayer:
         fresh: bool = True,
         calls: int = CALLS,
     ) -> SyntheticRollout:
-        """Play some calls of a copy of an episode, which the policy may change.
+        """Reset the policy and ask it a few times; return its answers.
+
+        It gets a copy of the episode, as it may change what it is given. Each observation after the
+        first is as many steps later as the last answer had actions.
 
         Args:
             check: that is under way.
@@ -103,29 +107,30 @@ class PolicyPlayer:
         """
         episode = copy.deepcopy(episode)
         with ending_checks(check, "reset(): "):
-            policy = self.make_fresh() if fresh or self._policy is None else self._policy
+            policy = self.make_fresh() if fresh else self.policy
             policy.reset(episode.instruction, episode.demonstration)
         episodes = SyntheticEpisodes(self.needs, self.seed)
         observation = episode.first
-        rollout = SyntheticRollout([], "")
+        chunks: Chunks = []
+        dtype = ""
         for _ in range(calls):
             with ending_checks(check, "act(): "):
                 actions = policy.act(observation)
                 chunk = check_chunk(actions, self.space)
-            # A copy: a policy may reuse its array.
-            rollout.chunks.append(chunk.copy())
-            rollout = rollout._replace(dtype=str(np.asarray(actions).dtype))
+            chunks.append(chunk.copy())  # a policy may reuse its array
+            dtype = str(np.asarray(actions).dtype)
             observation = episodes.after(episode, len(chunk))
-        return rollout
+        return SyntheticRollout(chunks, dtype)
 
     def ask(self, episode: ExpertEpisode) -> Chunks:
         """Return a fresh policy's answers in the expert's episode; its errors are not caught."""
         policy = self.make_fresh()
         policy.reset(episode.instruction, episode.demonstration)
-        return [
-            check_chunk(policy.act(copy.deepcopy(one.observation)), self.space).copy()
-            for one in episode.moments
-        ]
+        answers: Chunks = []
+        for moment in episode.moments:
+            actions = policy.act(copy.deepcopy(moment.observation))
+            answers.append(check_chunk(actions, self.space).copy())
+        return answers
 
     def make_fresh(self) -> Policy:
         """Return a fresh policy, or the object; the one before is closed."""
@@ -135,6 +140,7 @@ class PolicyPlayer:
         return self._policy
 
     def close(self) -> None:
+        """Close the policy that was made last."""
         policy = self._policy
         self._policy = None
         close_policy(policy)
@@ -146,8 +152,13 @@ def are_equal(one: SyntheticRollout, other: SyntheticRollout) -> bool:
 
 
 def describe_difference(one: SyntheticRollout, other: SyntheticRollout) -> str:
-    """Return the largest difference of two rollouts, in words."""
-    pairs = list(zip(one.chunks, other.chunks, strict=True))
-    if any(first.shape != second.shape for first, second in pairs):
-        return "the number of actions"
-    return f"{max(float(np.abs(first - second).max()) for first, second in pairs):.3g}"
+    """Return the largest difference of two rollouts in words, such as ``0.012``.
+
+    If their chunks have different shapes, it is ``the number of actions``.
+    """
+    largest = 0.0
+    for chunk, other_chunk in zip(one.chunks, other.chunks, strict=True):
+        if chunk.shape != other_chunk.shape:
+            return "the number of actions"
+        largest = max(largest, float(np.abs(chunk - other_chunk).max()))
+    return f"{largest:.3g}"

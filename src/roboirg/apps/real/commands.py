@@ -46,43 +46,46 @@ def plan(
     """
     from roboirg.apps.real.study.study_plan import make_study
     from roboirg.cli.names import known_settings
-    from roboirg.evaluation.plan.option_parsing import ALL, parse_names
+    from roboirg.runs.plan.option_parsing import ALL, parse_names
     from roboirg.tasks import find_tasks
 
-    made = make_study(
+    has_all_settings = settings.strip().lower() == ALL
+    study = make_study(
         policy,
         tasks=find_tasks(parse_names("task", tasks)),
-        settings=None if settings.strip().lower() == ALL else known_settings(settings),
+        settings=None if has_all_settings else known_settings(settings),
         trials=trials,
         demonstrations=demonstrations,
         seed=seed,
     )
-    _write(made, Path(out))
+    _write(study, Path(out))
 
 
-def _write(made: StudyPlan, folder: Path) -> None:
+def _write(study: StudyPlan, folder: Path) -> None:
     """Write the files of a plan and print their names."""
     from roboirg.apps.real.pages.trial_sheet import SHEET_FILE, sheet_text
     from roboirg.apps.real.study import study_csv
     from roboirg.apps.real.study.study_plan import write_study
-    from roboirg.evaluation.plan.plan_file import plan_text
+    from roboirg.runs.plan.plan_file import plan_text
     from roboirg.util.atomic_write import write_atomically
 
-    typer.echo(write_study(made, folder))
-    for name, text in (
-        (study_csv.TRIALS_FILE, study_csv.trials_csv(made)),
-        (study_csv.DEMONSTRATIONS_FILE, study_csv.demonstrations_csv(made)),
-        *((f"twin-{task}.yaml", plan_text(twin)) for task, twin in made.twin_plans.items()),
-        (SHEET_FILE, sheet_text(made)),
-    ):
-        if text:
+    typer.echo(write_study(study, folder))
+    texts = {
+        study_csv.TRIALS_FILE: study_csv.trials_csv(study),
+        study_csv.DEMONSTRATIONS_FILE: study_csv.demonstrations_csv(study),
+    }
+    for task, twin in study.twin_plans.items():
+        texts[f"twin-{task}.yaml"] = plan_text(twin)
+    texts[SHEET_FILE] = sheet_text(study)
+    for name, text in texts.items():
+        if text:  # no file without demonstrations
             write_atomically(folder / name, text)
             typer.echo(folder / name)
-    blocks = made.trials[-1].block
-    typer.echo(
-        f"{counted(len(made.trials), 'trial')} in {counted(blocks, 'block')}, "
-        f"{counted(len(made.demonstrations), 'demonstration')}, plan {made.fingerprint}"
-    )
+
+    trials = counted(len(study.trials), "trial")
+    blocks = counted(study.trials[-1].block, "block")
+    demonstrations = counted(len(study.demonstrations), "demonstration")
+    typer.echo(f"{trials} in {blocks}, {demonstrations}, plan {study.fingerprint}")
 
 
 @real_app.command()

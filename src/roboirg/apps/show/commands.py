@@ -40,41 +40,46 @@ def show(
 
     Example: roboirg show PickXtimes 3 --words
     """
-    from roboirg.evaluation.plan.plan_maker import word_options
     from roboirg.language import settings_of
     from roboirg.language.generator import check_options
+    from roboirg.runs.plan.plan_maker import word_options
     from roboirg.tasks import get_task
     from roboirg.tasks.splits.splits import get_episode
 
     found = get_episode(task, split, episode)
     options = word_options(**context.obj)
     check_options(options)
-    possible = settings_of(get_task(task))
+    task_settings = settings_of(get_task(task))
     chosen = known_settings(settings)
-    shown = [name for name in chosen if name in possible] or chosen
+    # Without any that the task has, the first refusal of one says why.
+    shown = [setting for setting in chosen if setting in task_settings] or chosen
     if words:
         _print_words(found, shown, options)
-    else:
-        path = Path(f"{task}-{split}-{episode}.png" if out is None else out)
-        _draw(found, shown, options, path)
+        return
+    if out is None:
+        out = f"{task}-{split}-{episode}.png"
+    _draw(found, shown, options, Path(out))
 
 
 def _print_words(episode: Episode, settings: Sequence[str], options: InstructionOptions) -> None:
-    """Print what is said in each setting, and how many tokens it needs."""
+    """Print what is said in each setting, and how many tokens it needs.
+
+    A setting that cannot express the episode has the reason instead, but an episode that none can
+    express is an error.
+    """
     from roboirg.language.generator import find_refusal, instruct_with
     from roboirg.language.token_counts import tokens_shown
 
-    told = {name: replace(options, setting=name) for name in settings}
-    refusals = {name: find_refusal(episode, one) for name, one in told.items()}
-    for name, chosen in told.items():
-        refusal = refusals[name]
-        # Where nothing can be said, the first refusal is an error.
-        if refusal is not None and None in refusals.values():
-            typer.echo(f"{typer.style(name, bold=True)} cannot express the episode: {refusal}")
+    options_of = {setting: replace(options, setting=setting) for setting in settings}
+    refusals = {setting: find_refusal(episode, options_of[setting]) for setting in settings}
+    can_be_said = None in refusals.values()
+    for setting, refusal in refusals.items():
+        title = typer.style(setting, bold=True)
+        if refusal is not None and can_be_said:
+            typer.echo(f"{title} cannot express the episode: {refusal}")
             continue
-        instruction = instruct_with(episode, chosen)
-        length = tokens_shown(instruction.text)
-        typer.echo(f"{typer.style(name, bold=True)} ({length} tokens):")
+        instruction = instruct_with(episode, options_of[setting])  # raises a refusal
+        typer.echo(f"{title} ({tokens_shown(instruction.text)} tokens):")
         for utterance in instruction.utterances:
             typer.echo(f"  {utterance.stage:<13} {utterance.text}")
 
@@ -82,16 +87,16 @@ def _print_words(episode: Episode, settings: Sequence[str], options: Instruction
 def _draw(
     episode: Episode, settings: Sequence[str], options: InstructionOptions, path: Path
 ) -> None:
-    """Print the scene and the instructions, and draw the oracle's episode."""
+    """Print the scene and the instructions, let the oracle play, and draw what it did.
+
+    What can fail is checked before anything is printed, as playing takes a while.
+    """
     from rich.console import Console
 
-    from roboirg.apps.show.episode_strip import SpokenSetting
-    from roboirg.apps.show.episode_text import print_episode
-    from roboirg.apps.show.playthrough import write_strip
+    from roboirg.analysis.figures.figure_style import check_figure_support
+    from roboirg.apps.show.episode_text import print_episode, spoken_settings
+    from roboirg.apps.show.playthrough import play_through, write_strip
     from roboirg.envs.factory import check_simulator
-    from roboirg.evaluation.analysis.figures.figure_style import check_figure_support
-    from roboirg.language.generator import find_refusal, instruct_with
-    from roboirg.language.settings import all_settings
 
     if path.suffix.lower() != ".png" or path.is_dir():
         raise InvalidValueError(f"{str(path)!r} is not a valid picture file; it must end in .png.")
@@ -99,16 +104,13 @@ def _draw(
     check_figure_support()
     console = Console()
     print_episode(episode, settings, options, console)
-    told = {name: replace(options, setting=name) for name in settings}
-    said = [
-        SpokenSetting(name, instruct_with(episode, one).text, all_settings()[name].color)
-        for name, one in told.items()
-        if not find_refusal(episode, one)
-    ]
-    verdict, paths = write_strip(episode, said, path)
+    said = spoken_settings(episode, settings, options)
+    played = play_through(episode)
+    files = write_strip(episode, said, played.moments, path)
+    verdict = f"{played.verdict} after {played.steps} steps"
     console.print(f"[bold]oracle:[/] {verdict}", highlight=False)
-    for one in paths:
-        typer.echo(one)
+    for file in files:
+        typer.echo(file)
 
 
 def add_commands(app: typer.Typer) -> None:

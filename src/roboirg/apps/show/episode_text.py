@@ -12,13 +12,15 @@ from rich.markup import escape
 from rich.padding import Padding
 from rich.table import Table
 
+from roboirg.apps.show.episode_strip import SpokenSetting
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Episode, Scene, SceneObject
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.motions import Away, Glow, Motion, Point, Shuttle, Swap, Vanish
 from roboirg.judging import plain_subgoal
 from roboirg.language.generator import find_refusal, instruct_with
-from roboirg.reader import interpret
+from roboirg.language.settings import all_settings
+from roboirg.shortcuts.command_chance import is_right, understood_goals
 
 MINIMUM_WIDTH = 100
 """Columns if the output is not a terminal."""
@@ -49,19 +51,18 @@ def objects_table(scene: Scene) -> Table:
     for name in ("x", "y", "z", "yaw"):
         table.add_column(name, justify="right")
     for item in scene.objects:
-        place = (f"{value:.3f}" for value in item.position)
+        position = [f"{value:.3f}" for value in item.position]
         yaw = f"{math.degrees(item.yaw):.0f}°"
-        table.add_row(item.name, _kind(item), item.color or "", *place, yaw)
+        table.add_row(item.name, _kind(item), item.color or "", *position, yaw)
     return table
 
 
 def describe_motions(scene: Scene) -> list[str]:
     """Describe the scripted motions; objects with the same motion share a line."""
-    subjects: dict[str, list[str]] = {}
+    movers: dict[str, list[str]] = {}
     for motion in scene.motions:
-        subject, words = _motion_words(motion)
-        subjects.setdefault(words, []).append(subject)
-    return [f"{', '.join(names)}: {words}" for words, names in subjects.items()]
+        movers.setdefault(_motion_words(motion), []).append(_mover(motion))
+    return [f"{', '.join(names)}: {words}" for words, names in movers.items()]
 
 
 def describe_video(episode: Episode) -> list[str]:
@@ -69,59 +70,99 @@ def describe_video(episode: Episode) -> list[str]:
     shown = [plain_subgoal(stage) for stage in episode.demonstration if stage.in_video]
     lines = [f"{number}. {words}" for number, words in enumerate(shown, start=1)]
     if episode.scene.past:
-        lines.append("that is: " + ", ".join(fact_words(fact) for fact in episode.scene.past))
+        facts = [fact_words(fact) for fact in episode.scene.past]
+        lines.append(f"that is: {', '.join(facts)}")
     return lines
 
 
 def fact_words(fact: Fact) -> str:
-    """Return a fact in words, with the objects' names."""
-    return " ".join(part for part in (fact.subject, fact.traits.state, fact.place) if part)
+    """Return a fact in words, with the objects' names: ``cube_1 placed on target_2``."""
+    parts = (fact.subject, fact.traits.state, fact.place)
+    return " ".join(part for part in parts if part)
 
 
 def instructions_table(
     episode: Episode, settings: Sequence[str], options: InstructionOptions
 ) -> Table:
-    """Return a table of the instruction in each setting, implicit and resolved."""
+    """Return a table of the instruction in each setting, implicit and resolved.
+
+    The explicit setting has one form only. A setting that cannot express the episode has the reason
+    instead, and one whose words fit another goal, too, a warning.
+    """
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_lines=False)
     table.add_column("setting", style="bold")
     table.add_column("form", style="dim")
     table.add_column("instruction", overflow="fold")
     for setting in settings:
         chosen = replace(options, setting=setting)
-        if refusal := find_refusal(episode, chosen):
+        refusal = find_refusal(episode, chosen)
+        if refusal:
             table.add_row(setting, "", f"cannot express the episode: {escape(refusal)}")
             continue
-        for form in ("implicit",) if setting == "explicit" else ("implicit", "resolved"):
-            text = instruct_with(episode, replace(chosen, form=form)).text
-            table.add_row(setting if form == "implicit" else "", form, escape(text))
-            for complaint in interpret(text, episode.scene, episode.task).not_understood:
-                table.add_row("", "", f"[red]the interpreter {escape(complaint)}[/]")
+        title = setting
+        for form in ("implicit", "resolved"):
+            if form == "resolved" and setting == "explicit":
+                continue
+            instruction = instruct_with(episode, replace(chosen, form=form))
+            table.add_row(title, form, escape(instruction.text))
+            title = ""
+            goals = understood_goals(instruction, episode)
+            if not all(is_right(goal, episode) for goal in goals):
+                table.add_row("", "", "[red]can also mean another goal[/]")
     return table
 
 
-def _motion_words(motion: Motion) -> tuple[str, str]:
-    """Return the object that moves, and its movement in words."""
+def spoken_settings(
+    episode: Episode, settings: Sequence[str], options: InstructionOptions
+) -> list[SpokenSetting]:
+    """Return what is said in each setting that can express the episode."""
+    said = []
+    for setting in settings:
+        chosen = replace(options, setting=setting)
+        if not find_refusal(episode, chosen):
+            words = instruct_with(episode, chosen).text
+            color = all_settings()[setting].color
+            said.append(SpokenSetting(setting, words, color))
+    return said
+
+
+def _mover(motion: Motion) -> str:
+    """Return the names of what moves."""
+    if isinstance(motion, Swap):
+        return f"{motion.first} and {motion.second}"
+    return motion.subject
+
+
+def _motion_words(motion: Motion) -> str:
+    """Return a movement in words, without what moves: ``away until step 80``."""
     match motion:
-        case Away(subject, start, end, under):
-            begin = f"away from step {start}" if start else "away"
-            back = f", then under {under}" if under else ""
-            return subject, f"{begin} until step {end}{back}"
-        case Swap(first, second, start, steps, _, _, stage):
-            since = "" if stage is None else f" of the video's stage {stage + 1}"
-            return f"{first} and {second}", f"change places, step {start} to {start + steps}{since}"
-        case Shuttle(subject, begin, end, interval, passes, stopped_by):
-            return subject, (
-                f"runs from {_plane(begin)} to {_plane(end)} and back, {passes} passes of "
-                f"{interval} steps, until {fact_words(stopped_by)}"
-            )
-        case Glow(subject, during, linger):
-            return subject, f"seen while {fact_words(during)}, and {linger} steps longer"
-        case Vanish(subject, when):
-            words = fact_words(when)
-            return subject, f"gone for good once {words.removeprefix(f'{subject} ')}"
+        case Away():
+            words = "away"
+            if motion.start:
+                words += f" from step {motion.start}"
+            words += f" until step {motion.end}"
+            if motion.under:
+                words += f", then under {motion.under}"
+            return words
+        case Swap():
+            end = motion.start + motion.steps
+            words = f"change places, step {motion.start} to {end}"
+            if motion.stage is not None:
+                words += f" of the video's stage {motion.stage + 1}"
+            return words
+        case Shuttle():
+            way = f"runs from {_plane(motion.begin)} to {_plane(motion.end)} and back"
+            passes = f"{motion.passes} passes of {motion.interval} steps"
+            return f"{way}, {passes}, until {fact_words(motion.stopped_by)}"
+        case Glow():
+            return f"seen while {fact_words(motion.during)}, and {motion.linger} steps longer"
+        case Vanish():
+            words = fact_words(motion.when).removeprefix(f"{motion.subject} ")
+            return f"gone for good once {words}"
 
 
 def _print_list(title: str, lines: list[str], console: Console) -> None:
+    """Print lines under a title, or nothing if there are none."""
     if lines:
         console.print(f"[bold]{title}[/]")
     for line in lines:
@@ -129,7 +170,11 @@ def _print_list(title: str, lines: list[str], console: Console) -> None:
 
 
 def _kind(item: SceneObject) -> str:
-    return item.kind.replace("_", " ") + (f" in {item.inside}" if item.inside else "")
+    """Return the kind of an object in words: ``hidden cube in container_1``."""
+    kind = item.kind.replace("_", " ")
+    if item.inside:
+        kind += f" in {item.inside}"
+    return kind
 
 
 def _plane(point: Point) -> str:
@@ -137,4 +182,7 @@ def _plane(point: Point) -> str:
 
 
 def _value(value: object) -> str:
-    return " and ".join(str(part) for part in value) if isinstance(value, tuple) else str(value)
+    """Return the value of a goal's slot in words; some slots have several values."""
+    if isinstance(value, tuple):
+        return " and ".join(str(part) for part in value)
+    return str(value)

@@ -1,4 +1,4 @@
-"""Language 4: whole utterances that people say, from data files.
+"""Scenarios: whole utterances that people say, from data files.
 
 A scenario is one utterance with slots: a reason for the act, more of that reason, a remark that
 wanders off from there, a cue that returns, and words that lead to the command. Its sentences belong
@@ -13,18 +13,16 @@ settings; explicit is the command alone; the resolved form has the values in the
 ``general``      people, and remarks about anything
 other ``.toml``  commands and scenarios of the tasks that name the file as their `words`
 ``markup``       the marks in a sentence
-``scenario``     the fields of the files; ``scenario_file`` reads and checks them
+``scenario``     the fields of the files; ``scenario_file`` reads and checks them, with what
+                 ``scenario_needs`` says that a scenario needs
+``relations``    how a number or a position can follow from another one
 ``derived``      how the goal of an episode can follow from something else
-``choice``       what is said: derivation, then scenario
+``offers``       the ways to the goal that scenarios can say
+``choice``       what is said: the way to the goal, then the scenario
 ``amounts``      the fields of the goal that a scenario leaves open, and what they follow from
 ``introduced``   the values that the words name
-``spoken``       the words
+``speech``       the words of one scenario
+``spoken``       the words of an episode
 ``identity``     which words they are, by a digest
 ===============  =================================================================================
 """
-
-from __future__ import annotations
-
-from roboirg.language.scenarios.spoken import in_language_4
-
-__all__ = ["in_language_4"]

@@ -18,7 +18,13 @@ from roboirg.language.scenarios.declared import (
     chosen_term,
     pointed_term,
 )
-from roboirg.language.scenarios.markup import Text, parse, pointers_in, slots_said
+from roboirg.language.scenarios.markup import (
+    Pointer,
+    Text,
+    parse,
+    pointers_in,
+    slots_said,
+)
 
 NUMBERS: Mapping[str, str] = {"amounts": "counts", "reference": "reference", "kept": "kept"}
 """What words point back at that has numbers of things in their colors, with the slot of these."""
@@ -41,34 +47,58 @@ def amount_text(numbers: str, at: int, noun: str = "cube") -> Text:
 
 
 def stated_counts(words: Text) -> int:
-    """Return how many counts words state."""
-    return sum(slot.name.startswith("counts.") for slot in slots_said(words))
+    """Return how many counts words state: 1 for ``{counts.0} of <them colors.0: them>``."""
+    return len([slot for slot in slots_said(words) if slot.name.startswith("counts.")])
 
 
 def hidden_fields(words: Text, fields: Sequence[str]) -> Sequence[str]:
-    """Return those of a command's fields that words leave to their context."""
+    """Return those of a command's fields that words leave to their context.
+
+    *it* leaves all of them; *two of them*, which states a count, leaves ``colors.0``; words that
+    point at nothing leave none.
+    """
     if not any(pointers_in(words)):
         return ()
-    return [f"colors.{at}" for at in range(stated_counts(words))] or fields
+    counts = stated_counts(words)
+    if counts:
+        return [f"colors.{at}" for at in range(counts)]
+    return fields
 
 
 def hidden_term(field: str, words: Text, remark: ChoosingRemark | None, said: SaidValues) -> Term:
-    """Return the term of a field that words leave to their context.
+    """Return the term of a field: how its value follows from what was said before.
+
+    Of *Red or blue? Take the latter.*, the field ``color`` has the second of the listed values.
 
     Args:
-        field: of the goal.
-        words: for the field of the command that holds it.
-        remark: what has chosen the value that they point at, if anything has.
+        field: of the goal, which the command leaves to its context.
+        words: for the field of the command that holds it, with the words that point back.
+        remark: words before the command that have chosen one of a list, if there are any.
         said: what was said before.
     """
     base, _, number = field.partition(".")
-    at = int(number) if stated_counts(words) else -1
-    pointer = list(pointers_in(words))[at]
-    numbers = NUMBERS.get(pointer.of)
-    if numbers and base == "colors":
-        return Term("same", said.operands(field))
+    pointer = _pointer_of(field, words)
+    numbers_slot = NUMBERS.get(pointer.of)
+    if numbers_slot and base == "colors":
+        return Term("same", said.operands(field))  # "the same ones": each color as it was said
     if remark:
         return chosen_term(pointer, remark, said)
-    if numbers:
-        pointer = pointer._replace(of=f"{numbers}.{number or 0}")
+    if numbers_slot:
+        pointer = pointer._replace(of=f"{numbers_slot}.{number or 0}")
     return pointed_term(pointer, said)
+
+
+def _pointer_of(field: str, words: Text) -> Pointer:
+    """Return the words that point back at a field.
+
+    Next to stated counts, *two of those and one of these*, the first pointer is for ``colors.0``
+    and the second for ``colors.1``. Else the last pointer is for all fields.
+    """
+    pointers = list(pointers_in(words))
+    if not stated_counts(words):
+        return pointers[-1]
+    _, _, number = field.partition(".")
+    at = int(number)
+    if at >= len(pointers):
+        raise LookupError(f"words that point at {field}")
+    return pointers[at]

@@ -1,42 +1,42 @@
 """Choose what is said of an episode: how the goal follows, then the scenario.
 
-All are equally likely, so that no frame goes with a value.
+All scenarios are equally likely, so that no frame, which is the name of a scenario, goes with a
+value. An offer is a way to the goal; a remark are words that choose one of two values.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from msgspec.structs import replace
+
+from roboirg.core.episode import Episode
 from roboirg.core.errors import check_names
 from roboirg.core.goal_slots import COLOR_SLOTS
-from roboirg.language.grounded import LEFT, Clue
 from roboirg.language.instruction import REFERENCE
-from roboirg.language.places import USUAL, SpokenPlace, spoken_places
-from roboirg.language.request import GoalValue, InstructionRequest
-from roboirg.language.rivals.balanced_rivals import balanced_rival
-from roboirg.language.rivals.pair_draw import draw_order
-from roboirg.language.rivals.value_pair import rival_pairs
+from roboirg.language.request import InstructionRequest
 from roboirg.language.scenarios.amounts import hidden_fields
-from roboirg.language.scenarios.derived import derivations_of
 from roboirg.language.scenarios.introduced import (
     Introduced,
     IntroducedValue,
     Offer,
     Values,
     goal_values,
-    named,
     several,
 )
 from roboirg.language.scenarios.markup import Slot, slots_said
+from roboirg.language.scenarios.offers import OFFERS
 from roboirg.language.scenarios.scenario import PERSON, Scenario
 from roboirg.language.settings import all_settings
-from roboirg.language.settings.grounded import clues_of
-from roboirg.language.settings.reasoning import in_turn
 
-_DESCRIBED = ("place", "clue", "aside", "rest", "kept")
+_DESCRIBED = ("place", "clue", "beside", "counted", "aside", "rest", "kept")
 """Slots for what is described; a scenario fits the things that have those that it names."""
+BLOCK = 4
+"""Number of episodes after which difficulties repeat; see `in_turn`."""
+_USUAL_LENGTHS = (2, 3)
+"""Of a list, for a scenario that says nothing about it."""
 _ANY = "any"
 """The form of a place that is said after a noun, as a spot where there is one."""
 
@@ -55,13 +55,6 @@ class Chosen(NamedTuple):
     remark: str
 
 
-class _Fitting(NamedTuple):
-    """A scenario that fits an episode, and the fields of the goal that it leaves to its context."""
-
-    scenario: Scenario
-    hidden: frozenset[str]
-
-
 class _Sayable(NamedTuple):
     """A way to lead to the goal, and the scenarios that can say it."""
 
@@ -69,34 +62,33 @@ class _Sayable(NamedTuple):
     scenarios: list[Scenario]
 
 
+class _Saying(NamedTuple):
+    """A scenario, and the way to the goal that it says."""
+
+    scenario: Scenario
+    offer: Offer
+
+
 def choose(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
 ) -> Chosen | None:
-    """Return what is said in a setting that does not refuse; None if no scenario fits."""
-    sampler, offers = request.sampler, all_settings()[setting].offers
-    fitting = [
-        _Fitting(scenario, _hidden_by(scenario, request))
-        for scenario in scenarios
-        if _fits(scenario, request)
-    ]
-    sayable: list[_Sayable] = []
-    if isinstance(offers, str):
-        check_names(f"way to the goal for the offers of {setting}, named", [offers], _OFFERS)
-        ways = _OFFERS[offers]
-    else:
-        ways = offers
-    for offer in ways(request):
-        saying = [found.scenario for found in fitting if _says(found, offer)]
-        if saying:
-            sayable.append(_Sayable(offer, saying))
+    """Return what is said in a setting that does not refuse; None if no scenario fits.
+
+    The scenario is drawn, with a way to the goal that it can say, then its list and its people.
+    """
+    sayable = _sayable_ways(request, setting, scenarios)
     if not sayable:
         return None
-    if offers == "reasoning":
+    if all_settings()[setting].offers == "reasoning":
         sayable = [_in_turn(request, sayable)]
-    by_frame = {scenario.fields.frame: scenario for way in sayable for scenario in way.scenarios}
-    purpose = setting.removeprefix("direct-")
-    scenario = sampler.pick_named(f"{purpose} scenario", by_frame)
-    offer = next(way.offer for way in sayable if scenario in way.scenarios)
+    # The first way counts that a scenario can say; the draw is among scenarios, not among ways.
+    by_frame: dict[str, _Saying] = {}
+    for way in sayable:
+        for fitting in way.scenarios:
+            by_frame.setdefault(fitting.fields.frame, _Saying(fitting, way.offer))
+    purpose = setting.removeprefix("direct-")  # part of the key of a draw, so it has to stay
+    scenario, offer = request.sampler.pick_named(f"{purpose} scenario", by_frame)
+
     values = {**goal_values(request), **offer.values}
     if offer.listed is None and scenario.fields.list:
         values |= several("list", _list(request, scenario))
@@ -104,28 +96,89 @@ def choose(
     return Chosen(scenario, Introduced(values, offer.notes), offer.remark)
 
 
+def _sayable_ways(
+    request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
+) -> list[_Sayable]:
+    """Return the ways to the goal that scenarios of a setting can say, each with these scenarios.
+
+    A scenario says a way that leaves the same fields to the context as its words do: with *it* for
+    the color, a way that gives the color.
+    """
+    by_hidden: dict[frozenset[str], list[Scenario]] = {}
+    for scenario in scenarios:
+        if _fits(scenario, request):
+            by_hidden.setdefault(_hidden_by(scenario, request), []).append(scenario)
+    sayable: list[_Sayable] = []
+    for offer in _offers_of(setting)(request):
+        possible = by_hidden.get(frozenset(offer.fields), [])
+        saying = [scenario for scenario in possible if _says(scenario, offer)]
+        if saying:
+            sayable.append(_Sayable(offer, saying))
+    return sayable
+
+
+def _offers_of(setting: str) -> Callable[[InstructionRequest], Iterable[Offer]]:
+    """Return what yields the ways to the goal of a setting: its own, or that of one of ours."""
+    offers = all_settings()[setting].offers
+    if not isinstance(offers, str):
+        return offers
+    check_names(f"way to the goal for the offers of {setting}, named", [offers], OFFERS)
+    return OFFERS[offers]
+
+
+def misfit(request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]) -> str:
+    """Return why none of some scenarios of a setting fits an episode."""
+    # Without introductions, only the words of places and clues can no longer be lacking.
+    without_introductions: list[Scenario] = []
+    for scenario in scenarios:
+        texts = {**scenario.texts, "introduction": ((),)}
+        without_introductions.append(replace(scenario, texts=texts))
+    if choose(request, setting, without_introductions):
+        return "nothing has the place or clue that the introduction names"
+    return "the goal follows in no way that setting, say, list, derive and needs allow"
+
+
 def _in_turn(request: InstructionRequest, sayable: Sequence[_Sayable]) -> _Sayable:
-    """Draw a derivation of the pattern whose turn it is, as in language 3."""
+    """Draw a derivation of the pattern, such as ``color exclusion``, whose turn it is.
+
+    Ways of one pattern are told apart by relation, reference and listed slot, under which they are
+    drawn.
+    """
     by_pattern: dict[str, dict[str, _Sayable]] = {}
     for way in sayable:
         notes = way.offer.notes
+        pattern = str(notes["pattern"])
         name = f"{notes['relation']} {notes['reference']} {way.offer.listed}"
-        by_pattern.setdefault(str(notes["pattern"]), {})[name] = way
+        by_pattern.setdefault(pattern, {})[name] = way
     pattern = in_turn(request.episode, list(by_pattern))
     return request.sampler.pick_named(f"{pattern} derivation", by_pattern[pattern])
 
 
+def in_turn(episode: Episode, patterns: Sequence[str]) -> str:
+    """Return an episode's pattern of those that it allows.
+
+    Cycle through the patterns that the episode allows, so that none takes the turns of another.
+    Move on by one more after each block of four episodes: otherwise a task with two patterns
+    would use only one of them in its hard episodes.
+    """
+    return patterns[(episode.index + episode.index // BLOCK) % len(patterns)]
+
+
 def _people(request: InstructionRequest, scenario: Scenario) -> Values:
-    """Return two people, who are different, and their pronouns, if a scenario speaks of any."""
+    """Return two people, who are different, and their pronouns, if a scenario speaks of any.
+
+    The slots of the first are ``person``, ``he`` …, those of the second ``person.2``, ``he.2`` …
+    """
     if not scenario.people:
         return {}
     first = request.sampler.pick("person", scenario.people)
     others = [person for person in scenario.people if person is not first]
     second = request.sampler.pick("other person", others)
     values: dict[str, tuple[IntroducedValue, ...]] = {}
-    for slot, word, other_word in zip(PERSON, first, second, strict=True):
-        values[slot] = (IntroducedValue("", "person", word, word),)
-        values[f"{slot}.2"] = (IntroducedValue("", "person", other_word, other_word),)
+    # Each person is a row of words in the order of `PERSON`: "Leo", "he", "him" …
+    for slot, first_word, second_word in zip(PERSON, first, second, strict=True):
+        values[slot] = (IntroducedValue("", "person", first_word, first_word),)
+        values[f"{slot}.2"] = (IntroducedValue("", "person", second_word, second_word),)
     return values
 
 
@@ -136,6 +189,7 @@ def _fits(scenario: Scenario, request: InstructionRequest) -> bool:
         return False
     if needs.shown and len(request.scene_colors) not in needs.shown:
         return False
+    # A scenario with a list needs enough values for it.
     return not scenario.fields.list or bool(_lengths(request, scenario))
 
 
@@ -147,182 +201,92 @@ def _hidden_by(scenario: Scenario, request: InstructionRequest) -> frozenset[str
     return frozenset(hidden)
 
 
-def _says(found: _Fitting, offer: Offer) -> bool:
-    """Return whether a scenario points back in exactly the fields of an offer, by its way."""
-    scenario = found.scenario
-    derive, notes = scenario.fields.derive, offer.notes
-    if found.hidden != set(offer.fields) or offer.listed not in (None, scenario.fields.list):
+def _says(scenario: Scenario, offer: Offer) -> bool:
+    """Return whether a scenario leads to the goal by the way of an offer.
+
+    It has to introduce the list of the offer, if that has one, derive the goal as the offer does,
+    and name nothing in its introduction for which the offer has no words.
+    """
+    if offer.listed not in (None, scenario.fields.list):
         return False
+    derive = scenario.fields.derive  # how the goal follows; in reasoning scenarios only
     if derive is not None:
-        relations = (None, *derive.relations)
-        if derive.pattern != notes["pattern"] or notes["relation"] not in relations:
+        if derive.pattern != offer.notes["pattern"]:
+            return False
+        if offer.notes["relation"] not in (None, *derive.relations):
             return False
     return all(_has_words(slot, offer) for slot in slots_said(scenario.text("introduction")))
 
 
 def _has_words(slot: Slot, offer: Offer) -> bool:
-    """Return whether an offer has words for a slot; those of values are always known."""
+    """Return whether an offer has words for a slot of a sentence, such as ``{place:spot}``.
+
+    Those of the goal's values are always known. A place must have words in the form that is asked
+    for.
+    """
     if slot.name.partition(".")[0] not in _DESCRIBED:
         return True
     values = offer.values.get(slot.name, ())
-    return bool(values) and (values[0].kind != "place" or slot.form in (_ANY, values[0].form))
-
-
-def _others(request: InstructionRequest, slot: str) -> list[str | int]:
-    """Return the values that a slot could have in the scene, without those that it has."""
-    own = [value.value for value in request.values_in(slot)]
-    possible = itertools.chain.from_iterable(request.alternatives(slot))
-    return [value for value in dict.fromkeys(possible) if value not in own]
+    if not values:
+        return False
+    return values[0].kind != "place" or slot.form in (_ANY, values[0].form)
 
 
 def _lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
-    """Return the lengths that the list of a scenario can have."""
-    slot, wanted = scenario.fields.list, scenario.fields.needs.list or (2, 3)
+    """Return the lengths that the list of a scenario can have.
+
+    It holds all values of the goal and perhaps others: with one color of three in the scene, 1 to
+    3, of which the scenario's or the usual lengths are left, ``[2, 3]``.
+    """
+    slot = scenario.fields.list
     least = len(request.values_in(slot))
+    if not least:  # a slot of another task of the file
+        return []
     most = least + len(_others(request, slot))
+    wanted = scenario.fields.needs.list or _USUAL_LENGTHS
     return [length for length in wanted if least <= length <= most]
 
 
 def _list(request: InstructionRequest, scenario: Scenario) -> Sequence[IntroducedValue]:
-    """Draw the goal's values among others, in any order."""
+    """Draw the list of a scenario: the goal's values among others of the scene, in any order.
+
+    For the goal red it may be *blue, red*.
+    """
     slot = scenario.fields.list
-    members = [*goal_values(request)[slot]]
+    members = list(goal_values(request)[slot])
+    kind = members[0].kind
     size = request.sampler.pick("list length", _lengths(request, scenario))
-    left = list(itertools.permutations(_others(request, slot), size - len(members)))
-    for other in request.sampler.pick("listed others", left):
-        members.append(IntroducedValue(REFERENCE, members[0].kind, other))
+    choices = list(itertools.permutations(_others(request, slot), size - len(members)))
+    for other in request.sampler.pick("listed others", choices):
+        members.append(IntroducedValue(REFERENCE, kind, other))
     return request.sampler.pick("list order", list(itertools.permutations(members)))
 
 
-def _direct(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield every choice of fields that can point back; the command states the others."""
-    fields = [value.field for value in request.goal_values]
-    for size in range(1, len(fields) + 1):
-        for pointing in itertools.combinations(fields, size):
-            yield Offer(pointing, {}, {}, None)
-
-
-def _spatial(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield a spot of a thing of the goal; if none has any, a place after a noun.
-
-    Of amounts both, where there are both: a thing stands for its color.
-    """
-    colors = request.color_values
-    for form in ("spot", None):
-        drawn = _drawn_places(request, form)
-        if not drawn:
-            continue
-        # Of two things only that with the shorter words has a place.
-        at, place = min(drawn.items(), key=lambda item: len(item[1].said(form)))
-        words = place.said(form)
-        value = (IntroducedValue(colors[at].slot, "place", colors[at].value, words, form),)
-        notes: dict[str, object] = {
-            "landmarks": [words],
-            "landmark_classes": [int(place.kind)],
-            "frame": request.frame,
-        }
-        fields = [color.field for color in colors]
-        offer = Offer(fields, {"place": value, f"place.{at}": value}, notes)
-        if not request.values_of("amount"):
-            yield offer
-            return
-        yield _with_others_stated(request, colors[at], offer)
-
-
-def _with_others_stated(request: InstructionRequest, thing: GoalValue, offer: Offer) -> Offer:
-    """Return an offer for amounts, of which only one color is found out: the first one."""
-    values = goal_values(request, request.color_values.index(thing))
-    return offer._replace(fields=["colors.0"], values={**values, **offer.values})
-
-
-def _drawn_places(request: InstructionRequest, form: str | None) -> dict[int, SpokenPlace]:
-    """Draw a place for each color of the goal, by its number, that has one in this form.
-
-    The class is drawn first, or most places would be extremes.
-    """
-    found: dict[int, SpokenPlace] = {}
-    places = spoken_places(request.episode.scene, request.task.commands.pointed, request.frame)
-    for at, color in enumerate(request.color_values):
-        things = request.objects_to_point_at(color)
-        known = [place for place in places if place.thing in things and place.said(form)]
-        possible = [place for place in known if place.kind <= USUAL] or known[:1]
-        if possible:
-            kinds = list(dict.fromkeys(place.kind for place in possible))
-            kind = request.sampler.pick(f"{form} class-{color.field}", kinds)
-            of_kind = [place for place in possible if place.kind == kind]
-            found[at] = request.sampler.pick(f"{form} place-{color.field}", of_kind)
-    return found
-
-
-def _grounded(request: InstructionRequest) -> Iterator[Offer]:
-    clues = clues_of(request, spoken=True)
-    if not clues:
-        return
-    # Of two things only that with the shorter words is described.
-    thing, clue = min(clues.items(), key=lambda item: len(item[1].words))
-    fields = {value.field for value in (*clues, *request.values_in(thing.slot))}
-    notes = {"touched": [thing.slot], "pattern": clue.kind, "patterns": [clue.kind]}
-    offer = Offer(fields, _seen(thing, clue), notes)
-    if thing.slot == "counts":
-        kept = (IntroducedValue(REFERENCE, "number", LEFT),)
-        offer = Offer(["colors.0", "counts.0"], {"kept": kept}, notes)
-    elif request.values_of("amount"):
-        offer = _with_others_stated(request, thing, offer)
-    yield offer
-
-
-def _seen(thing: GoalValue, clue: Clue) -> Values:
-    """Return the slots for a clue; for one that sets two things aside, those of what is left."""
-    if not clue.aside:
-        seen = (IntroducedValue(thing.slot, "clue", thing.value, clue.words),)
-        _, _, number = thing.field.partition(".")
-        return {"clue": seen, f"clue.{number}": seen}
-    aside = [IntroducedValue("", "place", place, place) for place in clue.aside]
-    return {
-        "rest": (IntroducedValue(thing.slot, "clue", thing.value, "one"),),
-        **several("aside", aside),
-    }
-
-
-def _rival(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield a pair whose partners make both values equally likely."""
-    pair = balanced_rival(request, rival_pairs(request))
-    order = draw_order(request)
-    fields = [value.field for value in pair if pair.ordered or value is pair.meant]
-    if pair.slot == "counts":
-        fields.append("colors.0")  # the only one, at which the words for them point, too
-    rival = IntroducedValue(pair.rival.slot, pair.meant.slot_type, pair.rival.value)
-    both = (named(pair.meant), rival) if order.meant_first else (rival, named(pair.meant))
-    aimed = "former" if order.meant_first == order.points_at_meant else "latter"
-    remark = aimed if order.points_at_meant else f"not_{aimed}"
-    notes: dict[str, object] = {
-        "rival": pair.rival.value,
-        "rival_slot": pair.slot,
-        "rival_position": "second" if order.meant_first else "first",
-        "rival_reference": remark,
-        "candidates": {pair.slot: [value.value for value in both]},
-    }
-    yield Offer(fields, {**several("list", both), "taken": (rival,)}, notes, pair.slot, remark)
-
-
-_OFFERS: Mapping[str, Callable[[InstructionRequest], Iterable[Offer]]] = {
-    "direct": _direct,
-    "reasoning": derivations_of,
-    "spatial": _spatial,
-    "grounded": _grounded,
-    "direct-rival": _rival,
-}
+def _others(request: InstructionRequest, slot: str) -> list[str | int]:
+    """Return the values that a slot could have in the scene, without those of the goal."""
+    possible = dict.fromkeys(itertools.chain.from_iterable(request.alternatives(slot)))
+    for meant in request.values_in(slot):
+        possible.pop(meant.value, None)
+    return list(possible)
 
 
 def rival_values(request: InstructionRequest, introduced: Introduced) -> Iterator[Introduced]:
-    """Yield the slots with another value for a competing remark: ``rival color`` of each color."""
-    said = [value.value for value in introduced.values.get("list", ())]
-    said += [value.value for value in request.goal_values]
-    for slot, kind in {value.slot: value.slot_type for value in request.goal_values}.items():
-        others: Sequence[str | int] = request.task.commands.colors
-        if slot not in COLOR_SLOTS:
-            others = _others(request, slot)
-        for other in others:
-            if other not in said:
-                rival = (IntroducedValue(REFERENCE, kind, other),)
-                yield introduced.with_values(**{f"rival {slot}": rival})
+    """Yield what a competing remark can name: the slots with one more, a value that is not meant.
+
+    For the goal red, ``rival color`` is blue, then green, as far as neither was named in a list.
+    """
+    already_named = [value.value for value in introduced.values.get("list", ())]
+    already_named += [value.value for value in request.goal_values]
+    kinds = {value.slot: value.slot_type for value in request.goal_values}
+    for slot, kind in kinds.items():
+        for other in _possible_rivals(request, slot):
+            if other not in already_named:
+                rival = IntroducedValue(REFERENCE, kind, other)
+                yield introduced.with_values(**{f"rival {slot}": (rival,)})
+
+
+def _possible_rivals(request: InstructionRequest, slot: str) -> Sequence[str | int]:
+    """Return the values of which a competing remark can speak: any color, or what the scene has."""
+    if slot in COLOR_SLOTS:
+        return request.task.things.colors
+    return _others(request, slot)

@@ -55,11 +55,16 @@ class SaidValues:
         self.by_slot[slot] = values
 
     def operands(self, slot: str) -> tuple[Operand, ...]:
-        """Return what a slot named; ``colors.1`` is the second of ``colors``. Empty if nothing."""
-        base, _, number = slot.partition(".")
+        """Return what a slot named; empty if it was not said.
+
+        ``colors.1`` may have been named alone, or as the second of ``colors``.
+        """
         values = self.by_slot.get(slot, ())
+        base, _, number = slot.partition(".")
         if not values and number:
-            values = self.by_slot.get(base, ())[int(number) : int(number) + 1]
+            together = self.by_slot.get(base, ())
+            at = int(number)
+            values = together[at : at + 1]
         return tuple(self._operand(value) for value in values)
 
     def listed(self, *bases: str) -> tuple[Operand, ...]:
@@ -70,12 +75,14 @@ class SaidValues:
         members: list[Operand] = []
         for slot in self.by_slot:
             base, _, number = slot.partition(".")
+            # Members of a list that was also named together would count twice.
             is_new = not number or base not in self.by_slot
             if base in bases and is_new:
                 members += self.operands(slot)
         return tuple(members)
 
     def _operand(self, value: IntroducedValue) -> Operand:
+        """Return a value, or the description in its place."""
         if value.kind == "place":
             return Described(value.words, "place", self.frame)
         if value.kind == "clue":
@@ -84,34 +91,56 @@ class SaidValues:
 
 
 def pointed_term(pointer: Pointer, said: SaidValues) -> Term:
-    """Return the term of words that point back at what was said."""
-    operation, slot = pointer.operation, pointer.of
+    """Return the term of words that point back: how their value follows from what was said.
+
+    *it* has the same value as was said, *the former* the first of those listed, *one more than
+    that* a number and a step.
+    """
+    slot = pointer.of
+    operation = pointer.operation
     if operation == "rank":
-        members = said.listed("list") or said.listed(slot.partition(".")[0], *_DESCRIBED)
+        base = slot.partition(".")[0]
+        members = said.listed("list") or said.listed(base, *_DESCRIBED)
         return Term("rank", members, _rank_of(pointer, said))
     if operation == "other":
-        members = said.listed("list")
-        return Term("other", members, _taken_rank(members, said))
-    if operation == "without" or slot == "rest":
-        return Term(
-            "without", said.listed("excluded") or said.listed("aside") or said.listed("kept")
-        )
-    if operation == "double" or operation == "half":  # noqa: PLR1714 - the type checker narrows it
-        return Term(operation, said.operands(slot))
+        return _other_term(said)
+    if operation in ("without", "neighbor") or slot == "rest":  # what is left of all
+        return Term("without", _set_aside(said))
     operands = said.operands(slot)
-    if not operands and "rank" in said.by_slot:
+    if not operands and "rank" in said.by_slot and operation not in ("double", "half"):
         # "It's the second one's turn, so pick it up": a list was named, then a position in it.
         return Term("rank", said.listed("list"), _rank_of(pointer, said))
+    return _reckoned_term(operation, operands, said)
+
+
+def _reckoned_term(operation: Operation, operands: tuple[Operand, ...], said: SaidValues) -> Term:
+    """Return the term of what was said itself, or of a number that follows from it."""
+    if operation == "double":
+        return Term("double", operands)
+    if operation == "half":
+        return Term("half", operands)
     step = _step_of(operation, said)
-    return Term("step" if step else "same", operands, step=step)
+    if step:
+        return Term("step", operands, step=step)
+    return Term("same", operands)
 
 
-def _rank_of(pointer: Pointer, said: SaidValues) -> int:
-    """Return the position that words name, by their class or as the number in them."""
-    if pointer.expression in _RANKS:
-        return _RANKS[pointer.expression]
-    (rank,) = said.by_slot["rank"]
-    return int(rank.value)
+def _set_aside(said: SaidValues) -> tuple[Operand, ...]:
+    """Return what was named so that something else is left; empty if nothing was."""
+    for slot in ("excluded", "aside", "kept", "reference"):
+        members = said.listed(slot)
+        if members:
+            return members
+    return ()
+
+
+def _other_term(said: SaidValues) -> Term:
+    """Return the term of *the other one*: of a list without what is taken, or of all without it."""
+    members = said.listed("list")
+    taken = said.operands("taken")
+    if taken and not members:
+        return Term("without", taken)
+    return Term("other", members, _taken_rank(members, said))
 
 
 def _taken_rank(members: tuple[Operand, ...], said: SaidValues) -> int:
@@ -120,6 +149,14 @@ def _taken_rank(members: tuple[Operand, ...], said: SaidValues) -> int:
     if not taken or taken[0] not in members:
         return 0
     return members.index(taken[0]) + 1
+
+
+def _rank_of(pointer: Pointer, said: SaidValues) -> int:
+    """Return the position that words name, by their class or as the number in them."""
+    if pointer.expression in _RANKS:
+        return _RANKS[pointer.expression]
+    (rank,) = said.by_slot["rank"]
+    return int(rank.value)
 
 
 def _step_of(operation: Operation, said: SaidValues) -> int:
@@ -135,7 +172,10 @@ def chosen_term(pointer: Pointer, remark: ChoosingRemark, said: SaidValues) -> T
 
     *The other one* is the one that was not chosen.
     """
-    members, rank = said.listed("list"), _RANKS[remark.pointer.expression]
+    members = said.listed("list")
+    rank = _RANKS[remark.pointer.expression]
     if remark.sets_aside:
-        rank = 3 - rank  # of two
-    return Term("other" if pointer.operation == "other" else "rank", members, rank)
+        rank = 3 - rank  # the other one of two
+    if pointer.operation == "other":
+        return Term("other", members, rank)
+    return Term("rank", members, rank)

@@ -1,19 +1,20 @@
 """Every way in which the goal of an episode can follow from something else, for reasoning.
 
-The rules are those of `roboirg.language.patterns`; here they give values instead of words.
+No derivation gives a value away: a relation is not used if its words spell the result, *one fewer*
+for one, or if it can lead to a single goal of the scene only.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
+from roboirg.core.goal_slots import MOMENTS
+from roboirg.core.motions import Shuttle
 from roboirg.language.instruction import REFERENCE
-from roboirg.language.patterns.deduction import deductions
-from roboirg.language.patterns.exclusion import excluded_colors
-from roboirg.language.patterns.sequence import open_steps
-from roboirg.language.request import GoalValue, InstructionRequest
-from roboirg.language.rivals.value_pair import ValuePair, possible_pairs
+from roboirg.language.request import GoalValue, GoalValues, InstructionRequest
+from roboirg.language.rivals import ValuePair, possible_pairs
 from roboirg.language.scenarios.introduced import (
     IntroducedValue,
     Offer,
@@ -21,77 +22,233 @@ from roboirg.language.scenarios.introduced import (
     named,
     several,
 )
-from roboirg.language.slot_types.ordinal import series_length
-from roboirg.language.templates import derivations
+from roboirg.language.scenarios.relations import (
+    COUNTED_STEPS,
+    NEIGHBOR,
+    RELATIONS,
+    STEPS,
+    Relation,
+)
 
 PAIR = 2
 """Colors of which the second one is the other one."""
+_POSITIONS = ("placement", "visit")
+"""Slots whose values are positions in an order."""
+MAX_REFERENCE = 10
+"""The largest quantity to introduce."""
 
 
 def derivations_of(request: InstructionRequest) -> Iterator[Offer]:
     """Yield the derivations of an episode; those of a pair are drawn."""
     yield from _deduced(request)
     for value in (*request.values_of("visit"), *request.values_of("placement")):
-        yield from _stepped(request, value, "number deduction", derivations.COUNTED_STEPS)
-        yield from _stepped(request, value, "sequential relation", derivations.STEPS)
+        yield from _stepped(request, value, "number deduction", COUNTED_STEPS)
+        yield from _stepped(request, value, "sequential relation", STEPS)
+    for value in request.values_of("relation"):
+        yield _neighboring(value)
     yield from _colored(request)
-    yield from _other(request)
+    yield from _complements(request)
+
+
+def _neighboring(moment: GoalValue) -> Offer:
+    """Return the moment that is next to the other one in time, whichever comes first."""
+    (other,) = [name for name in MOMENTS if name != moment.value]
+    reference = IntroducedValue(REFERENCE, "relation", other)
+    values = {"reference": (reference,)}
+    return _derived("sequential relation", [moment.field], values, NEIGHBOR.name)
 
 
 def _deduced(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield the number as it follows from another one; counts all by one relation."""
+    """Yield the goal's numbers as they follow from others: 2 as *one fewer than* 3.
+
+    All counts of a goal follow by the same relation: 2 red and 1 blue from 3 red and 2 blue.
+    """
     numbers = request.values_of("number") or request.values_in("counts")
     if not numbers:
         return
-    slot, kind = numbers[0].slot, numbers[0].slot_type
-    fields = [value.field for value in request.values_of(kind)]
-    results, choices = [number.number for number in numbers], request.alternative_numbers(slot)
-    # Words for amounts need not name the number: "and Leo wants the same".
-    unspelled = ["twice"] if kind == "amount" else []
-    for relation, references in deductions(results, choices, unspelled):
-        values = _counted(numbers[0], references, relation.offset)
+    first = numbers[0]  # all of them have its type
+    results = [value.number for value in numbers]
+    fields = [value.field for value in request.values_of(first.slot_type)]
+    for deduction in deductions(results, request.alternative_numbers(first.slot)):
+        relation = deduction.relation
+        # Words for amounts need not name the number: "and Leo wants the same".
+        is_unsaid = first.slot_type == "amount" and relation.name == "twice"
+        if relation.spells in results and not is_unsaid:
+            continue
+        values = _counted(first, deduction.references, relation.offset)
         yield _derived("number deduction", fields, values, relation.name)
+
+
+class Deduction(NamedTuple):
+    """How numbers follow from others.
+
+    Attributes:
+        relation: for all of them.
+        references: the quantity from which each follows.
+    """
+
+    relation: Relation
+    references: list[int]
+
+
+def deductions(results: Sequence[int], choices: Sequence[Sequence[int]]) -> Iterator[Deduction]:
+    """Yield each relation that gives all of some results, with the number from which each follows.
+
+    *One fewer* gives the results 2 and 1 from 3 and 2.
+
+    Args:
+        results: the goal's numbers.
+        choices: all results that are possible in the scene. A relation that can give only one
+            of them would give the result away.
+    """
+    for relation in RELATIONS:
+        references = _references(relation, results)
+        if not references:
+            continue
+        reachable = [choice for choice in choices if _references(relation, choice)]
+        if len(reachable) > 1:
+            yield Deduction(relation, references)
+
+
+def _references(relation: Relation, results: Sequence[int]) -> list[int]:
+    """Return the numbers from which some results follow; empty if one follows from none.
+
+    By *one fewer*, 2 and 1 follow from 3 and 2.
+    """
+    found: list[int] = []
+    for result in results:
+        reference = relation.reference(result)
+        if reference is None or not 1 <= reference <= MAX_REFERENCE:
+            return []
+        found.append(reference)
+    return found
 
 
 def _stepped(
     request: InstructionRequest,
     value: GoalValue,
     pattern: str,
-    known: tuple[derivations.Step, ...],
+    known: Sequence[Relation],
 ) -> Iterator[Offer]:
+    """Yield a position in a series as it follows from another: *right after* the second.
+
+    Args:
+        request: of the episode.
+        value: the position, a visit or a placement.
+        pattern: the name of this kind of reasoning.
+        known: the steps that words can say.
+    """
     length = series_length(request, value)
     choices = [number for (number,) in request.alternative_numbers(value.slot)]
     for step in open_steps(known, value.number, length, choices):
-        values = _counted(value, [value.number - step.offset], step.offset)
+        reference = value.number - step.offset
+        values = _counted(value, [reference], step.offset)
         yield _derived(pattern, [value.field], values, step.name)
 
 
+def series_length(request: InstructionRequest, value: GoalValue) -> int:
+    """Return the length of the episode's series: visits to come, or placements shown."""
+    scene = request.episode.scene
+    if value.slot_type == "visit":
+        return sum(shuttle.passes for shuttle in scene.motions_of(Shuttle))
+    targets = [target.name for target in scene.of_kind("target")]
+    placements = [fact for fact in scene.past if fact.kind == "placed" and fact.place in targets]
+    return len(placements)
+
+
+def open_steps(
+    known: Sequence[Relation], position: int, length: int, choices: Sequence[int]
+) -> list[Relation]:
+    """Return those of the known steps that lead to a position and do not give it away.
+
+    *two after* leads to the third from the first. It would give the position away if its words
+    named it, or if it could lead to no other position.
+
+    Args:
+        known: the steps.
+        position: in the series, from 1.
+        length: of the series.
+        choices: all positions that are possible in the scene.
+    """
+    found: list[Relation] = []
+    for step in known:
+        if step.spells == position or not _leads(step, position, length):
+            continue
+        reachable = [choice for choice in choices if _leads(step, choice, length)]
+        if len(reachable) > 1:
+            found.append(step)
+    return found
+
+
+def _leads(step: Relation, position: int, length: int) -> bool:
+    """Return whether a step leads to a position from another one of the series."""
+    return 1 <= position - step.offset <= length
+
+
 def _counted(value: GoalValue, references: Sequence[int], offset: int) -> Values:
-    """Return references, and the step from there to the goal, without its direction."""
-    step = {"step": (IntroducedValue("", "number", abs(offset)),)} if offset else {}
+    """Return the slots of a number: ``reference``, from which it follows, and ``step``.
+
+    For 2 as one fewer than 3, the reference is 3 and the step 1; words say the direction.
+    """
     known = [IntroducedValue(REFERENCE, value.slot_type, number) for number in references]
-    return {**several("reference", known), **step}
+    values = {**several("reference", known)}
+    if offset:
+        values["step"] = (IntroducedValue("", "number", abs(offset)),)
+    return values
 
 
 def _colored(request: InstructionRequest) -> Iterator[Offer]:
     """Yield the color that is left without others; of two colors that one is the other one."""
     colors = request.color_values
     if len(colors) == 1:
-        excluded = [IntroducedValue(REFERENCE, "color", one) for one in excluded_colors(request)]
-        yield _derived("color exclusion", [colors[0].field], several("excluded", excluded))
+        yield _remaining(request, colors[0])
     if len(colors) == PAIR:
-        both = [named(one) for one in colors]
-        yield _one_of(request, both, both[0], [one.field for one in colors], colors[0].slot)
+        yield _second_of(request, colors)
 
 
-def _other(request: InstructionRequest) -> Iterator[Offer]:
+def _remaining(request: InstructionRequest, color: GoalValue) -> Offer:
+    """Return the color that is left when others are excluded."""
+    excluded = [IntroducedValue(REFERENCE, "color", name) for name in excluded_colors(request)]
+    return _derived("color exclusion", [color.field], several("excluded", excluded))
+
+
+def _second_of(request: InstructionRequest, colors: GoalValues) -> Offer:
+    """Return the two colors of a goal, of which the first one is taken."""
+    both = [named(color) for color in colors]
+    fields = [color.field for color in colors]
+    return _one_of(request, both, both[0], fields, colors[0].slot)
+
+
+def excluded_colors(request: InstructionRequest) -> tuple[str, ...]:
+    """Return the colors to exclude, so that only the first color of the goal is left.
+
+    With red meant in a scene of red, blue and green: blue and green, in an order that is drawn. In
+    a scene of a single color, one is named that nothing there has.
+    """
+    target = request.color_values[0].color
+    others = [color for color in request.scene_colors if color != target]
+    if not others:
+        absent = request.sampler.pick("absent color", request.other_colors(target))
+        return (absent,)
+    return request.sampler.pick("excluded colors", list(itertools.permutations(others)))
+
+
+def _complements(request: InstructionRequest) -> Iterator[Offer]:
     """Yield for each slot a value as the other one of two, in an order that is drawn."""
-    pairs = [pair for pair in possible_pairs(request) if not pair.ordered]
-    for slot in dict.fromkeys(pair.slot for pair in pairs):
-        of_slot = [pair for pair in pairs if pair.slot == slot]
-        pair: ValuePair = request.sampler.pick(f"complement {slot}", of_slot)
-        both = [IntroducedValue(REFERENCE, one.slot_type, one.value) for one in pair]
-        yield _one_of(request, both, both[1], [pair.meant.field], slot)
+    by_slot: dict[str, list[ValuePair]] = {}
+    for pair in possible_pairs(request):
+        if not pair.is_ordered:
+            by_slot.setdefault(pair.slot, []).append(pair)
+    for slot, pairs in by_slot.items():
+        yield _complement(request, request.sampler.pick(f"complement {slot}", pairs))
+
+
+def _complement(request: InstructionRequest, pair: ValuePair) -> Offer:
+    """Return a value as the other one of two, of which the rival is taken."""
+    kind = pair.meant.slot_type
+    meant = IntroducedValue(REFERENCE, kind, pair.meant.value)
+    rival = IntroducedValue(REFERENCE, kind, pair.rival.value)
+    return _one_of(request, [meant, rival], rival, [pair.meant.field], pair.slot)
 
 
 def _one_of(
@@ -101,8 +258,22 @@ def _one_of(
     fields: list[str],
     slot: str,
 ) -> Offer:
-    """Return the offer of two values in an order that is drawn, and of the one that is taken."""
-    order = request.sampler.pick("complement order", list(itertools.permutations(both)))
+    """Return the offer of two values, and of the one that is taken.
+
+    Their order is drawn, but for positions: after *the second or first one*, *the first* could be
+    the first of these two.
+
+    Args:
+        request: of the episode.
+        both: the two values.
+        taken: one of them; the other one is meant.
+        fields: of the command, that point back.
+        slot: of which the two are listed.
+    """
+    orders = list(itertools.permutations(both))
+    if slot in _POSITIONS:
+        orders = [tuple(sorted(both, key=lambda introduced: introduced.value))]
+    order = request.sampler.pick("complement order", orders)
     values = {**several("list", order), "taken": (taken,)}
     return _derived("contextual logic", fields, values, listed=slot)
 
@@ -114,8 +285,16 @@ def _derived(
     relation: str | None = None,
     listed: str = "",
 ) -> Offer:
-    """Return the offer of a derivation."""
-    reference = values.get("reference", values.get("taken"))
+    """Return the offer of a derivation, with what the metadata say of it.
+
+    Args:
+        pattern: the kind of reasoning, ``number deduction``.
+        fields: of the command, that point back.
+        values: what is introduced.
+        relation: its name, ``one fewer``; None without one.
+        listed: the slot of which two values are listed; empty if none are.
+    """
+    reference = values.get("reference") or values.get("taken")
     notes: dict[str, object] = {
         "pattern": pattern,
         "patterns": [pattern],
@@ -123,5 +302,5 @@ def _derived(
         "reference": reference[0].value if reference else None,
     }
     if listed:
-        notes["candidates"] = {listed: [one.value for one in values["list"]]}
+        notes["candidates"] = {listed: [candidate.value for candidate in values["list"]]}
     return Offer(fields, values, notes, listed)

@@ -8,30 +8,26 @@ from collections.abc import Iterable
 
 from msgspec.structs import replace
 
-from roboirg.core.instruction_options import DEFAULT_LANGUAGE
 from roboirg.core.word_pools import PoolName, outside_words
+from roboirg.language.scenarios.scenario import TaskScenarios
 from roboirg.language.scenarios.scenario_file import general, setting_scenarios
 from roboirg.language.scenarios.wording_store import task_words
 from roboirg.language.settings import EXPLICIT
-from roboirg.language.templates import LANGUAGE_VERSIONS
+from roboirg.language.word_sampler import LANGUAGE_VERSION
 from roboirg.util.short_hash import short_hash
 
 
 def words_of(
     task: str,
     pool: PoolName,
-    language: int,
     setting: str = EXPLICIT,
     wordings: str | None = None,
 ) -> str:
     """Return which words a task has in a pool, such as ``PickXtimes/test@1a2b3c4d5e6f``.
 
-    ``PickXtimes/test/lab@3c4d5e6f1a2b`` in a setting *lab* whose own file serves the task. Empty
-    in the usual language, whose words are code: its version is enough. `wordings` may be the
-    identity of an open wording file, whose words come before ours.
+    ``PickXtimes/test/lab@3c4d5e6f1a2b`` in a setting *lab* whose own file serves the task.
+    `wordings` may be the identity of an open wording file, whose words come before ours.
     """
-    if language == DEFAULT_LANGUAGE:
-        return ""
     name = f"{task}/{pool}"
     if task in setting_scenarios(setting):
         name += f"/{setting}"
@@ -41,16 +37,15 @@ def words_of(
 def language_label(
     tasks: Iterable[str],
     pool: PoolName,
-    language: int,
     settings: Iterable[str] = (),
     wordings: str | None = None,
 ) -> str:
-    """Return the version of a language, followed by which words each task has in settings."""
+    """Return the version of the words, followed by which words each task has in settings."""
     names = (EXPLICIT, *settings)
     words: list[str] = []
     for task in tasks:
-        words += [words_of(task, pool, language, setting, wordings) for setting in names]
-    return " ".join([LANGUAGE_VERSIONS[language], *dict.fromkeys(words)]).strip()
+        words += [words_of(task, pool, setting, wordings) for setting in names]
+    return " ".join([LANGUAGE_VERSION, *dict.fromkeys(words)]).strip()
 
 
 @functools.cache
@@ -68,17 +63,29 @@ def words_digest(
     words = task_words(task, setting, wordings)
     if words is None:
         return "none"
-    scenarios: list[list[str]] = []
+    shared = general()
+    said = [
+        list(shared.people.items()),  # in their order, by which they are drawn
+        shared.distractors[pool],
+        repr(sorted(words.stated.items())),
+        words.commands.get(pool, ()),
+        _scenarios_in(words, pool),
+    ]
+    if words.literals:
+        said.append(repr(sorted(words.literals.items(), key=repr)))
+    return short_hash(json.dumps(said))
+
+
+def _scenarios_in(words: TaskScenarios, pool: PoolName) -> list[list[str]]:
+    """Return the fields and the sentences of each scenario of a pool, as text, sorted.
+
+    So the same scenarios in another order give the same list.
+    """
+    found: list[list[str]] = []
     for scenario in words.scenarios:
         if scenario.fields.pool in (None, pool):
             # Which other tasks say it, too, does not matter.
             needs = replace(scenario.fields.needs, tasks=())
             fields = replace(scenario.fields, needs=needs)
-            scenarios.append([repr(fields), repr(sorted(scenario.texts.items()))])
-    people = list(general().people.items())  # in their order, by which they are drawn
-    stated = repr(sorted(words.stated.items()))
-    commands = words.commands.get(pool, ())
-    said = [people, general().distractors[pool], stated, commands, sorted(scenarios)]
-    if words.literals:
-        said.append(repr(sorted(words.literals.items(), key=repr)))
-    return short_hash(json.dumps(said))
+            found.append([repr(fields), repr(sorted(scenario.texts.items()))])
+    return sorted(found)

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from roboirg.language.instruction import REFERENCE, Expression
 from roboirg.language.number_words import agreeing_number, cardinal, ordinal, plural, times
-from roboirg.language.phrases import Mentionable, MentionedValue, Phrase, antecedent, listed, plain
+from roboirg.language.phrases import Phrase, antecedent, listed, plain
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.scenarios.markup import Slot
-from roboirg.language.templates.derivations import MOMENTS
 
 FORMER: tuple[Expression, ...] = ("former", "latter")
 RANKS: tuple[Expression, ...] = ("first", "second", "third")
+_NUMBER_FORMS: Mapping[str, Callable[[int], str]] = {
+    "ordinal": ordinal,
+    "cardinal": cardinal,
+    "times": times,
+}
+"""How a number is said in a form; any other form is a noun to be counted."""
 
 
 class IntroducedValue(NamedTuple):
@@ -35,19 +40,42 @@ class IntroducedValue(NamedTuple):
     form: str | None = None
 
     def said(self, form: str | None) -> str:
-        """Return the words for the value in a form, or as a number of a noun."""
+        """Return the words for the value in a form, or as a number of a noun.
+
+        For 3: ``ordinal`` gives *third*, ``times`` *three times*, the noun ``lap`` *three laps*.
+        """
+        # Colors, places and clues have no other forms; numbers may have words of their own.
         if isinstance(self.value, str) or (self.words and form is None):
-            return self.words or MOMENTS.get(str(self.value), str(self.value))
+            return self.words or str(self.value)
         if form is None:
             form = "ordinal" if self.kind in ("visit", "placement") else "cardinal"
-        known = {"ordinal": ordinal, "cardinal": cardinal, "times": times}.get(form)
-        if known is not None:
-            return known(self.value)
-        return f"{cardinal(self.value)} {form if self.value == 1 else plural(form)}"
+        if form in _NUMBER_FORMS:
+            return _NUMBER_FORMS[form](self.value)
+        noun = form if self.value == 1 else plural(form)
+        return f"{cardinal(self.value)} {noun}"
 
 
 Values = Mapping[str, tuple[IntroducedValue, ...]]
 """By slot: one value, or several."""
+
+
+class PointedValue(NamedTuple):
+    """What words that point back stand for: the slot and the value of their mentions."""
+
+    slot: str
+    value: str | int
+
+
+class Ranked(NamedTuple):
+    """Values of which one is named by its position in the list.
+
+    Attributes:
+        introduced: the values, with the position as ``rank``.
+        expression: the class of words for the position, *the former*.
+    """
+
+    introduced: Introduced
+    expression: Expression
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,32 +95,52 @@ class Introduced:
         return agreeing_number([introduced.value for introduced in self.values[controller]])
 
     def phrase(self, slot: Slot) -> Phrase:
-        """Return the words for a slot, each value a mention."""
-        found = self.values[slot.name]
-        joint, form = (slot.form, None) if slot.form in ("or", "nor") else ("and", slot.form)
+        """Return the words for a slot, each value a mention: *red and blue* for ``{list}``.
+
+        Several values are joined by *and*; ``{list:or}`` and ``{list:nor}`` join them by that word.
+        """
+        joint = "and"
+        form = slot.form
+        if form in ("or", "nor"):
+            joint = form
+            form = None
         phrases: list[Phrase] = []
-        for value in found:
+        for value in self.values[slot.name]:
             words = value.said(form)
-            phrases.append(antecedent(words, value) if value.slot else plain(words))
+            if value.slot:
+                phrases.append(antecedent(words, value.slot, value.value))
+            else:
+                phrases.append(plain(words))
         return listed(phrases, joint)
 
-    def referent(self, name: str) -> Mentionable:
-        """Return what mentions that point back at a slot stand for."""
+    def referent(self, name: str) -> PointedValue:
+        """Return the slot and value for which words stand that point back at a slot.
+
+        *them*, for the colors red and blue, stands for ``red and blue``.
+        """
         found = self.values[name]
         if len(found) == 1:
-            return found[0]
+            return PointedValue(found[0].slot, found[0].value)
         slots = {value.slot for value in found}
         slot = slots.pop() if len(slots) == 1 else REFERENCE
-        return MentionedValue(" and ".join(str(value.value) for value in found), slot)
+        return PointedValue(slot, " and ".join(str(value.value) for value in found))
 
-    def ranked(self, name: str, *, ordinals: bool) -> tuple[Introduced, Expression]:
-        """Return the same with the rank of a slot's value in the list, and the rank's class."""
-        members = [one.value for one in self.values["list"]]
-        at = members.index(self.values[name][0].value)
-        pair = len(members) == len(FORMER)
-        words = f"the {FORMER[at]}" if pair else f"the {RANKS[at]} one"
-        rank = IntroducedValue("", "rank", at + 1, words)
-        return self.with_values(rank=(rank,)), FORMER[at] if pair and not ordinals else RANKS[at]
+    def ranked(self, name: str, *, ordinals: bool) -> Ranked:
+        """Name a slot's value by its position in the list.
+
+        Of two values it is *the former* or *the latter*, of three *the second one*. With
+        `ordinals`, words of two values are also of the class of *the first*.
+        """
+        members = [member.value for member in self.values["list"]]
+        position = members.index(self.values[name][0].value)
+        words = f"the {RANKS[position]} one"
+        expression = RANKS[position]
+        if len(members) == len(FORMER):
+            words = f"the {FORMER[position]}"
+            if not ordinals:
+                expression = FORMER[position]
+        rank = IntroducedValue("", "rank", position + 1, words)
+        return Ranked(self.with_values(rank=(rank,)), expression)
 
     def with_values(self, **added: tuple[IntroducedValue, ...]) -> Introduced:
         """Return the same with further slots."""
@@ -123,9 +171,10 @@ def named(value: GoalValue) -> IntroducedValue:
 
 
 def goal_values(request: InstructionRequest, first: int = 0) -> Values:
-    """Return the values of the goal by field, and all of a slot with several by its name.
+    """Return the values of the goal by field, and all values of a slot by its name.
 
-    Amounts have no order: that with the number `first` gets the fields of the first one. Words that
+    A goal of red and blue gives ``colors``, both, ``colors.0``, red, and ``colors.1``, blue.
+    Amounts have no order: the one with the number `first` gets the fields of the first. Words that
     point back at them stand for their colors.
     """
     values: dict[str, tuple[IntroducedValue, ...]] = {}
@@ -134,13 +183,16 @@ def goal_values(request: InstructionRequest, first: int = 0) -> Values:
         values[value.field] = (named(value),)
     if request.values_of("amount"):
         for slot in ("colors", "counts"):
-            found = [*values[slot]]
-            values |= several(slot, [found.pop(first), *found])
+            in_order = list(values[slot])
+            in_order.insert(0, in_order.pop(first))  # this one to the front
+            values |= several(slot, in_order)
         values["amounts"] = values["colors"]
     return values
 
 
 def several(name: str, values: Sequence[IntroducedValue]) -> Values:
-    """Return the slots of several values: one by one, and all together."""
-    one_by_one = {f"{name}.{at}": (value,) for at, value in enumerate(values)}
-    return {name: tuple(values), **one_by_one}
+    """Return the slots of several values: all together, ``list``, and one by one, ``list.0``."""
+    slots = {name: tuple(values)}
+    for at, value in enumerate(values):
+        slots[f"{name}.{at}"] = (value,)
+    return slots

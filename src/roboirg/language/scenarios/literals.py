@@ -1,27 +1,26 @@
 """Whole sentences for single goals, such as RoboMME's: read them, and say them.
 
-They serve the explicit setting, in every version of our words.
+They serve the explicit setting, instead of commands.
 """
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import msgspec
 
 from roboirg.core.episode import Goal, SlotValue, describe_goal
-from roboirg.core.errors import InvalidValueError, check_names
-from roboirg.core.plain_text import clip_text
+from roboirg.core.errors import InvalidValueError
+from roboirg.language.goal_fields import unordered
 from roboirg.language.instruction import Meaning
 from roboirg.language.phrases import TaggedText, plain
 from roboirg.language.request import InstructionRequest, InstructionSpec, UtteranceSpec
 from roboirg.language.scenarios.markup import parse
-from roboirg.language.scenarios.written import converted
-from roboirg.language.settings import EXPLICIT, all_settings
-from roboirg.language.settings.setting import Setting
+from roboirg.language.scenarios.scenario import TaskScenarios
+from roboirg.language.scenarios.written import Mistakes, converted, fields_of, shown
+from roboirg.tasks import goals_of
 from roboirg.tasks.splits.splits import get_episode
 
 Literals = Mapping[Goal, str]
@@ -43,40 +42,66 @@ class LiteralFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def read_literals(
-    written: Iterable[object], tasks: Sequence[str], where: str, mistakes: list[str]
+    written: Iterable[dict[str, Any]], tasks: Sequence[str], mistakes: Mistakes
 ) -> dict[str, dict[Goal, str]]:
-    """Return the sentences of each task; what is wrong with one is added to the mistakes."""
+    """Return the sentences of each task, ``{"StopCube": {…}}``, by goal as `unordered` has it.
+
+    What is wrong with a sentence is added to the mistakes, and the sentence is left out.
+    """
     found: dict[str, dict[Goal, str]] = {task: {} for task in tasks}
-    for number, one in enumerate(written, 1):
-        at = f"{where}, literal {number}"
-        try:
-            literal = converted(one, LiteralFields, at)
-            check_names(f"task of {at}, named", [literal.task], tasks)
-            goal, sentence = _goal(literal, at), _sentence(literal.text, at)
-        except InvalidValueError as error:
-            mistakes.append(str(error))
+    for number, table in enumerate(written, 1):
+        part = mistakes.at(f"literal {number}")
+        literal = fields_of(table, LiteralFields, part)
+        if literal is None:
             continue
-        if goal in found[literal.task]:
-            mistakes.append(f"{at} states the goal {_in_words(goal)} of {literal.task} again.")
-        found[literal.task][goal] = sentence
+        if literal.task not in tasks:
+            part.check_names("task", [literal.task], tasks)
+            continue
+        with part.kept():
+            _add_literal(literal, found[literal.task], part.where)
     return found
 
 
-def _goal(literal: LiteralFields, where: str) -> Goal:
-    """Return the goal that a sentence is for."""
-    slots = _example(literal.task).as_mapping()
-    if literal.when.keys() != slots.keys():
-        given = clip_text(repr(dict(literal.when)), 80)
+def _add_literal(literal: LiteralFields, sentences: dict[Goal, str], where: str) -> None:
+    """Add a sentence to those of its task, by its goal."""
+    goal = _goal(literal, where)
+    if goal in sentences:
         raise InvalidValueError(
-            f"{where} has when = {given}; it must have a value for {' and '.join(slots)}."
+            f"{where} states the goal {in_words(goal)} of {literal.task} again."
+        )
+    sentences[goal] = _sentence(literal.text, where)
+
+
+def _goal(literal: LiteralFields, where: str) -> Goal:
+    """Return the goal that a sentence is for: ``when = {color = "red", repeats = 2}`` as a goal.
+
+    It must have a value of the right type for each slot of the task's goals.
+    """
+    example = _example(literal.task).as_mapping()
+    if literal.when.keys() != example.keys():
+        given = shown(dict(literal.when))
+        raise InvalidValueError(
+            f"{where} has when = {given}; it must have a value for {' and '.join(example)}."
         )
     values: dict[str, SlotValue] = {}
-    for slot, value in slots.items():
-        kind: Any = type(value)
-        if isinstance(value, tuple):
-            kind = tuple[int, ...] if isinstance(value[0], int) else tuple[str, ...]
+    for slot, content in example.items():
+        kind = _kind_of(content)
         values[slot] = converted(literal.when[slot], kind, f"{where}, when.{slot}")
-    return Goal.of(**values)
+    try:
+        return unordered(Goal.of(**values))
+    except ValueError:
+        raise InvalidValueError(
+            f"{where} has when = {shown(values)}; it must have a count for each color."
+        ) from None
+
+
+def _kind_of(content: SlotValue) -> Any:  # noqa: ANN401 - mypy knows no type of a type form
+    """Return the type of what a slot holds: ``str``, ``int``, or a tuple of either."""
+    if not isinstance(content, tuple):
+        return type(content)
+    if isinstance(content[0], int):
+        return tuple[int, ...]
+    return tuple[str, ...]
 
 
 @functools.cache
@@ -92,36 +117,31 @@ def _sentence(text: str, where: str) -> str:
     except ValueError as error:
         raise InvalidValueError(f"{where} {error}.") from None
     if not text.strip() or any(not isinstance(part, TaggedText) for part in parts):
-        raise InvalidValueError(f"{where} has the text {text!r}; it must be a whole sentence.")
+        raise InvalidValueError(f"{where} has the text {shown(text)}; it must be a whole sentence.")
     return text
 
 
-def literal_refusal(request: InstructionRequest, literals: Literals, whose: str) -> str | None:
+def literal_refusal(request: InstructionRequest, words: TaskScenarios) -> str | None:
     """Return why there is no sentence for an episode; None if there is one."""
     goal = request.episode.goal
-    if goal in literals:
+    if unordered(goal) in words.literals:
         return None
-    return f"{whose} has no sentence of {request.task.name} for the goal: {_in_words(goal)}"
+    whose = f"the wording file {request.options.wordings}"
+    return f"{whose} has no sentence of {request.task.name} for the goal: {in_words(goal)}"
 
 
-def _in_words(goal: Goal) -> str:
+def in_words(goal: Goal) -> str:
+    """Return a goal in words, for messages."""
     return describe_goal(goal.as_mapping())
 
 
-def say_literal(request: InstructionRequest, literals: Literals) -> InstructionSpec:
+def say_literal(request: InstructionRequest, words: TaskScenarios) -> InstructionSpec:
     """Return the sentence for an episode; it means every goal of which the file says the same."""
     goal = request.episode.goal
-    sentence = literals[goal]
-    meant = [other for other, words in literals.items() if words == sentence]
-    notes: dict[str, object] = {"command": sentence, "template_slots": sorted(goal.as_mapping())}
+    sentence = words.literals[unordered(goal)]
+    meant: list[Goal] = []
+    for other in dict.fromkeys((goal, *goals_of(request.episode))):
+        if words.literals.get(unordered(other)) == sentence:
+            meant.append(other)
     command = UtteranceSpec("command", plain(sentence))
-    return InstructionSpec((command,), notes, Meaning({}, goals=tuple(meant)))
-
-
-def in_literals(literals: Literals, whose: str) -> Setting:
-    """Return the explicit setting in whole sentences; `whose` says in refusals where from."""
-    return replace(
-        all_settings()[EXPLICIT],
-        say=functools.partial(say_literal, literals=literals),
-        refusal=functools.partial(literal_refusal, literals=literals, whose=whose),
-    )
+    return InstructionSpec((command,), Meaning({}, goals=tuple(meant)), {"command": sentence})

@@ -15,16 +15,18 @@ from collections.abc import Iterator
 from typing import Literal, NamedTuple, Union
 
 from roboirg.language.phrases import TaggedText
+from roboirg.language.scenarios.written import shown
 
 Operation = Literal[
     "same", "rank", "other", "without", "minus", "plus", "double", "half", "earlier", "later",
-    "before", "after", "place", "seen",
+    "before", "after", "neighbor", "place", "seen",
 ]  # fmt: skip
 """How a value follows from what a pointer stands for."""
 
 MOST_LETTERS = 2_000
 """Of a sentence."""
 _NAME = r"(?:rival )?[a-z]+(?:\.\d)?"
+"""A regular expression for a slot: ``color``, ``list.0``, ``rival color``."""
 _SLOT = re.compile(rf"\{{(?P<name>{_NAME})(?::(?P<form>[a-z -]+))?\}}")
 _AGREEMENT = re.compile(rf"\[(?P<controller>{_NAME}): ?(?P<one>[^\[\]|]*)\|(?P<many>[^\[\]|]*)\]")
 _POINTER = re.compile(rf"<(?P<expression>[a-z]+) (?P<of>{_NAME}): (?P<words>[^<>]+)>")
@@ -84,36 +86,47 @@ class Pointer(NamedTuple):
 
 
 def parse(text: object) -> Text:
-    """Return the parts of a sentence.
+    """Return the parts of a sentence: of ``Lift <it color: it>.`` words, a pointer, a stop.
 
     Raises:
         ValueError: it is none, or it has a bracket that is none of the marks.
     """
-    if not isinstance(text, str) or not text.isascii() or not text.isprintable():
-        raise ValueError(f"has the words {text!r}; they must be printable ASCII on one line")
-    if len(text) > MOST_LETTERS:
-        raise ValueError(
-            f"has words of {len(text):,} characters, {text[:40]!r}; at most {MOST_LETTERS:,} are "
-            "one sentence"
-        )
+    sentence = _checked_sentence(text)
     parts: list[Part] = []
     end = 0
-    for mark in (*_MARK.finditer(text), None):
-        between = text[end : mark.start() if mark else None]
-        if _BRACKET.search(between):
-            raise ValueError(
-                f"has a bracket that is no mark in {text!r}; marks are like {{color}}, "
-                "{repeats:lap}, <it color: it> and [repeats: lap|laps]"
-            )
-        if between:
-            parts.append(TaggedText(between))
-        if mark:
-            parts.append(_parsed(mark))
-            end = mark.end()
+    for mark in _MARK.finditer(sentence):
+        parts += _plain_words(sentence, end, mark.start())
+        parts.append(_parsed(mark))
+        end = mark.end()
+    parts += _plain_words(sentence, end, len(sentence))
     return tuple(parts)
 
 
+def _checked_sentence(text: object) -> str:
+    """Return a text as it is if it can be a sentence."""
+    if isinstance(text, str) and len(text) > MOST_LETTERS:
+        raise ValueError(
+            f"has words of {len(text):,} characters, {shown(text)}; at most {MOST_LETTERS:,} are "
+            "one sentence"
+        )
+    if not isinstance(text, str) or not text.isascii() or not text.isprintable():
+        raise ValueError(f"has the words {shown(text)}; they must be printable ASCII on one line")
+    return text
+
+
+def _plain_words(sentence: str, start: int, end: int) -> list[TaggedText]:
+    """Return the words between two marks, if there are any."""
+    words = sentence[start:end]
+    if _BRACKET.search(words):
+        raise ValueError(
+            f"has a bracket that is no mark in {shown(sentence)}; marks are like {{color}}, "
+            "{repeats:lap}, <it color: it> and [repeats: lap|laps]"
+        )
+    return [TaggedText(words)] if words else []
+
+
 def _parsed(mark: re.Match[str]) -> Part:
+    """Return the part of a sentence for a mark that was found in it."""
     if mark["expression"]:
         return Pointer(mark["expression"], mark["of"], mark["words"], parse(mark["words"]))
     if mark["name"]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.word_pools import ROBOMME_NAME
+from roboirg.language.goal_fields import unordered
 from roboirg.language.scenarios.literals import Literals
 from roboirg.tasks.splits.published_episodes import published_goals
 from roboirg.util.short_hash import short_hash
@@ -30,5 +31,5 @@ def check_robomme_name(name: str, task: str, literals: Literals, where: str) -> 
 
 def fingerprint(task: str, literals: Literals) -> str:
     """Return the hash of what sentences say in RoboMME's published episodes of a task."""
-    said = [literals.get(goal, "") for goal in published_goals(task)]
+    said = [literals.get(unordered(goal), "") for goal in published_goals(task)]
     return short_hash("\n".join(said))

@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from collections.abc import Collection, Mapping
+from typing import Any, Literal, get_args
 
 import msgspec
 
@@ -14,13 +14,22 @@ from roboirg.core.episode import Goal
 from roboirg.core.word_pools import PoolName
 from roboirg.language.scenarios.markup import Operation, Text
 
+PatternName = Literal[
+    "color exclusion", "number deduction", "sequential relation", "contextual logic"
+]
+PATTERNS: tuple[PatternName, ...] = get_args(PatternName)
+"""How the goal of a reasoning scenario can follow."""
 Texts = tuple[str, ...]
+Sentences = Mapping[str, tuple[Text, ...]]
+"""By field: one sentence, parsed, or several of which any can be said."""
 PERSON = ("person", "he", "him", "his", "hers")
 """The slots of a person, ``hers`` for *his* or *hers* alone; those of another one end in ``.2``."""
 PEOPLE = frozenset(f"{slot}{number}" for number in ("", ".2") for slot in PERSON)
 """Those of both."""
-REMARKS = ("former", "latter", "not_former", "not_latter")
-"""What a remark of direct-rival points at, and whether it sets that aside."""
+COMMANDS = "commands"
+"""Among the parts of words that a file has itself."""
+REMARKS = ("remarks.former", "remarks.latter", "remarks.not_former", "remarks.not_latter")
+"""The remarks of direct-rival, by what they point at, and whether they set that aside."""
 
 
 class PointerRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"kind": "class"}):
@@ -37,9 +46,7 @@ class PointerRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename
 class Derive(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """How the goal of a reasoning scenario follows: pattern, and the relations that it can say."""
 
-    pattern: Literal[
-        "number deduction", "sequential relation", "color exclusion", "contextual logic"
-    ]
+    pattern: PatternName
     relations: Texts = ()
 
 
@@ -89,7 +96,7 @@ class Scenario(msgspec.Struct, frozen=True):
     """
 
     fields: ScenarioFields
-    texts: Mapping[str, tuple[Text, ...]]
+    texts: Sentences
     people: tuple[Texts, ...]
     said: Texts
 
@@ -118,7 +125,7 @@ class FileFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         literal: the table of each whole sentence.
     """
 
-    tasks: Annotated[Texts, msgspec.Meta(min_length=1)]
+    tasks: Texts = ()
     name: str = ""
     source: str = ""
     scenario: tuple[dict[str, Any], ...] = ()
@@ -136,6 +143,8 @@ class TaskScenarios(msgspec.Struct, frozen=True):
         scenarios: all that are said of it.
         file: the name of the file that has them.
         literals: whole sentences, which explicit says instead of a command.
+        own: what the file has itself: fields of `stated`, and `COMMANDS`. The rest is of the file
+            that the task names.
     """
 
     commands: Mapping[PoolName, Texts]
@@ -143,3 +152,4 @@ class TaskScenarios(msgspec.Struct, frozen=True):
     scenarios: list[Scenario]
     file: str
     literals: Mapping[Goal, str] = {}
+    own: Collection[str] = ()

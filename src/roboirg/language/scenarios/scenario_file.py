@@ -1,36 +1,51 @@
-"""Read the data files of language 4; every mistake of a file is named by scenario and field."""
+"""Read the data files of words; every mistake of a file is named by scenario and field."""
 
 from __future__ import annotations
 
 import functools
-import itertools
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-import msgspec
-
-from roboirg.core.errors import InvalidValueError, check_names
+from roboirg.core.episode import SUITES
+from roboirg.core.errors import InvalidValueError
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.core.word_pools import POOLS, PoolName
 from roboirg.language.phrases import TaggedText
 from roboirg.language.request import AMOUNT_FIELD
-from roboirg.language.scenarios.amounts import SLOTS
 from roboirg.language.scenarios.literals import Literals, read_literals
-from roboirg.language.scenarios.markup import Pointer, Text, parse, slots_in
+from roboirg.language.scenarios.markup import (
+    Part,
+    Pointer,
+    Slot,
+    Text,
+    parse,
+    pointers_in,
+    slots_in,
+)
+from roboirg.language.scenarios.relations import EVERY_RELATION
 from roboirg.language.scenarios.scenario import (
+    COMMANDS,
     PEOPLE,
-    REMARKS,
     FileFields,
     General,
     PointerRow,
     Scenario,
     ScenarioFields,
+    Sentences,
     TaskScenarios,
     Texts,
 )
-from roboirg.language.scenarios.written import converted, data_of, text_of
+from roboirg.language.scenarios.scenario_needs import check_needs, sentence_names, slots_of
+from roboirg.language.scenarios.written import (
+    Mistakes,
+    converted,
+    data_of,
+    fields_of,
+    shown,
+    text_of,
+)
 from roboirg.language.settings import all_settings
 from roboirg.language.settings.setting import Setting
 from roboirg.tasks import Task, all_tasks, every_task
@@ -40,15 +55,15 @@ ALL = "all"
 """Instead of a task: for all tasks of a file."""
 PRONOUNS = {"he": ("he", "him", "his", "his"), "she": ("she", "her", "her", "hers")}
 GIVEN = frozenset(
-    {"list", "list.0", "list.1", "list.2", "rank", "reference", "step", "taken"}
-    | {"place", "place.0", "place.1", "clue", "clue.0", "clue.1", "aside.0", "aside.1", "rest"}
-    | {"kept", "excluded", "excluded.0", "excluded.1"}
-    | PEOPLE
-)
+    {
+        "list", "list.0", "list.1", "list.2", "rank", "reference", "step", "taken",
+        "place", "place.0", "place.1", "clue", "clue.0", "clue.1", "beside", "counted",
+        "aside.0", "aside.1", "rest", "kept", "excluded", "excluded.0", "excluded.1", *PEOPLE,
+    }
+)  # fmt: skip
 """Slots that are no fields of the goal."""
-_CONTEXTUAL = ("reinforcement", "distractors", "competing", "cue")
-SENTENCES = frozenset({"introduction", *_CONTEXTUAL, "lead", "say", "resolved", "remarks"})
-"""The fields that hold sentences."""
+_SEVERAL = ("say.", "remarks.", "distractors", "competing")
+"""The fields of which each sentence may be a list of alternatives."""
 
 
 @functools.cache
@@ -71,14 +86,13 @@ def _shared(name: str) -> dict[str, Any]:
 @functools.cache
 def task_scenarios(task: str) -> TaskScenarios | None:
     """Return the words of a task; None if none have been written."""
-    path = own_file(task)
-    return read_scenario_file(path).get(task) if path else None
+    return _words_of(every_task().get(task)).get(task)
 
 
 def written_words() -> Mapping[str, TaskScenarios]:
-    """Return the words of each of our tasks that has some."""
+    """Return the words of each of our tasks that has some, the real robot's included."""
     found: dict[str, TaskScenarios] = {}
-    for task in all_tasks():
+    for task in all_tasks(SUITES):
         words = task_scenarios(task)
         if words is not None:
             found[task] = words
@@ -88,7 +102,12 @@ def written_words() -> Mapping[str, TaskScenarios]:
 @functools.cache
 def setting_scenarios(setting: str) -> Mapping[str, TaskScenarios]:
     """Return the words of each task that a setting's own file serves; empty if it names none."""
-    path = _named_file(all_settings().get(setting))
+    return _words_of(all_settings().get(setting))
+
+
+def _words_of(owner: Task | Setting | None) -> Mapping[str, TaskScenarios]:
+    """Return what the file that a task or setting names for its words has for each task."""
+    path = _named_file(owner)
     return read_scenario_file(path) if path else {}
 
 
@@ -98,11 +117,6 @@ def words_in(setting: str, task: str) -> TaskScenarios | None:
     They stand in the setting's own file if it serves the task, and else in the task's file.
     """
     return setting_scenarios(setting).get(task) or task_scenarios(task)
-
-
-def own_file(task: str) -> Path | None:
-    """Return the file that a task names for its words; None if it names none."""
-    return _named_file(every_task().get(task))
 
 
 def _named_file(owner: Task | Setting | None) -> Path | None:
@@ -118,19 +132,19 @@ def _named_file(owner: Task | Setting | None) -> Path | None:
     return path
 
 
-def scenario_settings() -> Mapping[str, Setting]:
-    """Return the settings that scenarios are written for; contextual says those of direct."""
-    others = ("", "explicit", "contextual")
-    return {one.name: one for one in all_settings().values() if one.offers not in others}
-
-
 def read_task_scenarios(text: str, where: str) -> Mapping[str, TaskScenarios]:
     """Return the words of each task that a file serves; `where` names the file in complaints.
 
     Raises:
         InvalidValueError: it is not as `docs/add-scenario.md` says; a line for each mistake.
     """
-    return tasks_in(read_head(text, where), where)
+    head = read_head(text, where)
+    if head.name or head.literal:
+        raise InvalidValueError(
+            f"{where} has a name or a [[literal]], which only wording files have; remove it from "
+            "the file of a task or setting."
+        )
+    return tasks_in(head, where)
 
 
 # Cached: each task that a file serves asks for its head.
@@ -145,14 +159,12 @@ def read_head(text: str, where: str) -> FileFields:
                 "[commands], and import RoboMME's sentences again with `roboirg language "
                 "import-robomme`."
             )
-    check_names(f"key of {where} named", data, FileFields.__struct_fields__)
-    if "tasks" not in data:
+    mistakes = Mistakes(where)
+    head = fields_of(data, FileFields, mistakes)
+    mistakes.refuse()
+    if head is None or not head.tasks:
         raise InvalidValueError(f'{where} has no tasks; add a line such as tasks = ["PickXtimes"].')
-    fields: dict[str, Any] = {}
-    for field in msgspec.structs.fields(FileFields):
-        if field.name in data:
-            fields[field.name] = converted(data[field.name], field.type, f"{where}, {field.name}")
-    return FileFields(**fields)
+    return head
 
 
 def tasks_in(head: FileFields, where: str) -> Mapping[str, TaskScenarios]:
@@ -160,263 +172,386 @@ def tasks_in(head: FileFields, where: str) -> Mapping[str, TaskScenarios]:
 
     A task for which it has no commands has those of its own file; so does each stated value.
     """
-    check_names(f"task of {where} named", head.tasks, every_task())
-    check_names(f"task of {where} named", [*head.commands, *head.stated], (*head.tasks, ALL))
-    mistakes: list[str] = []
-    literals = read_literals(head.literal, head.tasks, where, mistakes)
-    words = {
-        task: _command_words(head, task, literals[task], where, mistakes) for task in head.tasks
-    }
-    stated = dict[str, Text]()
-    for of_task in words.values():
-        stated |= of_task.stated
-    usual: dict[str, Any] = {"pool": None} if head.name else {}
-    scenarios = [
-        _scenario(usual | one, stated, f"{where}, scenario {one.get('frame', number)!r}", mistakes)
-        for number, one in enumerate(head.scenario, 1)
-    ]
-    seen: set[str] = set()
-    for one in head.scenario:
-        frame, setting, pool = one.get("frame"), one.get("setting"), one.get("pool", "both pools")
-        name = f"{where} has the frame {frame!r} twice in the setting {setting}, {pool}."
-        if name in seen and None not in (frame, setting):
-            mistakes.append(name)
-        seen.add(name)
-    if mistakes:
-        # A sentence that serves several pools or tasks is read for each of them.
-        raise InvalidValueError("\n".join(dict.fromkeys(mistakes)))
-    for scenario in filter(None, scenarios):
-        needed = scenario.fields.needs.tasks
-        kind = f"task of {where}, scenario {scenario.fields.frame!r}, needs.tasks, named"
-        check_names(kind, needed, head.tasks)
-        for task in needed or head.tasks:
-            words[task].scenarios.append(scenario)
+    mistakes = Mistakes(where)
+    mistakes.check_names("task", head.tasks, every_task())
+    mistakes.check_names("task", [*head.commands, *head.stated], (*head.tasks, ALL))
+    mistakes.refuse()
+    literals = read_literals(head.literal, head.tasks, mistakes)
+    mistakes.refuse()  # without its sentences a task would seem to lack commands
+    words: dict[str, TaskScenarios] = {}
+    for task in head.tasks:
+        words[task] = _command_words(head, task, literals[task], mistakes)
+    _check_stated(head, words, mistakes)
+    _add_scenarios(head, words, mistakes)
+    mistakes.refuse()
     return words
 
 
-def _command_words(
-    head: FileFields, task: str, literals: Literals, where: str, mistakes: list[str]
-) -> TaskScenarios:
-    """Return the words of a task without scenarios: its commands, and the values they state."""
-    path = own_file(task)
-    own = read_head(text_of(path), path.name) if path else head
-    texts: dict[str, str] = {}
-    for known in (own, head):
-        texts |= {**known.stated.get(ALL, {}), **known.stated.get(task, {})}
-    stated = {
-        name: _sentence(text, "", texts, f"{where}, stated", mistakes)
-        for name, text in texts.items()
-    }
-    written = _commands(head, task) or _commands(own, task)
-    # Whole sentences need no commands: a task without words of ours may have nothing else.
-    for pool in POOLS if written or not literals else ():
-        if not written.get(pool):
-            mistakes.append(f"{where} has no commands of {task} in the pool {pool}.")
-        for command in written.get(pool, ()):
-            _sentence(command, "", texts, f"{where}, commands of {task}", mistakes)
-    return TaskScenarios(written, stated, [], where, literals)
+def _check_stated(head: FileFields, words: Mapping[str, TaskScenarios], mistakes: Mistakes) -> None:
+    """Check that a file states values of fields that its tasks have."""
+    for owner, texts in head.stated.items():
+        known = words[owner].stated if owner in words else _stated_in(words)
+        mistakes.at(f"stated.{owner}").check_names("field", texts, known)
 
 
-def _commands(head: FileFields, task: str) -> dict[PoolName, Texts]:
-    """Return the commands of a task by pool, as a file has them."""
-    found: dict[PoolName, Texts] = {}
-    for name in (ALL, task):
-        commands = head.commands.get(name, {})
-        if isinstance(commands, tuple):
-            commands = dict.fromkeys(POOLS, commands)
-        found |= commands
+def _add_scenarios(
+    head: FileFields, words: Mapping[str, TaskScenarios], mistakes: Mistakes
+) -> None:
+    """Add the scenarios of a file to the words of each task that they serve."""
+    for scenario in _scenarios(head, _stated_in(words), mistakes):
+        served = scenario.fields.needs.tasks or head.tasks
+        for task, task_words in words.items():
+            if task in served:
+                task_words.scenarios.append(scenario)
+
+
+def _stated_in(words: Mapping[str, TaskScenarios]) -> dict[str, Text]:
+    """Return what states each field in any of some tasks."""
+    stated: dict[str, Text] = {}
+    for task_words in words.values():
+        stated |= task_words.stated
+    return stated
+
+
+def _of_task(tables: Mapping[str, Any], task: str) -> dict[Any, Any]:
+    """Return what a file has for a task, by its name or for all tasks; its own entries win.
+
+    A list is for both pools: ``["Lift it."]`` becomes ``{"train": […], "test": […]}``.
+    """
+    found: dict[Any, Any] = {}
+    for owner in (ALL, task):
+        table = tables.get(owner, {})
+        if isinstance(table, tuple):
+            table = dict.fromkeys(POOLS, table)
+        found |= table
     return found
 
 
+def _command_words(
+    head: FileFields, task: str, literals: Literals, mistakes: Mistakes
+) -> TaskScenarios:
+    """Return the words of a task but its scenarios: commands, and words that state values.
+
+    What the file lacks is taken from the file that the task names for its words.
+    """
+    path = _named_file(every_task().get(task))
+    task_head = head
+    if path is not None:
+        task_head = read_head(text_of(path), path.name)
+
+    own_stated = _of_task(head.stated, task)
+    stated = _stated_texts(_of_task(task_head.stated, task), own_stated, mistakes)
+    parts = list(own_stated)
+    commands = _of_task(task_head.commands, task)
+    if ALL in head.commands or task in head.commands:
+        commands = _of_task(head.commands, task)
+        parts.append(COMMANDS)
+    # Whole sentences need no commands: a task without words of ours may have nothing else.
+    if COMMANDS in parts or commands or not literals:
+        _check_commands(commands, task, stated, mistakes)
+    return TaskScenarios(commands, stated, [], mistakes.where, literals, parts)
+
+
+def _stated_texts(
+    usual: Mapping[str, str], own: Mapping[str, str], mistakes: Mistakes
+) -> dict[str, Text]:
+    """Return the words that state each field of a task: a file's own, or else the usual ones."""
+    stated: dict[str, Text] = {}
+    for name, usual_text in usual.items():
+        part = mistakes.at(f"stated {name}")
+        text = _parsed(own.get(name, usual_text), part)
+        slot = "amounts" if name == AMOUNT_FIELD else name
+        other_slots = set(slots_in(text)) - {slot}  # it may say its own value only
+        if other_slots or any(pointers_in(text)):
+            part.add(f"has other marks than those of {{{slot}}}")
+        stated[name] = text
+    return stated
+
+
+def _check_commands(
+    commands: Mapping[PoolName, Texts], task: str, stated: Collection[str], mistakes: Mistakes
+) -> None:
+    """Check that each pool has commands, with no marks but values that are stated."""
+    part = mistakes.at(f"commands of {task}")
+    for pool in POOLS:
+        texts = commands.get(pool, ())
+        if not texts:
+            mistakes.add(f"has no commands of {task} in the pool {pool}")
+        for text in texts:
+            _check_command(text, stated, part)
+
+
+def _check_command(text: str, stated: Collection[str], mistakes: Mistakes) -> None:
+    """Check that a command has no marks but values that are stated: ``{color}``."""
+    for mark in _parsed(text, mistakes):
+        is_plain = isinstance(mark, TaggedText)
+        is_value = isinstance(mark, Slot) and mark.form is None and mark.name in stated
+        if not is_plain and not is_value:
+            names = " and ".join(f"{{{name}}}" for name in stated)
+            mistakes.add(f"has other marks than {names}: {shown(text)}")
+
+
+def _scenarios(head: FileFields, stated: Collection[str], mistakes: Mistakes) -> Iterator[Scenario]:
+    """Yield the scenarios of a file whose fields are right; each mistake is added.
+
+    A frame, which is the name of a scenario, may be there once for each setting and pool.
+    """
+    taken: dict[str, set[str]] = {}  # by frame: the settings with pools that have it
+    # In files of users, which have a name, a scenario without a pool is for both.
+    usual: dict[str, Any] = {"pool": None} if head.name else {}
+    for number, table in enumerate(head.scenario, 1):
+        part = mistakes.at(f"scenario {shown(table.get('frame', number))}")
+        scenario = _scenario(usual | table, stated, part)
+        if scenario is None:
+            continue
+        part.at("needs.tasks").check_names("task", scenario.fields.needs.tasks, head.tasks)
+        before = taken.setdefault(scenario.fields.frame, set())
+        settings = _settings_of(scenario)
+        if settings & before:
+            part.add(f"stands twice in the setting {min(settings & before)}")
+        before |= settings
+        yield scenario
+
+
+def _settings_of(scenario: Scenario) -> set[str]:
+    """Return the setting of a scenario with each of its pools: ``direct, train``."""
+    fields = scenario.fields
+    pools = POOLS if fields.pool is None else (fields.pool,)
+    return {f"{fields.setting}, {pool}" for pool in pools}
+
+
 def _scenario(
-    written: Mapping[str, Any], stated: Collection[str], where: str, mistakes: list[str]
+    table: Mapping[str, Any], stated: Collection[str], mistakes: Mistakes
 ) -> Scenario | None:
-    """Return a scenario; None if the file has mistakes, to which those of the scenario are added.
+    """Return a scenario; None if a field has a mistake. Each mistake is added.
 
     What its fields need of each other is checked once each of them is right.
     """
-    fields = _fields(written, where, mistakes)
-    listed = str(written.get("list", ""))
-    sentences = {name: written[name] for name in written if name in SENTENCES}
-    texts: dict[str, tuple[Text, ...]] = {}
-    for name, value in _flat(sentences):
-        several = value if isinstance(value, list) else [value]
-        at = f"{where}, {name}"
-        texts[name] = tuple(_sentence(one, listed, stated, at, mistakes) for one in several)
-    said = tuple(sorted(name.removeprefix("say.") for name in texts if name.startswith("say.")))
-    if fields is not None:
-        for name in (fields.frame, *itertools.chain(*(fields.people or {}).values())):
-            _parsed(name, f"{where}, frame or people", mistakes)
-        mistakes += [f"{where} {one}." for one in _unmet(fields, texts, said, stated)]
-    if fields is None or mistakes:
+    flat = _flat_table(table)
+    fields = fields_of(flat, ScenarioFields, mistakes, sentence_names(stated))
+    texts = _sentences(flat, fields, stated, mistakes)
+    if fields is None:
         return None
-    return Scenario(fields, texts, _people(fields, texts), said)
+    _check_names(fields, mistakes.at("frame or people"))
+    said = tuple(name for name in sorted(stated) if f"say.{name}" in texts)
+    scenario = Scenario(fields, texts, _people(fields, texts), said)
+    check_needs(scenario, stated, mistakes)
+    return scenario
 
 
-def _people(
-    fields: ScenarioFields, texts: Mapping[str, tuple[Text, ...]]
-) -> tuple[tuple[str, ...], ...]:
-    """Return who can be spoken of, each with his or her pronouns, if the sentences speak of any."""
-    said = (name for several in texts.values() for text in several for name in slots_in(text))
+def _check_names(fields: ScenarioFields, mistakes: Mistakes) -> None:
+    """Check that the frame and the people of a scenario are plain words."""
+    _parsed(fields.frame, mistakes)
+    for names in (fields.people or {}).values():
+        for name in names:
+            _parsed(name, mistakes)
+
+
+def _flat_table(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a scenario's table with the sentences of inner tables by full name, ``say.color``."""
+    flat: dict[str, Any] = {}
+    for name, value in table.items():
+        if name in ScenarioFields.__struct_fields__:
+            flat[name] = value
+        else:
+            flat.update(_flat(value, name))
+    return flat
+
+
+def _sentences(
+    flat: Mapping[str, Any],
+    fields: ScenarioFields | None,
+    stated: Collection[str],
+    mistakes: Mistakes,
+) -> Sentences:
+    """Return the sentences of a scenario by field, such as ``say.color``; mistakes are added.
+
+    `flat` has the scenario's table with full names, and `stated` the fields of the task's commands.
+    """
+    reader = _SentenceReader(str(flat.get("list", "")), _operations(fields), _known_slots(stated))
+    texts: dict[str, tuple[Text, ...]] = {}
+    names = sentence_names(stated)
+    for name, value in flat.items():
+        if name not in names:
+            continue
+        alternatives = [value]  # most fields have one sentence only
+        if isinstance(value, list) and name.startswith(_SEVERAL):
+            alternatives = value
+        part = mistakes.at(name)
+        texts[name] = tuple(reader.read(text, part) for text in alternatives)
+    return texts
+
+
+def _operations(fields: ScenarioFields | None) -> set[str]:
+    """Return the operations of the relations that a scenario can say."""
+    found: set[str] = set()
+    if fields is not None and fields.derive is not None:
+        for name in fields.derive.relations:
+            if name in EVERY_RELATION:
+                found.add(EVERY_RELATION[name].operation)
+    return found
+
+
+def _people(fields: ScenarioFields, texts: Sentences) -> tuple[Texts, ...]:
+    """Return who can be spoken of, with pronouns: ``("Leo", "he", "him", "his", "his")``.
+
+    Empty if no sentence speaks of a person.
+    """
+    said: set[str] = set()
+    for alternatives in texts.values():
+        for text in alternatives:
+            said.update(slots_in(text))
     if PEOPLE.isdisjoint(said):
         return ()
-    people = fields.people or general().people
-    return tuple((name, *PRONOUNS[one]) for one, names in people.items() for name in names)
+    people: list[Texts] = []
+    for pronoun, names in (fields.people or general().people).items():
+        for name in names:
+            people.append((name, *PRONOUNS[pronoun]))
+    return tuple(people)
 
 
-def _fields(written: Mapping[str, Any], where: str, mistakes: list[str]) -> ScenarioFields | None:
-    """Return what a scenario has besides sentences; None if it has mistakes."""
-    before, found = len(mistakes), dict[str, Any]()
-    for one in msgspec.structs.fields(ScenarioFields):
-        if one.required and one.name not in written:
-            mistakes.append(f"{where} has no {one.name}.")
-        elif one.name in written:
-            try:
-                found[one.name] = converted(written[one.name], one.type, f"{where}, {one.name}")
-            except InvalidValueError as error:
-                mistakes.append(str(error))
-    known = SENTENCES.union(ScenarioFields.__struct_fields__)
-    mistakes += [
-        f"{where} has the field {name!r}; the fields are {', '.join(sorted(known))}."
-        for name in written
-        if name not in known
-    ]
-    return ScenarioFields(**found) if len(mistakes) == before else None
-
-
-def _unmet(
-    fields: ScenarioFields,
-    texts: Mapping[str, tuple[Text, ...]],
-    said: Texts,
-    stated: Collection[str],
-) -> list[str]:
-    """Return what the fields of a scenario need of each other and do not have."""
-    settings = scenario_settings()
-    if fields.setting not in settings:
-        return [f"has the setting {fields.setting!r}; the settings are {', '.join(settings)}"]
-    offers = settings[fields.setting].offers
-    needed = ["introduction", *(_CONTEXTUAL if fields.setting == "direct" else ())]
-    if offers == "direct-rival":
-        needed += [f"remarks.{name}" for name in REMARKS]
-    lacking = [name for name in needed if not any(texts.get(name, ()))]
-    unknown = sorted(set(said) - set(stated))
-    slots = _slots(stated)
-    wrong = {
-        f"has no say; write say.{' or say.'.join(stated)}": not said,
-        f"has say.{', say.'.join(unknown)}; the fields are {', '.join(stated)}": unknown,
-        f"has no {' and no '.join(lacking)}; {fields.setting} needs {', '.join(needed)}": lacking,
-        "must have derive if its setting is reasoning, and only then": (
-            (fields.derive is not None) != (offers == "reasoning")
-        ),
-        "has a competing remark that names no {rival …}": not all(
-            any(name.startswith("rival ") for name in slots_in(one))
-            for one in texts.get("competing", ())
-        ),
-        "has a single person; another one must be possible": (
-            sum(map(len, (fields.people or {}).values())) == 1
-        ),
-        f"has a list of {fields.list!r}; the slots are {', '.join(sorted(slots))}": (
-            fields.list and fields.list not in slots
-        ),
-    }
-    return [complaint for complaint, holds in wrong.items() if holds]
-
-
-def _slots(stated: Collection[str]) -> set[str]:
-    """Return the slots of a task, and its fields: ``colors`` and ``colors.0``."""
-    if AMOUNT_FIELD in stated:
-        return {*SLOTS, *stated}
-    return {*stated, *(name.partition(".")[0] for name in stated)}
-
-
-def _sentence(
-    text: object, listed: str, stated: Collection[str], where: str, mistakes: list[str]
-) -> Text:
-    """Return a sentence, with the rows of the closed table for what points back."""
-    parts = _parsed(text, where, mistakes)
-    slots = _slots(stated)
+def _known_slots(stated: Collection[str]) -> frozenset[str]:
+    """Return the slots of which sentences can speak."""
+    slots = slots_of(stated)
     rivals = {f"rival {name}" for name in slots if name.isalpha() and name != AMOUNT_FIELD}
-    known = GIVEN | slots | rivals
-    mistakes += [
-        f"{where} has the slot {name!r}; known: {', '.join(sorted(known))}."
-        for name in slots_in(parts)
-        if name not in known
-    ]
-    said = re.sub(r"<[^:<>]+: ", "<", str(text))  # as the table has it: without class and slot
-    return tuple(
-        _pointing(one, said, type_of(one.of, listed), where, mistakes)
-        if isinstance(one, Pointer)
-        else one
-        for one in parts
-    )
+    return GIVEN | slots | rivals
 
 
 @functools.cache
 def _pattern(words: str) -> re.Pattern[str]:
-    """Return a pattern for the words of a row of the table, with any noun for ``*``."""
-    return re.compile(re.escape(words).replace(r"\*", "[a-z]+"))
+    """Return a pattern for the words of a row of the table, with any noun for ``*``.
+
+    ``**`` is any words.
+    """
+    any_words = "[A-Za-z{}' ]+"
+    any_noun = "[a-z]+"
+    pattern = re.escape(words).replace(r"\*\*", any_words).replace(r"\*", any_noun)
+    return re.compile(pattern)
 
 
 def _is_said(row: PointerRow, words: str, sentence: str) -> bool:
-    """Return whether a row of the table is for the words of a pointer."""
-    if "<" in row.words:  # with the words around them
+    """Return whether a row of the table is for the words of a pointer.
+
+    The words of a row may stand in others, ``of <those>``: then the sentence must have these as
+    well.
+    """
+    if "<" in row.words:
         return f"<{words}>" in row.words and _pattern(row.words).search(sentence) is not None
     return _pattern(row.words).fullmatch(words) is not None
 
 
-def _pointing(pointer: Pointer, said: str, kind: str, where: str, mistakes: list[str]) -> Pointer:
-    """Return a pointer with what its row says."""
-    words = pointer.words
-    of_kind = [row for row in pointer_table() if kind in row.of]
-    rows = [row for row in of_kind if _is_said(row, words, said)]
-    rows.sort(key=lambda row: "<" not in row.words)  # with the words around them first
-    row = next((row for row in rows if row.kind == pointer.expression), None)
-    if row is None:
-        found = f"{where} has the pointer <{pointer.expression} {pointer.of}: {words}>"
-        classes = " or ".join(dict.fromkeys(repr(one.kind) for one in rows))
-        known = "; ".join(_written(one, pointer.of) for one in of_kind) or "none"
-        mistakes.append(
-            f"{found} of the class {pointer.expression!r}; in pointers.toml the words {words!r} "
-            f"have the class {classes} for a {kind}."
-            if rows
-            else f"{found}, which is not in pointers.toml; for a {kind} there are: {known}."
-        )
+class _SentenceReader(NamedTuple):
+    """Reads the sentences of a scenario.
+
+    Attributes:
+        listed: the slot of which the scenario introduces a list; empty if it does not.
+        operations: those of the relations that it can say.
+        slots: of which its sentences can speak.
+    """
+
+    listed: str
+    operations: Collection[str]
+    slots: Collection[str]
+
+    def read(self, text: object, mistakes: Mistakes) -> Text:
+        """Return a sentence, with the rows of the closed table for what points back."""
+        parts = _parsed(text, mistakes)
+        mistakes.check_names("slot", slots_in(parts), self.slots)
+        sentence: list[Part] = []
+        for part in parts:
+            if isinstance(part, Pointer):
+                sentence.append(self._pointing(part, str(text), mistakes))
+            else:
+                sentence.append(part)
+        return tuple(sentence)
+
+    def _pointing(self, pointer: Pointer, sentence: str, mistakes: Mistakes) -> Pointer:
+        """Return a pointer of a sentence with what its row in the table of pointers says.
+
+        Of rows for the same words, such as *that one*, that of the scenario's relations is taken:
+        *one earlier* or *one later*. Without a row of its class, the mistake is added.
+        """
+        kind = type_of(pointer.of, self.listed)
+        said = re.sub(r"<[^:<>]+: ", "<", sentence)  # as the table has it: without class and slot
+        rows = [row for row in _rows_of(kind) if _is_said(row, pointer.words, said)]
+        # False comes before True, and the second order counts more than the first.
+        rows.sort(key=lambda row: row.operation not in self.operations)
+        rows.sort(key=lambda row: "<" not in row.words)  # with the words around them first
+        for row in rows:
+            if row.kind == pointer.expression:
+                return pointer._replace(resolved=parse(row.resolved), operation=row.operation)
+        mistakes.add(_wrong_pointer(pointer, sentence, kind, rows))
         return pointer
-    return pointer._replace(resolved=parse(row.resolved), operation=row.operation)
+
+
+def _rows_of(kind: str) -> list[PointerRow]:
+    """Return the rows of the table that point back at a type of value."""
+    return [row for row in pointer_table() if kind in row.of]
+
+
+def _wrong_pointer(pointer: Pointer, sentence: str, kind: str, rows: Sequence[PointerRow]) -> str:
+    """Return the complaint about a pointer: its words have another class, or no row at all.
+
+    Args:
+        pointer: as written.
+        sentence: that has it.
+        kind: the type of what it stands for.
+        rows: those for its words, of other classes.
+    """
+    found = f"has the pointer <{pointer.expression} {pointer.of}: {pointer.words}>"
+    if rows:
+        classes = " or ".join(dict.fromkeys(repr(row.kind) for row in rows))
+        return f"{found}; in pointers.toml these words have the class {classes} for a {kind}"
+    import difflib  # here, because only a mistake needs it
+
+    known = {_written(row, pointer.of) for row in _rows_of(kind)}
+    nearest = difflib.get_close_matches(sentence, known, n=5, cutoff=0)
+    return (
+        f"{found}, which does not exist; the nearest for a {kind}: "
+        f"{'; '.join(nearest) or 'none'} (* is any noun); docs/scenario-marks.md has all"
+    )
 
 
 def _written(row: PointerRow, of: str) -> str:
     """Return a row of the table as authors write it, with class and slot."""
     begun = f"<{row.kind} {of}: "
-    return row.words.replace("<", begun) if "<" in row.words else f"{begun}{row.words}>"
+    if "<" in row.words:
+        return row.words.replace("<", begun)
+    return f"{begun}{row.words}>"
 
 
 def type_of(name: str, listed: str = "") -> str:
-    """Return the type of what a slot stands for, as in ``of`` of the table of pointers."""
+    """Return the type of what a slot stands for, as in ``of`` of the table of pointers.
+
+    ``repeats`` gives ``number`` and ``list`` gives ``pair``; ``list.0`` and ``taken`` have the type
+    of what is listed.
+    """
     base, _, number = name.partition(".")
-    several = {"list": "pair", "colors": "colors"}
-    if base in several and not number:
-        return several[base]
-    base = (listed or "color") if base in ("list", "taken") else base
+    if not number and base == "list":
+        return "pair"
+    if not number and base == "colors":
+        return "colors"
+    if base in ("list", "taken"):
+        base = listed or "color"
     return SLOT_TYPE_NAMES.get(base, base)
 
 
-def _flat(table: object, prefix: str = "") -> Iterator[tuple[str, object]]:
+def _flat(value: object, name: str) -> Iterator[tuple[str, object]]:
     """Yield the entries of a table whose keys may hold dots: ``colors.0`` is one."""
-    if not isinstance(table, dict):
-        yield prefix, table
+    if not isinstance(value, dict) or not value:
+        yield name, value
         return
-    for name, value in table.items():
-        yield from _flat(value, f"{prefix}.{name}" if prefix else name)
+    for key, inner in value.items():
+        yield from _flat(inner, f"{name}.{key}")
 
 
-def _parsed(text: object, where: str, mistakes: list[str]) -> Text:
+def _parsed(text: object, mistakes: Mistakes) -> Text:
     """Return the parts of a sentence; of one with a mistake, which is added, the words."""
     try:
         return parse(text)
     except ValueError as error:
-        mistakes.append(f"{where} {error}.")
-        return (TaggedText(str(text)),)
+        mistakes.add(str(error))
+        return (TaggedText(shown(text)),)
 
 
 def read_scenario_file(path: Path) -> Mapping[str, TaskScenarios]:

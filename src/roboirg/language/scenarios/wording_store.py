@@ -13,8 +13,8 @@ from msgspec.structs import replace
 
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.word_pools import POOLS, outside_words
-from roboirg.language.scenarios.scenario import TaskScenarios
-from roboirg.language.scenarios.scenario_file import setting_scenarios, task_scenarios, words_in
+from roboirg.language.scenarios.scenario import COMMANDS, TaskScenarios
+from roboirg.language.scenarios.scenario_file import words_in
 from roboirg.language.scenarios.wording_file import Wordings, read_wordings
 
 _OPEN: dict[str, Wordings] = {}
@@ -30,13 +30,15 @@ def open_wordings(path: str | Path | None, identity: str | None = None) -> str |
         identity: the wordings that are wanted; None for those of the file.
     """
     if identity in _OPEN:
-        return identity
+        return identity  # it is open already, whatever the path
+    # A pool of our own words needs no file.
     if path in POOLS or identity in POOLS:
         return str(identity or path)
     if path is None:
         if identity is not None:
             raise InvalidValueError(f"The wordings {identity} need their file; none was given.")
         return None
+    # The path may also be the identity of wordings that are open.
     wordings = _OPEN.get(str(path)) or read_wordings(path)
     if identity not in (None, wordings.identity):
         raise InvalidValueError(
@@ -64,23 +66,36 @@ def find_wordings(identity: str) -> Wordings:
 def task_words(task: str, setting: str, wordings: str | None) -> TaskScenarios | None:
     """Return what is said of a task in a setting; None if nothing has been written.
 
+    A wording file comes before the file of a setting, and this one before the file of the task.
+
     Args:
         task: its name.
-        setting: its name; a setting whose own file serves the task says nothing else.
+        setting: its name.
         wordings: the identity of open wordings; None, or a pool, for our own words.
     """
     identity = outside_words(wordings)
-    if identity is None or task in setting_scenarios(setting):
+    if identity is None:
         return words_in(setting, task)
-    return _with_ours(task, identity)
+    return _with_ours(task, setting, identity)
 
 
 @functools.cache
-def _with_ours(task: str, identity: str) -> TaskScenarios | None:
-    """Return the words of a wording file, with our scenarios in the settings where it has none."""
-    ours, theirs = task_scenarios(task), find_wordings(identity).tasks.get(task)
+def _with_ours(task: str, setting: str, identity: str) -> TaskScenarios | None:
+    """Return the words of a wording file for a task, with ours where the file has none.
+
+    That goes for the commands as a whole, for each stated field, and for the scenarios of each
+    setting.
+    """
+    ours = words_in(setting, task)
+    theirs = find_wordings(identity).tasks.get(task)
     if ours is None or theirs is None:
         return theirs
-    settings = {scenario.fields.setting for scenario in theirs.scenarios}
-    others = [one for one in ours.scenarios if one.fields.setting not in settings]
-    return replace(theirs, scenarios=[*theirs.scenarios, *others])
+    commands = theirs.commands if COMMANDS in theirs.own else ours.commands
+    own_stated = {field: text for field, text in theirs.stated.items() if field in theirs.own}
+    stated = {**ours.stated, **own_stated}
+    their_settings = {scenario.fields.setting for scenario in theirs.scenarios}
+    scenarios = list(theirs.scenarios)
+    for scenario in ours.scenarios:
+        if scenario.fields.setting not in their_settings:
+            scenarios.append(scenario)
+    return replace(theirs, commands=commands, stated=stated, scenarios=scenarios)

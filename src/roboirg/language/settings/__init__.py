@@ -40,7 +40,8 @@ longer be compared. A new setting may refuse some of these episodes instead.
 def all_settings() -> Mapping[str, Setting]:
     """Return every setting by name, explicit first."""
     found = discover(sys.modules[__name__], "SETTING", Setting, "roboirg.settings")
-    return {one.name: one for one in sorted(found, key=lambda one: (one.order, one.name))}
+    in_order = sorted(found, key=lambda setting: (setting.order, setting.name))
+    return {setting.name: setting for setting in in_order}
 
 
 def setting_names() -> tuple[str, ...]:
@@ -60,9 +61,14 @@ SETTING_GROUPS = {"all": plain_settings, "every": setting_names}
 
 def expand_settings(words: Iterable[str]) -> tuple[str, ...]:
     """Return words with those of `SETTING_GROUPS` replaced, each once, the replaced ones first."""
-    in_turn = sorted(words, key=lambda word: word.lower() not in SETTING_GROUPS)
-    groups = (SETTING_GROUPS.get(word.lower(), lambda word=word: (word,)) for word in in_turn)
-    return tuple(dict.fromkeys(name for group in groups for name in group()))
+    names: list[str] = []
+    others: list[str] = []
+    for word in words:
+        if word.lower() in SETTING_GROUPS:
+            names += SETTING_GROUPS[word.lower()]()
+        else:
+            others.append(word)
+    return tuple(dict.fromkeys([*names, *others]))
 
 
 def find_settings(words: Iterable[str]) -> tuple[str, ...]:
@@ -79,7 +85,7 @@ def find_settings(words: Iterable[str]) -> tuple[str, ...]:
 
 def settings_of(task: Task) -> tuple[str, ...]:
     """Return the names of the settings that a task has, explicit first."""
-    return tuple(one.name for one in all_settings().values() if one.applies_to(task))
+    return tuple(name for name, setting in all_settings().items() if setting.applies_to(task))
 
 
 def get_setting(name: str, task: Task) -> Setting:
@@ -92,12 +98,12 @@ def get_setting(name: str, task: Task) -> Setting:
     return all_settings()[name]
 
 
-def _check(name: str, *more: str) -> None:
-    """Raise if there is no setting of that name; `more` could stand in its place."""
+def _check(name: str, *groups: str) -> None:
+    """Raise if there is no setting, nor one of some groups, of that name."""
     if name in FORMS:
-        implicit = (one for one, rule in all_settings().items() if rule.implicit)
+        implicit = [setting.name for setting in all_settings().values() if setting.implicit]
         raise InvalidValueError(
             f"{name!r} is a form of the instruction, not a setting; settings that leave the goal "
             f"implicit are {', '.join(implicit)}."
         )
-    check_names("setting", [name], (*all_settings(), *more))
+    check_names("setting", [name], (*all_settings(), *groups))

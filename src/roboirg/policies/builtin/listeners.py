@@ -1,4 +1,4 @@
-"""Listeners: the interpreter, or a surface rule for the words, in front of the scripted expert."""
+"""Listeners: the declared meaning, or a surface rule, in front of the scripted expert."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class ListenerPolicy(ScriptedPolicy):
         return self._chosen(understood_goals(env.instruction, env.episode), env, instruction)
 
     def _chosen(self, goals: Sequence[Goal], env: RoboIRGEnv, words: str) -> Goal:
-        """Return one of some goals at random; of all goals if there is none."""
+        """Return one of the goals that fit the words, at random; if none fits, one of all goals."""
         if not goals:
             self._has_guessed = True
             goals = goals_of(env.episode)

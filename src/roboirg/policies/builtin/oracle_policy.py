@@ -43,8 +43,12 @@ class PreviousGoalPolicy(OraclePolicy):
     """
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:  # noqa: ARG002
-        """Return the goal of the split's episode before this one, of the last before the first."""
+        """Return the goal of the split's previous episode; None if this scene has no such goal.
+
+        Before the first episode comes the last one of the split.
+        """
         episode = env.episode
         before = (episode.index - 1) % split_size(episode.split)
         goal = get_episode(episode.task, episode.split, before).goal
-        return goal if goal in get_task(episode.task).goals(episode.scene) else None
+        goals = get_task(episode.task).goals(episode.scene)
+        return goal if goal in goals else None

@@ -13,6 +13,7 @@ from roboirg.core.observations import Demonstration, Observation
 from roboirg.policies.builtin.scripted import WORDLESS
 
 CHUNK = 16
+"""Actions in a chunk."""
 MAX_STEP = 0.045
 """Radians per control step: 0.9 rad/s, the speed limit of the scripted expert."""
 
@@ -34,7 +35,10 @@ class RandomPolicy:
         self._rng = np.random.default_rng([self.seed, zlib.crc32(instruction.encode())])
 
     def act(self, observation: Observation) -> Actions:
-        """Return sixteen actions toward a target within the joint limits."""
+        """Return `CHUNK` actions (n, 8) toward random joint angles, with a random gripper value.
+
+        Each step is at most `MAX_STEP` a joint, so a far target is not reached.
+        """
         joints = np.asarray(observation["joint_positions"], dtype=np.float64)
         target = self._rng.uniform(JOINT_LOW, JOINT_HIGH)
         step = np.clip((target - joints) / CHUNK, -MAX_STEP, MAX_STEP)

@@ -24,6 +24,11 @@ if TYPE_CHECKING:
 _StagedChunk = tuple[Stage | None, NDArray[np.float64]]
 """A chunk of actions and the stage that it belongs to; None while the command is awaited."""
 
+_OPEN_FINGERS = 0.039
+"""Meters that each finger is from the middle when the gripper is open, at least."""
+_STILL_STEPS = 20
+"""Control steps of a chunk that holds still: one second."""
+
 LISTENING_STEPS = 5
 """Control steps at rest between two observations while the command has not been heard."""
 MAX_RETRIES = 3
@@ -42,7 +47,7 @@ READING: Mapping[str, str] = {
     "reads_text": "yes",
     "text_normalization": "lower case, split into words and punctuation",
 }
-"""Metadata of those that read it with `roboirg.reader`."""
+"""Metadata of those that go by the words."""
 
 
 class ScriptedPolicy(AttachedPolicy, ABC):
@@ -109,8 +114,19 @@ class ScriptedPolicy(AttachedPolicy, ABC):
 def _execute(
     env: RoboIRGEnv, stages: tuple[Stage, ...], primitives: MotionPrimitives
 ) -> Iterator[_StagedChunk]:
-    """Yield action chunks, stage by stage; a primitive that fails is retried."""
-    index, retries, since = 0, 0, env.session.world.elapsed
+    """Yield action chunks, stage by stage; a stage that is not completed is retried.
+
+    A stage that handles what is held, such as placing it, is retried from the stage before, which
+    picks it up. After `MAX_RETRIES` in all, the chunks end.
+
+    Args:
+        env: in which the caller executes each chunk before it takes the next one.
+        stages: of the goal.
+        primitives: the expert, which plans the motion of a stage.
+    """
+    index = 0
+    retries = 0
+    since = env.session.world.elapsed
     while index < len(stages):
         stage = stages[index]
         for chunk in primitives.execute(stage.primitive):
@@ -119,27 +135,42 @@ def _execute(
             index += 1
         elif retries < MAX_RETRIES:
             retries += 1
-            index -= stage.primitive.kind in HANDLES_HELD and index > 0
+            if stage.primitive.kind in HANDLES_HELD and index > 0:
+                index -= 1
         else:
             return
 
 
 def _get_ready(env: RoboIRGEnv) -> Iterator[_StagedChunk]:
-    """Yield the hover with which every goal begins, if there is one, then short rests for ever."""
+    """Yield what can be done before the goal is known, then short rests for ever.
+
+    If every goal of the scene begins with the same hover, that can be done. Rests are short, so
+    that the next words are heard soon.
+    """
     from roboirg.simulation.expert.primitives import MotionPrimitives
 
-    task, scene = get_task(env.episode.task), env.episode.scene
-    first, *others = {task.stages(scene, goal)[0].primitive for goal in task.goals(scene)}
-    if not others and first.kind == "hover":
-        for chunk in MotionPrimitives(env.session.world).execute(first):
-            yield None, chunk
+    scene = env.episode.scene
+    task = get_task(env.episode.task)
+    beginnings = {task.stages(scene, goal)[0].primitive for goal in task.goals(scene)}
+    if len(beginnings) == 1:
+        (beginning,) = beginnings
+        if beginning.kind == "hover":
+            for chunk in MotionPrimitives(env.session.world).execute(beginning):
+                yield None, chunk
     while True:
         yield None, _hold_still(env)[:LISTENING_STEPS]
 
 
 def completed_stages(env: RoboIRGEnv, stages: tuple[Stage, ...], since: int) -> int:
-    """Return how many stages of a plan are completed now; facts before a step do not count."""
-    judge, now = Judge(stages), env.session.world.elapsed
+    """Return how many stages of a plan are completed now, in their order.
+
+    Args:
+        env: with the events of the episode.
+        stages: of the plan.
+        since: control step from which on facts count.
+    """
+    judge = Judge(stages)
+    now = env.session.world.elapsed
     facts = facts_by_step(env.session.events, now)
     for step in range(since, now + 1):
         judge.update(step, facts[step])
@@ -149,5 +180,6 @@ def completed_stages(env: RoboIRGEnv, stages: tuple[Stage, ...], since: int) -> 
 def _hold_still(env: RoboIRGEnv) -> NDArray[np.float64]:
     """Return one second of actions that keep the arm and the gripper as they are."""
     robot = env.session.world.robot
-    gripper = 1.0 if robot.finger_positions.min() > 0.039 else -1.0  # noqa: PLR2004
-    return np.tile(np.append(robot.arm_positions, gripper), (20, 1))
+    is_open = robot.finger_positions.min() > _OPEN_FINGERS
+    gripper = 1.0 if is_open else -1.0
+    return np.tile(np.append(robot.arm_positions, gripper), (_STILL_STEPS, 1))

@@ -43,6 +43,9 @@ UP = 0.05
 ASIDE = 0.06
 """Meters aside within which it still is."""
 _TURNS = {"pick_cube": "align", "pick_container": "align", "press": "home", "hover": "home"}
+"""How the tool turns when it moves to the object of a motion; else it keeps its angle."""
+_YAW = 5
+"""Place of the angle about the vertical in a waypoint."""
 
 
 class Disturbance(NamedTuple):
@@ -77,8 +80,8 @@ class ExpertWaypoint(NamedTuple):
     """
 
     action: CheckedActions
-    anchor: str | None
-    turn: str
+    anchor: str | None = None
+    turn: str = "keep"
 
 
 class WaypointExpert(OraclePolicy):
@@ -108,75 +111,98 @@ class WaypointExpert(OraclePolicy):
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
         """Return the episode's goal; the instruction is ignored."""
-        self._gripper, self._waits = OPEN, 0
+        self._gripper = OPEN
+        self._waits = 0
         self._stalled: ExpertWaypoint | None = None
         self._missed: NDArray[np.float64] | None = None
         self._rng = np.random.default_rng((env.episode.seed, self.seed))
         return super().decide(env, instruction)
 
     def act(self, observation: Observation) -> Actions:  # noqa: ARG002
-        """Return the next waypoint (1, 7), perhaps disturbed; `last` is the undisturbed one."""
+        """Return the next waypoint (1, 7), perhaps disturbed; `last` is the undisturbed one.
+
+        A disturbance either lets the tool stay once where it is (a stall, after which the same
+        decision is tried again), or moves the waypoint.
+        """
         decided = self._stalled or self._next()
         self._stalled = None
-        self.last, wanted = decided, decided.action
-        how = self._disturbance
-        if how is not None and wanted[-1] == LEAVE and self._rng.random() < how.stall:
+        self.last = decided
+        wanted = decided.action
+        is_move = wanted[-1] == LEAVE
+        disturbance = self._disturbance
+        if disturbance is not None and is_move and self._rng.random() < disturbance.stall:
             self._stalled = decided
             action = self._here(LEAVE)
         else:
             action = self._disturb(wanted)
-        if wanted[-1] == LEAVE:
+
+        if is_move:
             self._missed = None if np.array_equal(action, wanted) else wanted
-        elif self._missed is not None:  # where the gripper is not meant to open or close
+        elif self._missed is not None:
+            # The disturbed move ended elsewhere, so the gripper is about to act in a wrong place:
+            # the label is the place that was missed.
             wanted = np.append(self._missed[:POSE_SIZE], wanted[-1])
         self.labels = wanted[None]
         return action[None]
 
     def _next(self) -> ExpertWaypoint:
-        """Return the next decision; after the last one the tool stays where it is."""
+        """Return the next decision; after the last one the tool stays where it is.
+
+        Trajectories that move neither tool nor gripper give no decision; in a stage that takes a
+        time, they become waits.
+        """
         if self._waits:
             self._waits -= 1
-            return ExpertWaypoint(self._here(self._gripper), None, "keep")
+            return ExpertWaypoint(self._here(self._gripper))
         for stage, chunk in self._chunks:
             self.stage = stage
             decided = self._waypoint(chunk)
             if decided is not None:
                 return decided
             if stage is not None and stage.primitive.steps:
-                # Time must pass while something is held until then.
-                least = int(stage.primitive.kind == "hold_until")
+                # Where something is held until a step, at least one wait lets the time pass.
+                least = 1 if stage.primitive.kind == "hold_until" else 0
                 self._waits = max(round(len(chunk) / WAIT_STEPS), least)
             if self._waits:
                 return self._next()
-        return ExpertWaypoint(self._here(LEAVE), None, "keep")
+        return ExpertWaypoint(self._here(LEAVE))
 
     def _waypoint(self, chunk: JointTrajectory) -> ExpertWaypoint | None:
-        """Return the waypoint of a trajectory; None if it moves neither tool nor gripper.
+        """Return the waypoint that replaces a trajectory of the expert.
 
-        Then the expert waits: a gripper that is closed again takes `WAIT_STEPS`.
+        If the arm moves, that is the pose at its end; if the gripper opens or closes, the present
+        pose with its new value. A trajectory that does neither has none (None).
         """
+        arm = chunk[:, :ARM_JOINTS]
         gripper = float(chunk[-1, ARM_JOINTS])
-        if np.abs(chunk[:, :ARM_JOINTS] - chunk[0, :ARM_JOINTS]).max() < STILL:
-            if gripper not in (OPEN, CLOSED) or gripper == self._gripper:
-                return None
-            self._gripper = gripper
-            return ExpertWaypoint(self._here(gripper), None, "keep")
-        action = self._pose_at(chunk[-1, :ARM_JOINTS], LEAVE)
-        return ExpertWaypoint(action, *self._meaning(action))
+        is_arm_still = np.abs(arm - arm[0]).max() < STILL
+        if not is_arm_still:
+            return self._move_to(self._pose_at(arm[-1], LEAVE))
+        if gripper not in (OPEN, CLOSED) or gripper == self._gripper:
+            return None
+        self._gripper = gripper
+        return ExpertWaypoint(self._here(gripper))
 
-    def _meaning(self, action: CheckedActions) -> tuple[str | None, str]:
-        """Return the anchor of a move, and how the tool turns in it."""
-        env = self.env
-        tool = np.asarray(env.session.world.robot.tool_pose.p)
-        is_up = action[2] > tool[2] + UP and np.hypot(*(action[:2] - tool[:2])) < ASIDE
-        if is_up or self.stage is None:
-            return None, "keep"
+    def _move_to(self, action: CheckedActions) -> ExpertWaypoint:
+        """Return the decision to move to a pose, with the object that the pose is at.
+
+        That object is its `anchor`, the one that the motion picks up or places something on. A move
+        straight up, and one that ends away from the object, has none.
+        """
+        world = self.env.session.world
+        tool = np.asarray(world.robot.tool_pose.p)
+        rises = action[2] > tool[2] + UP
+        is_straight_up = rises and _distance_in_plane(action, tool) < ASIDE
+        if is_straight_up or self.stage is None:
+            return ExpertWaypoint(action)
         primitive = self.stage.primitive
-        name = primitive.place if primitive.kind in HANDLES_HELD else primitive.subject
-        body = env.session.world.bodies.get(str(name))
-        if body is not None and np.hypot(*(action[:2] - body.position[:2])) < ON_THING:
-            return str(name), _TURNS.get(primitive.kind, "keep")
-        return None, "keep"
+        anchor = primitive.subject
+        if primitive.kind in HANDLES_HELD:
+            anchor = str(primitive.place)
+        body = world.bodies.get(anchor)
+        if body is None or _distance_in_plane(action, body.position) >= ON_THING:
+            return ExpertWaypoint(action)
+        return ExpertWaypoint(action, anchor, _TURNS.get(primitive.kind, "keep"))
 
     def _here(self, gripper: float) -> CheckedActions:
         robot = self.env.session.world.robot
@@ -188,19 +214,30 @@ class WaypointExpert(OraclePolicy):
         return np.concatenate([position, rotation.as_euler("xyz"), [gripper]])
 
     def _disturb(self, action: CheckedActions) -> CheckedActions:
-        """Return a waypoint moved at random, if it is its turn; gripper actions stay."""
-        how, rng = self._disturbance, self._rng
-        if how is None or action[-1] != LEAVE:
+        """Return a waypoint, moved at random with the probability of `Disturbance`.
+
+        In free space it may be moved far and turned; near the objects only a little and in the
+        plane. Waypoints at which the gripper opens or closes stay where they are.
+        """
+        disturbance = self._disturbance
+        rng = self._rng
+        if disturbance is None or action[-1] != LEAVE:
             return action
         moved = action.copy()
-        if action[2] > FREE_HEIGHT:
-            if rng.random() < how.free:
-                moved[:2] += rng.normal(0.0, how.plane, 2)
-                moved[2] += rng.normal(0.0, how.height)
-                moved[5] += rng.normal(0.0, how.turn)
-        elif rng.random() < how.low:
-            moved[:2] += rng.normal(0.0, how.miss, 2)
+        is_free = action[2] > FREE_HEIGHT
+        if is_free and rng.random() < disturbance.free:
+            moved[:2] += rng.normal(0.0, disturbance.plane, 2)
+            moved[2] += rng.normal(0.0, disturbance.height)
+            moved[_YAW] += rng.normal(0.0, disturbance.turn)
+        if not is_free and rng.random() < disturbance.low:
+            moved[:2] += rng.normal(0.0, disturbance.miss, 2)
         return moved
+
+
+def _distance_in_plane(point: NDArray[np.floating[Any]], other: Any) -> float:  # noqa: ANN401
+    """Return how far apart two points are on the table, m; what follows x and y does not count."""
+    x, y = point[:2] - other[:2]
+    return float(np.hypot(x, y))
 
 
 class JointWaypointExpert(WaypointExpert):
@@ -221,7 +258,11 @@ class JointWaypointExpert(WaypointExpert):
         return super().decide(env, instruction)
 
     def act(self, observation: Observation) -> Actions:
-        """Return the targets (n, 8) of the next move, perhaps disturbed, or of the gripper."""
+        """Return the joint targets (n, 8) of the next waypoint, perhaps disturbed.
+
+        `labels` (n, 8) are the targets on the way to where the expert wanted to go: the returned
+        ones, unless the waypoint was disturbed.
+        """
         executed = next(self._moves, None)
         if executed is None:
             (action,) = super().act(observation)
@@ -233,12 +274,13 @@ class JointWaypointExpert(WaypointExpert):
             self.labels = executed
         else:
             last = len(self._way) - 1
+            # If the undisturbed way is shorter, its last target is repeated.
             self.labels = self._way[np.minimum(np.arange(len(executed)), last)]
             self._way = self._way[min(len(executed), last) :]
         return executed
 
     def _way_of(self, waypoint: CheckedActions) -> JointTrajectory:
-        """Return the way to a waypoint, with the gripper's action at its end."""
+        """Return the joint targets (n, 8) on the way to a waypoint, and of the gripper there."""
         move = next(self._controller.trajectories(waypoint))
         if waypoint[-1] == LEAVE:
             return move

@@ -1,4 +1,11 @@
-"""Find a policy by its name, or make one known that Python code hands over."""
+"""Find a policy by its name, or make one known that Python code hands over.
+
+The name is a *spec*, such as ``oracle`` or ``planner:gemini?hands=scripted``
+(`roboirg.policies.by_name.policy_kinds`). *Hands* are what follows the subgoals of a planner: a
+policy, or the scripted expert, which needs the simulator. A policy is *foreign* if its code is
+neither ours nor behind a protocol; it gets a process of its own. Its *makeup* is what distinguishes
+it from others of its name, with its options: `roboirg.core.versions`.
+"""
 
 from __future__ import annotations
 
@@ -68,65 +75,123 @@ def read_policy(spec: str, name: str | None = None) -> PolicyRef:
         MissingDependencyError: a library that the URL's scheme needs is not installed.
     """
     ref = split_spec(spec if name is None else name, spec)
-    system, kind = system_of(ref.kind, ref.target, dict(ref.options)), ref.kind
-    is_foreign = not known_kinds().get(kind, True) or (kind == CLASS and ":" in ref.body)
-    is_split = False
-    asks: Asker | None = "listener" if kind == LISTENER else None
-    if system is not None:
-        planner_kind = (system.planner or {}).get("kind")
-        has_own_planner = ":" in str(planner_kind)  # package.module:Class
-        is_split = has_own_planner and system.policy == SCRIPTED
-        has_hands = system.policy not in (SCRIPTED, ELSEWHERE)
-        is_foreign = has_own_planner or (has_hands and read_policy(system.policy).is_foreign)
-        asks = "planner" if planner_kind in OF_MODELS else None
-    ref = replace(ref, asks=asks, is_foreign=is_foreign, is_privileged=ref.is_declared)
-    if ref.is_declared and not is_foreign:
+    system = system_of(ref.kind, ref.target, dict(ref.options))
+    ref = _with_code(ref, system)
+    if ref.is_declared and not ref.is_foreign:
         raise InvalidValueError(
             f"Policy {ref.body!r} is not a class of your own; leave out {PRIVILEGED!r}."
         )
-    if is_foreign:
-        place: Place = "world" if ref.is_declared else "split" if is_split else "own"
-        ref = replace(ref, is_privileged=ref.is_declared or is_split)
-    else:
+    if not ref.is_foreign:
         ref = look_up(ref)
-        place = "server" if is_url(spec) else "world"
-        if find_kind(kind).has_weights:
-            # What acts on the world by its state is next to it, even if it is trained.
-            place = "world" if ref.is_privileged else "own"
-    ref = replace(ref, place=place)
+        ref = replace(ref, place=_place_of_ours(ref))
+    elif ref.is_declared:
+        ref = replace(ref, place="world", is_privileged=True)
+    elif ref.place == "split":
+        ref = replace(ref, is_privileged=True)  # its scripted hands read the world
     return replace(ref, makeup=_makeup(ref, system))
 
 
-def _makeup(ref: PolicyRef, system: System | None) -> Makeup:
-    """Return what a policy is, with its place and version known, and the system that it names.
+def _with_code(ref: PolicyRef, system: System | None) -> PolicyRef:
+    """Return a policy with what its spec says of its code.
 
-    Of code of others, every option that is typed counts.
+    Set are `asks` (which kind of model it asks), `is_foreign` (whether its code is a user's) and
+    `place` (where it plays): ``split`` for a foreign planner with scripted hands, which need the
+    simulator and so stay in the world's process, else ``own``.
+
+    Args:
+        ref: of the policy.
+        system: that its spec means; then planner and hands decide. None if it means none.
     """
+    place: Place = "own"
+    asks: Asker | None = None
+    if system is None:
+        is_class = ref.kind == CLASS and ":" in ref.body
+        is_foreign = is_class or not known_kinds().get(ref.kind, True)
+        if ref.kind == LISTENER:
+            asks = "listener"
+    else:
+        is_foreign = ":" in system.planner_kind  # package.module:Class
+        if is_foreign and system.policy == SCRIPTED:
+            place = "split"
+        if system.policy not in (SCRIPTED, ELSEWHERE):
+            is_foreign = is_foreign or read_policy(system.policy).is_foreign
+        if system.planner_kind in OF_MODELS:
+            asks = "planner"
+    return replace(ref, is_foreign=is_foreign, asks=asks, place=place)
+
+
+def _place_of_ours(ref: PolicyRef) -> Place:
+    """Return where a policy with code of ours runs; `look_up` has found out if it is privileged."""
+    if find_kind(ref.kind).has_weights:
+        # What acts on the world by its state is next to it, even if it is trained.
+        return "world" if ref.is_privileged else "own"
+    return "server" if is_url(ref.spec) else "world"
+
+
+def _makeup(ref: PolicyRef, system: System | None) -> Makeup:
+    """Return the makeup of a policy: pairs of its maker, of each option, and of its hands.
+
+    Of ``planner:gemini?model=m1`` the maker is ``planner:gemini``, and ``model`` is an option.
+    Options that have their default values are left out, as they make no difference; of foreign
+    code, whose defaults are not known, every option that is typed is kept.
+
+    Args:
+        ref: of the policy, with place and version.
+        system: that its spec means, if any.
+    """
+    if system is not None:
+        return _makeup_of_system(system)
     maker = ref.kind
     if ref.kind in (BUILT_IN, CLASS):
         maker = ref.spec
     elif ref.version == UNKNOWN_VERSION and ref.place != "server":
-        maker += f":{content_of(ref.target)}"
-    options: dict[str, Any] = dict(ref.options)
-    hands = SCRIPTED
-    made: Any = None
-    if system is not None:
-        if system.planner is None:
-            return read_policy(system.policy).makeup
-        options = dict(system.planner)
-        hands = system.policy
-        kind = options.pop("kind", "")
-        maker = f"{PLANNER}:{kind}"
-        if ":" not in kind:  # else it is the user's own, which has no options
-            made = make_planner(kind, options, maker)
-    elif not ref.is_foreign:
-        hands = options.pop(HANDS, SCRIPTED)
-        made = maker_of(ref)(0)
-    if hasattr(made, "options"):
-        options = made.options.model_dump(exclude_defaults=True)
-        options |= options.pop("model", {})  # its model's options stand next to its own
+        # Without a version, only the content of its file tells it from others of its kind.
+        maker = f"{ref.kind}:{content_of(ref.target)}"
+    options = dict(ref.options)
+    if ref.is_foreign:
+        return _joined(maker, options, SCRIPTED)
+    hands = options.pop(HANDS, SCRIPTED)
+    options = _changed_options(maker_of(ref)(0), options)
+    return _joined(maker, options, hands)
+
+
+def _makeup_of_system(system: System) -> Makeup:
+    """Return the makeup of a planner with its hands; without a planner that of the policy."""
+    if system.planner is None:
+        return read_policy(system.policy).makeup
+    kind = system.planner_kind
+    maker = f"{PLANNER}:{kind}"
+    options = system.planner_options
+    if ":" not in kind:  # else it is the user's own, which has no options
+        options = _changed_options(make_planner(kind, options, maker), options)
+    return _joined(maker, options, system.policy)
+
+
+def _changed_options(made: Any, typed: dict[str, Any]) -> dict[str, Any]:  # noqa: ANN401
+    """Return the options of a policy or planner that differ from their defaults.
+
+    Options of its model stand next to its own, as they are typed.
+
+    Args:
+        made: the policy or planner.
+        typed: its options as typed, which are returned if it keeps no ``options`` of its own.
+    """
+    if not hasattr(made, "options"):
+        return typed
+    options: dict[str, Any] = made.options.model_dump(exclude_defaults=True)
+    of_model: dict[str, Any] = options.pop("model", {})
+    return options | of_model
+
+
+def _joined(maker: str, options: dict[str, Any], hands: str) -> Makeup:
+    """Return the makeup of a policy: its maker, then its options by name, with the hands as one.
+
+    ``planner:gemini`` with the option ``model`` gives
+    ``(("policy", "planner:gemini"), ("model", "m1"))``. Hands are named only if they are not the
+    scripted ones; an option that names a file counts with a hash of its content.
+    """
     if hands not in (SCRIPTED, ELSEWHERE):
-        options[HANDS] = makeup_text(read_policy(hands).makeup)
+        options = {**options, HANDS: makeup_text(read_policy(hands).makeup)}
     pairs = [(name, content_of(str(value))) for name, value in sorted(options.items())]
     return ((POLICY, maker), *pairs)
 
@@ -140,20 +205,30 @@ def policy_of(policy: str | type[Any] | object, name: str | None = None) -> Poli
             own ``reset`` clears what it remembers.
         name: in records; the spec, or the name of the class, by default.
     """
-    declaration = PRIVILEGED if isinstance(policy, Privileged) else ""
-    given = policy.policy if isinstance(policy, Privileged) else policy
+    declaration = ""
+    given = policy
+    if isinstance(policy, Privileged):
+        declaration = PRIVILEGED
+        given = policy.policy
     if isinstance(given, str):
         return read_policy(declaration + given, name)
-    kind = given if isinstance(given, type) else type(given)
-    name = name or kind.__name__
-    if given is kind and _can_be_imported(kind):
-        return read_policy(f"{declaration}{kind.__module__}:{kind.__name__}", name)
+
+    policy_class = given if isinstance(given, type) else type(given)
+    name = name or policy_class.__name__
+    module = policy_class.__module__
+    if given is policy_class and _can_be_imported(policy_class):
+        return read_policy(f"{declaration}{module}:{policy_class.__name__}", name)
+
+    # It cannot be named elsewhere, so the object or class itself is kept under its name.
     check_policy(name, given, ("reset", "act"))
     live[name] = given
     ref = split_spec(name, f"{declaration}{LIVE}:{name}")
-    makeup = ((POLICY, f"{declaration}{kind.__module__}:{kind.__qualname__}"),)
     return replace(
-        ref, place="python", is_foreign=True, is_privileged=ref.is_declared, makeup=makeup
+        ref,
+        place="python",
+        is_foreign=True,
+        is_privileged=ref.is_declared,
+        makeup=((POLICY, f"{declaration}{module}:{policy_class.__qualname__}"),),
     )
 
 
@@ -189,34 +264,54 @@ def find_policy(spec: str) -> PolicyRef:
 def look_up(ref: PolicyRef) -> PolicyRef:
     """Return a policy with what its code declares, without opening it; raises like `find_policy`.
 
-    Of code of others, the version is a fingerprint of the file that defines it.
+    A class is asked itself; where the spec names no class, a policy is made and asked.
     """
     if ref.kind in (CLASS, BUILT_IN):
-        return declared_by(ref, find_class(ref.body))
-    return declared_by(ref, live[ref.target] if ref.kind == LIVE else maker_of(ref)(0))
+        declaring: object = find_class(ref.body)
+    elif ref.kind == LIVE:
+        declaring = live[ref.target]
+    else:
+        declaring = maker_of(ref)(0)
+    return declared_by(ref, declaring)
 
 
 def declared_by(ref: PolicyRef, declaring: object) -> PolicyRef:
-    """Return a policy with what its class, or one that was made, declares."""
+    """Return a policy with the needs, version and privilege that its code declares.
+
+    Args:
+        ref: of the policy.
+        declaring: its class, or a policy that was made.
+    """
     _refuse_undeclared(ref, declaring)
+    version: str | None
     if ref.kind == BUILT_IN:
-        version: str | None = BUILT_IN
+        version = BUILT_IN
+    elif ref.is_foreign:
+        version = file_fingerprint(declaring)
     else:
-        version = file_fingerprint(declaring) if ref.is_foreign else read_version(declaring)
+        version = read_version(declaring)
+    is_ours_with_attach = not ref.is_foreign and hasattr(declaring, "attach")
     return replace(
         ref,
         needs=PolicyNeeds.of(declaring),
         version=version or UNKNOWN_VERSION,
-        is_privileged=ref.is_privileged or (not ref.is_foreign and hasattr(declaring, "attach")),
+        is_privileged=ref.is_privileged or is_ours_with_attach,
     )
 
 
 def _refuse_undeclared(ref: PolicyRef, made: object) -> None:
-    """Raise if a policy of others has ``attach``, which its spec does not declare."""
-    # With scripted hands the whole has attach; the planner, which is all that is foreign, must not.
-    is_planner = ref.place == "split" or isinstance(made, PlannerAlone)
-    part = getattr(made, "planner", None) if is_planner else made
-    if ref.is_foreign and not ref.is_declared and hasattr(part, "attach"):
+    """Raise if foreign code has ``attach``, so reads the simulator, and its spec does not say so.
+
+    Args:
+        ref: of the policy.
+        made: the policy, or its class.
+    """
+    foreign_part = made
+    if ref.place == "split" or isinstance(made, PlannerAlone):
+        # With scripted hands the whole has attach; the planner, which is all that is foreign, must
+        # not.
+        foreign_part = getattr(made, "planner", None)
+    if ref.is_foreign and not ref.is_declared and hasattr(foreign_part, "attach"):
         raise InvalidValueError(
             f"Policy {ref.spec!r} has attach(), with which a policy reads the simulator's state; "
             f"declare that as {PRIVILEGED + ref.spec!r}, in Python with roboirg.Privileged(policy),"
@@ -224,9 +319,9 @@ def _refuse_undeclared(ref: PolicyRef, made: object) -> None:
         )
 
 
-def _can_be_imported(policy: type[Any]) -> bool:
+def _can_be_imported(policy_class: type[Any]) -> bool:
     """Return whether a process of its own finds the class under its name."""
-    module = policy.__module__
-    return (
-        module != "__main__" and getattr(sys.modules.get(module), policy.__name__, None) is policy
-    )
+    if policy_class.__module__ == "__main__":
+        return False
+    module = sys.modules.get(policy_class.__module__)
+    return getattr(module, policy_class.__name__, None) is policy_class

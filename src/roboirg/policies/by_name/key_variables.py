@@ -46,19 +46,26 @@ def environment_for(ref: PolicyRef, named: Iterable[str]) -> dict[str, str]:
         ref: the policy; it has the keys that our own parts of it read.
         named: variables that the user lets it have.
     """
-    kept = key_variables(ref).union(named)
-    variables = os.environ.items()
-    return {name: text for name, text in variables if name in kept or not _SECRET.search(name)}
+    granted = key_variables(ref).union(named)
+    return {
+        name: value
+        for name, value in os.environ.items()
+        if name in granted or not _SECRET.search(name)
+    }
 
 
-def key_variables(ref: PolicyRef) -> set[str | None]:
-    """Return the variables with the keys that our own parts of a policy read; None may be there."""
+def key_variables(ref: PolicyRef) -> set[str]:
+    """Return the names of the environment variables with keys that a policy reads.
+
+    Only parts that are ours count: a client, its planner's model, and the hands of a system.
+    """
     options = dict(ref.options)
     names = {options.get("api_key_env"), _HUB_KEYS.get(ref.kind)}
     with contextlib.suppress(InvalidValueError):  # then it cannot be made, either
         system = system_of(ref.kind, ref.target, options)
         if system is not None:
             names |= key_variables(split_spec(system.policy, system.policy))
-            if system.planner and "model" in system.planner:
-                names.add(ModelOptions.model_construct(**system.planner["model"]).key_variable)
-    return names
+            if "model" in system.planner_options:
+                model = ModelOptions.model_construct(**system.planner_options["model"])
+                names.add(model.key_variable)
+    return {name for name in names if name is not None}

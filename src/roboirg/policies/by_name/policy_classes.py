@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import inspect
 from collections.abc import Mapping
@@ -25,7 +26,8 @@ from roboirg.policies.lerobot.checkpoint_policy import LeRobotPolicy
 from roboirg.policies.remote.protocols import protocols_by_scheme
 from roboirg.util.discovery import entry_names
 
-_MAX_NAMED = 20
+_MOST_LISTED = 20
+"""Classes of a module that an error message lists at most."""
 CHECKPOINTS: Mapping[str, type[Any]] = {"lerobot": LeRobotPolicy}
 """Policies of this process that a URL names, by its scheme; called with ``(url, seed=)``."""
 
@@ -35,7 +37,7 @@ KINDS_GROUP = "roboirg.policy_kinds"
 
 def url_classes() -> Mapping[str, type[Any]]:
     """Return the classes of policies that URLs name, by the scheme."""
-    clients = {scheme: one.client for scheme, one in protocols_by_scheme().items()}
+    clients = {scheme: protocol.client for scheme, protocol in protocols_by_scheme().items()}
     return {**clients, **CHECKPOINTS}
 
 
@@ -53,27 +55,30 @@ def find_class(spec: str, methods: tuple[str, ...] = ("reset", "act")) -> type[A
         MissingDependencyError: a library that the URL's scheme needs is not installed.
     """
     if is_url(spec):
-        scheme, classes = spec.partition("://")[0], url_classes()
+        scheme, _, _ = spec.partition("://")
+        classes = url_classes()
         check_names("policy scheme", [scheme], classes)
-        check_policy(spec, classes[scheme](spec), methods)
-        return classes[scheme]
+        url_class = classes[scheme]
+        # One is made for the check, which also checks the URL's options; nothing connects yet.
+        made = url_class(spec)
+        check_policy(spec, made, methods)
+        return url_class
+
     if spec not in BUILTIN and ":" not in spec:
-        urls = (f"{scheme}://…" for scheme in url_classes())
-        kinds = (f"{kind}:…" for kind in entry_names(KINDS_GROUP))
-        ours = ("system:NAME", "planner:KIND", "vlm-listener:PROVIDER")
-        known = [*BUILTIN, "package.module:Class", *urls, *ours, *kinds]
-        raise UnknownNameError("policy", spec, known)
-    module_name, _, name = BUILTIN.get(spec, spec).partition(":")
-    module = _module(spec, module_name)
-    found = getattr(module, name, None)
-    if not inspect.isclass(found):
-        names = [key for key, one in vars(module).items() if inspect.isclass(one)]
-        raise InvalidValueError(
-            f"Policy {spec!r}: module {module_name} has no class {name!r}; "
-            f"it has {', '.join(names[:_MAX_NAMED]) or 'none'}."
-        )
+        raise UnknownNameError("policy", spec, _known_specs())
+
+    found = _import_class(spec)
     check_policy(spec, found, methods)
     return found
+
+
+def _known_specs() -> list[str]:
+    """Return the specs that exist, such as ``oracle`` and ``openpi://…``, for an error message."""
+    specs = [*BUILTIN, "package.module:Class"]
+    specs += [f"{scheme}://…" for scheme in url_classes()]
+    specs += ["system:NAME", "planner:KIND", "vlm-listener:PROVIDER"]
+    specs += [f"{kind}:…" for kind in entry_names(KINDS_GROUP)]
+    return specs
 
 
 def make_from_class(spec: str, policy_class: type[Any], seed: int) -> Policy:
@@ -86,29 +91,52 @@ def make_from_class(spec: str, policy_class: type[Any], seed: int) -> Policy:
             seed 0, and gets the seed of each episode in ``begin``.
     """
     if takes_batches(policy_class):
-        return make_batched(
-            (spec, policy_class), lambda: _construct(spec, policy_class, seed=0), seed
-        )
+        make = functools.partial(_construct, spec, policy_class, seed=0)
+        return make_batched((spec, policy_class), make, seed)
     policy: Policy = _construct(spec, policy_class, seed)
     return policy
 
 
 def _construct(spec: str, policy_class: type[Any], seed: int) -> Any:  # noqa: ANN401
+    """Call a class of policies with what it takes: the URL, if the spec is one, and the seed."""
     if is_url(spec):
         return policy_class(spec, seed=seed)
-    return policy_class(seed=seed) if "seed" in parameters_of(policy_class) else policy_class()
+    if "seed" in parameters_of(policy_class):
+        return policy_class(seed=seed)
+    return policy_class()
 
 
-def _module(spec: str, name: str) -> ModuleType:
+def _import_class(spec: str) -> type[Any]:
+    """Import the class of a built-in name or of ``package.module:Class``.
+
+    If the module has no such class, the error lists those that it has.
+    """
+    module_name, _, class_name = BUILTIN.get(spec, spec).partition(":")
+    module = _import_module(spec, module_name)
+    found = getattr(module, class_name, None)
+    if inspect.isclass(found):
+        return found
+    classes = [name for name, value in vars(module).items() if inspect.isclass(value)]
+    listed = ", ".join(classes[:_MOST_LISTED]) or "none"
+    raise InvalidValueError(
+        f"Policy {spec!r}: module {module_name} has no class {class_name!r}; it has {listed}."
+    )
+
+
+def _import_module(spec: str, name: str) -> ModuleType:
+    """Import a module; if there is none of its name, the error lists those in this folder."""
     try:
         return importlib.import_module(name)
     except MissingDependencyError:
         raise
     except (Exception, SystemExit) as error:
         hint = ""
-        if isinstance(error, ModuleNotFoundError) and error.name == name.partition(".")[0]:
-            here = ", ".join(sorted(path.stem for path in Path.cwd().glob("*.py"))) or "none"
-            hint = f"; modules in {str(Path.cwd())!r}: {here}"
+        top_package = name.partition(".")[0]
+        # Not if it is found, and one that it imports is missing.
+        if isinstance(error, ModuleNotFoundError) and error.name == top_package:
+            modules_here = sorted(path.stem for path in Path.cwd().glob("*.py"))
+            listed = ", ".join(modules_here) or "none"
+            hint = f"; modules in {str(Path.cwd())!r}: {listed}"
         raise InvalidValueError(
             f"Policy {spec!r}: module {name!r} cannot be imported: {one_line(error)}{hint}."
         ) from error

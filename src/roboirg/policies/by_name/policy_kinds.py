@@ -71,35 +71,46 @@ class PolicyKind(NamedTuple):
 
 
 def split_spec(name: str, spec: str) -> PolicyRef:
-    """Return kind, target and options of a spec; nothing of it is imported.
+    """Return the reference of a policy with kind, target and options of its spec.
+
+    ``planner:gemini?model=m1`` has the kind ``planner``, the target ``gemini`` and an option;
+    ``oracle`` is of the kind of built-in policies, ``lab.walk:Walk`` of the kind of classes.
+    Nothing is imported.
+
+    Args:
+        name: in records.
+        spec: of the policy; a URL, too.
 
     Raises:
         InvalidValueError: the options are malformed.
     """
     body = spec.removeprefix(PRIVILEGED)
-    kind, colon, rest = body.partition(":")
-    target, _, query = rest.partition("?")
-    options = {}
     if is_url(body):
         return replace(split_url(body), name=name, spec=spec)
+    kind, colon, rest = body.partition(":")
     if colon and kind in known_kinds():
-        options = parse_query(body, query)
-    else:
-        kind, target = BUILT_IN if body in BUILTIN else CLASS, body
-    pairs = tuple(options.items())
-    return PolicyRef(name=name, spec=spec, kind=kind, target=target, options=pairs)
+        target, _, query = rest.partition("?")
+        options = tuple(parse_query(body, query).items())
+        return PolicyRef(name=name, spec=spec, kind=kind, target=target, options=options)
+    kind = BUILT_IN if body in BUILTIN else CLASS
+    return PolicyRef(name=name, spec=spec, kind=kind, target=body)
 
 
 @functools.cache
 def known_kinds() -> Mapping[str, bool]:
-    """Return the names of all kinds, and whether their code is ours; imports none."""
-    ours = (*OURS, *entry_names(KINDS_GROUP, OUR_PACKAGES))
-    return {name: name in ours for name in (*OURS, *entry_names(KINDS_GROUP))}
+    """Return the names of all kinds, and for each whether its code is ours; imports none."""
+    are_ours = dict.fromkeys(entry_names(KINDS_GROUP), False)
+    for name in (*OURS, *entry_names(KINDS_GROUP, OUR_PACKAGES)):
+        are_ours[name] = True
+    return are_ours
 
 
 @functools.cache
 def find_kind(name: str) -> PolicyKind:
-    """Return the kind of a name; a scheme of URLs means a class. Others are not imported."""
+    """Return the kind of a name, such as ``planner``; of packages, only the named one is imported.
+
+    The scheme of a URL, such as ``openpi``, is a kind too: the class of its clients makes them.
+    """
     found = OURS.get(name) or find_entry(name, "KIND", PolicyKind, KINDS_GROUP)
     return found or PolicyKind(name, _of_class, has_weights=name in CHECKPOINTS)
 
@@ -117,43 +128,62 @@ def maker_of(ref: PolicyRef) -> PolicyMaker:
 
 
 def system_of(kind: str, target: str, options: Mapping[str, str]) -> System | None:
-    """Return the planner and the hands that a spec puts together; None for another kind."""
+    """Return the planner and the hands that a spec combines; None if it names no planner.
+
+    ``system:NAME`` names both in a file. Of ``planner:KIND?hands=SPEC`` the option ``hands`` names
+    the hands, by default the scripted ones, and all others are the planner's. A planner that is a
+    class of the user's, ``planner:package.module:Class``, has no options.
+    """
     if kind == SYSTEM:
         return find_system(target, options)
     if kind != PLANNER:
         return None
-    name, own = f"{PLANNER}:{target}", dict(options)
-    hands = own.pop(HANDS, SCRIPTED)
-    if ":" in target and own:
-        raise UnknownNameError(f"option of {name}:", min(own), [HANDS])
-    return System(name=name, policy=hands, planner=with_options({"kind": target}, own))
+    name = f"{PLANNER}:{target}"
+    planner_options = dict(options)
+    hands = planner_options.pop(HANDS, SCRIPTED)
+    is_users_class = ":" in target
+    if is_users_class and planner_options:
+        raise UnknownNameError(f"option of {name}:", min(planner_options), [HANDS])
+    planner = with_options({"kind": target}, planner_options)
+    return System(name=name, policy=hands, planner=planner)
 
 
 def make_follower(spec: str, seed: int) -> Policy:
     """Make what follows a planner: any policy, or the scripted hands; nothing is connected."""
-    return maker_of(split_spec(spec, SCRIPTED_HANDS if spec == SCRIPTED else spec))(seed)
+    import_path = SCRIPTED_HANDS if spec == SCRIPTED else spec
+    make = maker_of(split_spec(spec, import_path))
+    return make(seed)
 
 
 def _build(system: System, seed: int) -> Policy:
+    """Make the policy of a system.
+
+    It is the policy alone if the system has no planner, the planner alone if the hands are in
+    another process (`ELSEWHERE`), else both in one.
+    """
     if system.planner is None:
         return make_follower(system.policy, seed)
-    options = dict(system.planner)
-    kind = str(options.pop("kind", ""))
+    kind = system.planner_kind
     if ":" in kind:
-        planner = cast("Planner", make_from_class(kind, find_class(kind, ("reset", "plan")), seed))
+        planner_class = find_class(kind, ("reset", "plan"))
+        planner = cast("Planner", make_from_class(kind, planner_class, seed))
     else:
-        planner = make_planner(kind, options, f"the planner of system {system.name}", seed)
+        origin = f"the planner of system {system.name}"
+        planner = make_planner(kind, system.planner_options, origin, seed)
     if system.policy == ELSEWHERE:
         return PlannerAlone(planner)
     return HierarchicalPolicy(planner, make_follower(system.policy, seed), system.name)
 
 
 def _of_class(spec: str, _target: str, _options: Mapping[str, str]) -> PolicyMaker:
+    """Return what makes the policies of a class, which the whole spec names."""
     return functools.partial(make_from_class, spec, find_class(spec))
 
 
 def _of_system(kind: str, _spec: str, target: str, options: Mapping[str, str]) -> PolicyMaker:
-    return functools.partial(_build, cast("System", system_of(kind, target, options)))
+    """Return what makes the policies of a system, or of a planner and its hands."""
+    system = cast("System", system_of(kind, target, options))
+    return functools.partial(_build, system)
 
 
 def _of_listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMaker:
@@ -164,7 +194,10 @@ def _of_listener(_spec: str, name: str, options: Mapping[str, str]) -> PolicyMak
 
 
 def _of_process(spec: str, name: str, _options: Mapping[str, str]) -> PolicyMaker:
-    """Return what makes the policies of a class, or returns an object again and again."""
+    """Return the maker of policies for a `live` object or class, as Python code has handed it over.
+
+    An object plays every episode itself; of a class, each episode gets a policy of its own.
+    """
     found = live[name]
     if isinstance(found, type):
         return functools.partial(make_from_class, spec, found)
@@ -174,11 +207,8 @@ def _of_process(spec: str, name: str, _options: Mapping[str, str]) -> PolicyMake
 
 
 OURS = {
-    one.name: one
-    for one in (
-        PolicyKind(SYSTEM, functools.partial(_of_system, SYSTEM)),
-        PolicyKind(PLANNER, functools.partial(_of_system, PLANNER)),
-        PolicyKind(LISTENER, _of_listener),
-        PolicyKind(LIVE, _of_process),
-    )
+    SYSTEM: PolicyKind(SYSTEM, functools.partial(_of_system, SYSTEM)),
+    PLANNER: PolicyKind(PLANNER, functools.partial(_of_system, PLANNER)),
+    LISTENER: PolicyKind(LISTENER, _of_listener),
+    LIVE: PolicyKind(LIVE, _of_process),
 }

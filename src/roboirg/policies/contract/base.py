@@ -140,5 +140,5 @@ def tell_policy(policy: object, utterances: Iterable[Mapping[str, Any]]) -> None
     """
     hear = getattr(policy, "hear", None)
     if callable(hear):
-        for one in utterances:
-            hear(one["text"], one["step"])
+        for utterance in utterances:
+            hear(utterance["text"], utterance["step"])

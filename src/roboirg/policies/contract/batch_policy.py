@@ -7,6 +7,7 @@ object per episode, and ``act_batch(states, observations)``, which returns a chu
 
 from __future__ import annotations
 
+import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -32,7 +33,8 @@ class BatchedEpisode:
     """
 
     def __init__(self, policy: Any, seed: int) -> None:  # noqa: ANN401 - any class with two methods
-        self._policy, self._seed = policy, seed
+        self._policy = policy
+        self._seed = seed
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401
         if name in ("attach", "usage", "close", "follow") or name.startswith("_"):
@@ -42,8 +44,9 @@ class BatchedEpisode:
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin the episode."""
         begin = self._policy.begin
-        seed = {"seed": self._seed} if "seed" in parameters_of(begin) else {}
-        self._state = begin(instruction, demonstration, **seed)
+        if "seed" in parameters_of(begin):
+            begin = functools.partial(begin, seed=self._seed)
+        self._state = begin(instruction, demonstration)
 
     def act(self, observation: Observation) -> Actions:
         """Return the next actions."""
@@ -57,7 +60,7 @@ class BatchedEpisode:
         Raises:
             ValueError: the policy did not return one chunk for each.
         """
-        states = [one._state for one in episodes]  # noqa: SLF001 - of this class
+        states = [episode._state for episode in episodes]  # noqa: SLF001 - of this class
         chunks = list(self._policy.act_batch(states, list(observations)))
         if len(chunks) != len(states):
             raise ValueError(
@@ -74,12 +77,15 @@ class BatchedEpisode:
 
 
 _made: dict[tuple[str, object], Any] = {}
+"""The policies of this process, by spec and class or object."""
 
 
 def forget_batched(spec: str) -> None:
     """Let the policies of a spec be made anew, as when a run begins."""
-    for key in [one for one in _made if one[0] == spec]:
-        del _made[key]
+    for key in list(_made):
+        made_spec, _ = key
+        if made_spec == spec:
+            del _made[key]
 
 
 def make_batched(key: tuple[str, object], make: Callable[[], Any], seed: int) -> BatchedEpisode:

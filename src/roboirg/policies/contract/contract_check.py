@@ -19,23 +19,31 @@ ARGUMENTS: Mapping[str, tuple[str, ...]] = {
 
 
 def check_policy(spec: str, policy: object, methods: tuple[str, ...]) -> None:
-    """Raise for a class of policies, or a policy, with which every episode would end in an error.
+    """Raise for a policy, or a class of policies, with which every episode would end in an error.
 
-    What only shows when it is made, such as a missing argument, shows when it is opened.
+    What shows only when a policy is made, such as a missing argument, is found when it is opened.
+
+    Args:
+        spec: of the policy, for errors.
+        policy: the policy or the class.
+        methods: that it must have; one that takes batches is checked without them.
     """
     kind = policy if isinstance(policy, type) else type(policy)
-    if takes_batches(policy) and hasattr(policy, "attach"):
-        raise InvalidValueError(
-            f"Policy {spec!r}: class {kind.__name__} has attach() and act_batch(); a privileged "
-            "policy is asked about one episode at a time."
-        )
-    for method in () if takes_batches(policy) else methods:
-        if not callable(getattr(policy, method, None)):
+    if takes_batches(policy):
+        if hasattr(policy, "attach"):
             raise InvalidValueError(
-                f"Policy {spec!r}: class {kind.__name__} has no method {method}()."
+                f"Policy {spec!r}: class {kind.__name__} has attach() and act_batch(); a "
+                "privileged policy is asked about one episode at a time."
             )
-        if policy is kind and method in ARGUMENTS:
-            _check_arguments(spec, getattr(policy, method), ARGUMENTS[method])
+        methods = ()
+    for name in methods:
+        method = getattr(policy, name, None)
+        if not callable(method):
+            raise InvalidValueError(
+                f"Policy {spec!r}: class {kind.__name__} has no method {name}()."
+            )
+        if policy is kind and name in ARGUMENTS:
+            _check_arguments(spec, method, ARGUMENTS[name])
     try:
         PolicyNeeds.of(policy)
     except InvalidValueError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,7 +21,25 @@ _TOO_LARGE = 2**63
 _MAX_SHOWN = 80
 
 
-def as_json(value: Any, owner: str | None = None, key: str = "", depth: int = 1) -> Any:  # noqa: ANN401
+class _Place(NamedTuple):
+    """Where a value stands, for errors and limits.
+
+    Attributes:
+        owner: whose value it is; None for a stranger's.
+        key: of the value, such as ``policy.sizes[2]``; empty for the outermost.
+        depth: containers around it, and one.
+    """
+
+    owner: str | None
+    key: str = ""
+    depth: int = 1
+
+    def inside(self, key: str) -> _Place:
+        """Return the place of a value in the container that stands here."""
+        return _Place(self.owner, key, self.depth + 1)
+
+
+def as_json(value: Any, owner: str | None = None) -> Any:  # noqa: ANN401
     """Return a value as JSON values that every reader of records can read.
 
     Numbers and arrays of NumPy, PyTorch and JAX become numbers and lists, paths and keys texts;
@@ -31,54 +49,87 @@ def as_json(value: Any, owner: str | None = None, key: str = "", depth: int = 1)
         value: anything.
         owner: whose value it is, for the error; None for a stranger's, in which all else becomes
             text, cut and without characters that control a terminal.
-        key: of the value.
-        depth: containers around it, and one.
 
     Raises:
         InvalidValueError: the owner's value is something else, a number that is not finite, a
             whole one of more than 63 bits, or nested too deep.
     """
-    if depth > MAX_DEPTH:
-        if owner is not None:
+    return _as_json(value, _Place(owner))
+
+
+def _as_json(value: Any, place: _Place) -> Any:  # noqa: ANN401
+    """Return a value as JSON values: mappings, arrays, sequences, and all else as a scalar.
+
+    Args:
+        value: anything.
+        place: where it stands in what is converted.
+    """
+    if place.depth > MAX_DEPTH:
+        if place.owner is not None:
             raise InvalidValueError(
-                f"{owner} are nested more than {MAX_DEPTH} deep; make them flat."
+                f"{place.owner} are nested more than {MAX_DEPTH} deep; make them flat."
             )
-        value = "…"
+        return "…"
     if isinstance(value, Mapping):
-        return {
-            _text(one, owner, key or "a key"): as_json(
-                held, owner, f"{key}.{one}" if key else str(one), depth + 1
-            )
-            for one, held in value.items()
-        }
+        return _object(value, place)
+    # An array of NumPy, PyTorch or JAX, or a scalar of theirs, known by its attributes.
     if hasattr(value, "tolist") and hasattr(value, "shape") and not isinstance(value, type):
-        if math.prod(value.shape) > _MAX_LISTED:
-            return f"array of shape {tuple(value.shape)}, {value.dtype}"
-        found = value.tolist()
-        # Number types that NumPy does not know, such as bfloat16, stay themselves.
-        return as_json(float(value) if isinstance(found, np.generic) else found, owner, key, depth)
+        return _array(value, place)
     if isinstance(value, Sequence) and not isinstance(value, str | bytes | bytearray | memoryview):
-        return [
-            as_json(held, owner, f"{key}[{index}]", depth + 1) for index, held in enumerate(value)
-        ]
-    if isinstance(value, int | float) and (
-        abs(value) < (_TOO_LARGE if isinstance(value, int) else math.inf)
-    ):
-        # Of a subclass, too.
-        kind = next(one for one in (bool, int, float) if isinstance(value, one))
-        return kind(value)
-    return None if value is None else _text(value, owner, key)
+        entries: list[Any] = []
+        for index, entry in enumerate(value):
+            entries.append(_as_json(entry, place.inside(f"{place.key}[{index}]")))
+        return entries
+    return _scalar(value, place)
 
 
-def _text(value: object, owner: str | None, key: str) -> str:
-    """Return what stands for text."""
-    if owner is None:
+def _scalar(value: object, place: _Place) -> Any:  # noqa: ANN401
+    """Return a value that holds no others as a plain JSON value; one that JSON lacks as a text."""
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, int) and abs(value) < _TOO_LARGE:
+        return int(value)
+    if isinstance(value, float) and math.isfinite(value):
+        return float(value)
+    return _text(value, place)
+
+
+def _object(value: Mapping[Any, Any], place: _Place) -> dict[str, Any]:
+    """Return a mapping as a JSON object, whose keys are texts.
+
+    In errors, the entry ``b`` of ``a`` is called ``a.b``.
+    """
+    entries: dict[str, Any] = {}
+    for key, entry in value.items():
+        name = _text(key, place._replace(key=place.key or "a key"))
+        path = f"{place.key}.{key}" if place.key else str(key)
+        entries[name] = _as_json(entry, place.inside(path))
+    return entries
+
+
+def _array(value: Any, place: _Place) -> Any:  # noqa: ANN401
+    """Return an array as lists; of a large one only ``array of shape (256, 256, 3), uint8``."""
+    if math.prod(value.shape) > _MAX_LISTED:
+        return f"array of shape {tuple(value.shape)}, {value.dtype}"
+    listed = value.tolist()
+    if isinstance(listed, np.generic):
+        listed = float(value)  # a number type that NumPy does not know, such as bfloat16
+    return _as_json(listed, place)
+
+
+def _text(value: object, place: _Place) -> str:
+    """Return a value as a text.
+
+    A stranger's value may be anything. One with an owner has to be a text, a path or a whole
+    number, and anything else raises `InvalidValueError`.
+    """
+    if place.owner is None:
         return printable(str(value)[:_MAX_TEXT_LENGTH])
     if isinstance(value, str):
         return str.__str__(value)  # of a subclass, too
     if isinstance(value, PurePath | int | np.integer):
         return str(value)
     raise InvalidValueError(
-        f"{owner}: {key!r} is {clip_text(repr(value), _MAX_SHOWN)}; it must be a text, a finite "
-        "number, True, False, None, or an array, list or dict of these."
+        f"{place.owner}: {place.key!r} is {clip_text(repr(value), _MAX_SHOWN)}; it must be a text, "
+        "a finite number, True, False, None, or an array, list or dict of these."
     )

@@ -35,17 +35,36 @@ def check_options(kind: type[Options], values: Mapping[str, Any], origin: str) -
     try:
         return kind.model_validate(flags_as_words(values))
     except ValidationError as error:
-        # What stands there and means nothing explains best what is missing.
-        first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
-        name = str(first["loc"][-1]) if first["loc"] else "options"
-        if first["type"] == "extra_forbidden":
-            raise UnknownNameError(f"option of {origin} named", name, _names(kind)) from None
-        if first["type"] == "missing":
-            raise InvalidValueError(f"{origin}: option {name} is missing.") from None
-        message = plain_complaint(first["msg"])
-        given = re.sub(r"//[^/@]*@", "//…@", repr(first["input"]))  # no password of a URL
-        end = "" if message.endswith((".", "?")) else "."
-        raise InvalidValueError(f"{origin}: option {name} is {given}; {message}{end}") from None
+        raise _in_one_sentence(error, kind, origin) from None
+
+
+def _in_one_sentence(
+    error: ValidationError, kind: type[BaseModel], origin: str
+) -> InvalidValueError | UnknownNameError:
+    """Return pydantic's faults as an error of one sentence.
+
+    It is about the first unknown option, or without any about the first fault.
+
+    Args:
+        error: with all faults.
+        kind: class of the options.
+        origin: of the options, such as ``system GroundSG``.
+    """
+    faults = error.errors()
+    unknown = [fault for fault in faults if fault["type"] == "extra_forbidden"]
+    # An option that does not exist explains best why another one is missing.
+    fault = unknown[0] if unknown else faults[0]
+    name = str(fault["loc"][-1]) if fault["loc"] else "options"
+    if unknown:
+        return UnknownNameError(f"option of {origin} named", name, _names(kind))
+    if fault["type"] == "missing":
+        return InvalidValueError(f"{origin}: option {name} is missing.")
+    # A URL may hold a password: "http://me:secret@host" is shown as "http://…@host".
+    given = re.sub(r"//[^/@]*@", "//…@", repr(fault["input"]))
+    complaint = plain_complaint(fault["msg"])
+    if not complaint.endswith((".", "?")):
+        complaint += "."
+    return InvalidValueError(f"{origin}: option {name} is {given}; {complaint}")
 
 
 def flags_as_words(given: Any) -> Any:  # noqa: ANN401 - options, or the value of one
@@ -59,7 +78,11 @@ def flags_as_words(given: Any) -> Any:  # noqa: ANN401 - options, or the value o
 
 
 def plain_complaint(message: str) -> str:
-    """Return pydantic's complaint about a value in plain words, to stand behind the value."""
+    """Return pydantic's complaint about a value in plain words, to stand behind the value.
+
+    ``Input should be a valid integer, unable to parse string`` becomes ``it must be a whole
+    number``.
+    """
     return (
         re.sub("^Value error, |, (unable|got) .*| or an instance of .*", "", message)
         .replace("Input should", "it must")
@@ -73,10 +96,12 @@ def plain_complaint(message: str) -> str:
 
 
 def _names(kind: type[BaseModel]) -> list[str]:
-    """Return the names of all options, those in tables in place of the table."""
+    """Return the names of all options, with those in a table (a field that is a model itself)."""
     names: list[str] = []
     for name, field in kind.model_fields.items():
         table = field.annotation
-        is_table = isinstance(table, type) and issubclass(table, BaseModel)
-        names += _names(table) if is_table else [name]  # type: ignore[arg-type]
+        if isinstance(table, type) and issubclass(table, BaseModel):
+            names += _names(table)
+        else:
+            names.append(name)
     return names

@@ -24,7 +24,8 @@ class EpisodeLoop:
     """The turns of an episode; subclasses guard, record or split its calls."""
 
     def __init__(self, env: RoboIRGEnv, policy: Policy) -> None:
-        self.env, self.policy = env, policy
+        self.env = env
+        self.policy = policy
 
     def play(self) -> dict[str, Any]:
         """Play the episode from beginning to end. Returns the last step's info."""
@@ -79,16 +80,26 @@ def play(env: RoboIRGEnv, policy: Policy) -> dict[str, Any]:
     return EpisodeLoop(env, policy).play()
 
 
+_CHECKED_NEEDS = (
+    "actions",
+    "demonstration_frames",
+    "observe_every",
+    "history_cameras",
+    "depth",
+    "calibration",
+)
+
+
 def _check(env: RoboIRGEnv, policy: Policy) -> None:
-    """Raise if the environment does not meet the policy's needs."""
+    """Raise if the environment was made with other values than the policy declares as its needs."""
     needs = PolicyNeeds.of(policy, *ENV_NEEDS)
-    extras = ("depth", "calibration")
-    for name in ("actions", "demonstration_frames", "observe_every", "history_cameras", *extras):
-        value, given = getattr(needs, name), getattr(env, name)
+    for name in _CHECKED_NEEDS:
+        needed = getattr(needs, name)
+        given = getattr(env, name)
         # What a policy does not declare, it takes as it comes.
-        is_open = not value or not (name == "actions" or hasattr(policy, name))
-        if value != given and not is_open:
+        is_declared = name == "actions" or hasattr(policy, name)
+        if is_declared and needed and needed != given:
             raise InvalidValueError(
-                f"{type(policy).__name__} needs {name}={value!r}, but the environment has "
-                f"{given!r}; make it with {name}={value!r}."
+                f"{type(policy).__name__} needs {name}={needed!r}, but the environment has "
+                f"{given!r}; make it with {name}={needed!r}."
             )

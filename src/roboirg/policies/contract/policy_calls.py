@@ -36,6 +36,8 @@ _METADATA = "the policy's metadata"
 
 MAX_COSTS = 64
 """Most entries of a policy's usage."""
+MAX_COST_LETTERS = 64
+"""Most characters of an entry's name."""
 GUESSED = "guessed"
 """The entry of a policy's usage for an episode whose words mean nothing to it."""
 
@@ -99,53 +101,65 @@ def read_metadata(text: str) -> dict[str, JsonValue]:
 
 
 def _checked(metadata: object, *, is_ours: bool) -> dict[str, JsonValue]:
+    """Return a policy's metadata as JSON values, or raise like `policy_metadata`.
+
+    Args:
+        metadata: of the policy.
+        is_ours: whether the policy's code is ours; only that may use the key `SERVER`.
+    """
     if not isinstance(metadata, Mapping):
         raise InvalidValueError(f"{_METADATA} are a {type(metadata).__name__}, not a dict.")
-    found: dict[str, JsonValue] = as_json(metadata, _METADATA)
-    plain = json.dumps(found, ensure_ascii=False)
-    if len(plain) > MAX_METADATA_LENGTH:
+    values: dict[str, JsonValue] = as_json(metadata, _METADATA)
+    text = json.dumps(values, ensure_ascii=False)
+    if len(text) > MAX_METADATA_LENGTH:
         raise InvalidValueError(
-            f"{_METADATA} have {len(plain)} characters of JSON; "
+            f"{_METADATA} have {len(text)} characters of JSON; "
             f"at most {MAX_METADATA_LENGTH} are allowed."
         )
-    if not is_encodable(plain):
+    if not is_encodable(text):
         raise InvalidValueError(f"{_METADATA} hold text with lone surrogates.")
-    # A planner's metadata have those of the policy behind it under "policy".
-    behind = found.get("policy")
-    keys = (*found, *(behind if isinstance(behind, dict) else ()))
-    for key in (REAL_TRIAL,) if is_ours else (REAL_TRIAL, SERVER):
+
+    keys = set(values)
+    of_follower = values.get("policy")  # a planner's metadata hold those of the policy behind it
+    if isinstance(of_follower, dict):
+        keys.update(of_follower)
+    reserved = [REAL_TRIAL]
+    if not is_ours:
+        reserved.append(SERVER)
+    for key in reserved:
         if key in keys:
             raise InvalidValueError(
                 f"{_METADATA} have the key {key!r}, which is reserved; choose another name."
             )
-    return found
+    return values
 
 
 def policy_usage(policy: Policy) -> dict[str, float]:
-    """Return the costs that a policy reports; those below 0 or beyond reason are left out.
+    """Return the costs that a policy reports, such as ``{"calls": 3.0}``.
 
-    So are those that are unknown, which is NaN.
+    Costs below 0, of `_TOO_LARGE` or more, and NaN, which means that one is unknown, are left out.
 
     Raises:
         InvalidValueError: there are too many, a name is not a short text, or a cost no number.
     """
-    reported = policy.usage() if hasattr(policy, "usage") else {}
+    if not hasattr(policy, "usage"):
+        return {}
     usage: dict[str, float] = {}
-    for name, value in reported.items():
+    for name, value in policy.usage().items():
         try:
             usage[str(name)] = float(value)
         except (TypeError, ValueError):
-            shown = clip_text(repr(value), MAX_COSTS)
+            shown = clip_text(repr(value), MAX_COST_LETTERS)
             raise InvalidValueError(
                 f"usage() has {shown} as {name!r}; it must be a number."
             ) from None
-        except OverflowError:  # beyond reason
+        except OverflowError:  # a whole number that is too large for a float
             continue
-    is_short = all(len(name) <= MAX_COSTS and is_encodable(name) for name in usage)
-    if len(usage) > MAX_COSTS or not is_short:
+    are_names = all(len(name) <= MAX_COST_LETTERS and is_encodable(name) for name in usage)
+    if len(usage) > MAX_COSTS or not are_names:
         raise InvalidValueError(
             f"usage() has {len(usage)} entries; it may have at most {MAX_COSTS}, with names of at "
-            f"most {MAX_COSTS} characters."
+            f"most {MAX_COST_LETTERS} characters."
         )
     return {name: cost for name, cost in usage.items() if 0 <= cost < _TOO_LARGE}
 
@@ -157,8 +171,9 @@ def server_version(metadata: Mapping[str, Any]) -> str | None:
         metadata: of the policy, or of a planner and a policy, after `reset`. Those of clients hold
             the address of the ``server`` and what it reported, such as its ``version``.
     """
-    for told in (metadata, metadata.get("policy")):
-        if isinstance(told, Mapping) and "server" in told:
-            version = told.get("version")
+    # Behind a planner, the metadata of the policy are an entry of the planner's.
+    for of_client in (metadata, metadata.get("policy")):
+        if isinstance(of_client, Mapping) and SERVER in of_client:
+            version = of_client.get("version")
             return None if version in (None, "", "unknown") else as_name(str(version))
     return None

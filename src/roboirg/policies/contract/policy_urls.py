@@ -44,14 +44,19 @@ def split_url(spec: str) -> PolicyRef:
 
 
 def parse_query(spec: str, query: str) -> dict[str, str]:
-    """Return the options in the query of a policy's spec.
+    """Return the options in the query of a policy's spec: of ``a=1&b=x`` a is ``1`` and b ``x``.
+
+    Args:
+        spec: the whole of it, for errors; it must hold no key or password.
+        query: what stands behind its ``?``.
 
     Raises:
         InvalidValueError: the query is malformed, gives an option twice, or holds a key.
     """
-    whole = unquote(spec)
-    shown = _KEY.sub(r"\1\2…", whole)
-    if shown != whole:
+    # A key may be anywhere in the spec, and percent-encoded.
+    plain = unquote(spec)
+    shown = _KEY.sub(r"\1\2…", plain)
+    if shown != plain:
         raise InvalidValueError(
             f"Policy {shown!r} holds a key or password, which plans and records would keep; put it "
             "into an environment variable and name that with api_key_env=NAME."

@@ -30,14 +30,30 @@ def read_version(policy: object) -> str | None:
         InvalidValueError: it is something else, which may differ in each process, or empty; or it
             cannot be read.
     """
-    kind, subject = type(policy), f"version of {type(policy).__name__}"
+    kind = type(policy)
     try:
         value: Any = policy.version  # type: ignore[attr-defined]
     except (Exception, SystemExit) as error:
-        missing = isinstance(error, AttributeError) and error.name in ("version", None)
-        if missing and not hasattr(kind, "version"):
+        # Not an AttributeError inside of a property `version`, which is a fault.
+        is_missing = isinstance(error, AttributeError) and error.name in ("version", None)
+        if is_missing and not hasattr(kind, "version"):
             return None
-        raise InvalidValueError(f"{subject} cannot be read: {one_line(error)}.") from error
+        raise InvalidValueError(
+            f"version of {kind.__name__} cannot be read: {one_line(error)}."
+        ) from error
+    return _version_text(value, f"version of {kind.__name__}")
+
+
+def _version_text(value: Any, subject: str) -> str:  # noqa: ANN401 - whatever the policy has
+    """Return a version as a text that records can hold.
+
+    ``"v1"`` stays, ``2`` becomes ``"2"``. A text that is long, or has characters that a name cannot
+    hold, is cut or changed and gets a hash of the original, so that different ones stay different.
+
+    Args:
+        value: of the policy.
+        subject: whose version it is, for errors.
+    """
     if isinstance(value, np.generic | np.ndarray) and value.ndim == 0:
         value = value.item()
     if isinstance(value, os.PathLike):
@@ -48,16 +64,22 @@ def read_version(policy: object) -> str | None:
             "path, such as the name of a checkpoint, or not be there."
         )
     text = str(value)
-    shown = as_name(text)
-    # Long paths may differ in their last letters only, others in what a name cannot hold.
-    cut = f"{shown[:MOST_LETTERS]}…{short_hash(ascii(text))}"
-    return shown if shown == text and len(shown) <= MOST_LETTERS else cut
+    name = as_name(text)
+    if name == text and len(name) <= MOST_LETTERS:
+        return name
+    return f"{name[:MOST_LETTERS]}…{short_hash(ascii(text))}"
 
 
 def file_fingerprint(declaring: object) -> str | None:
-    """Return a hash of a class, or an object's, and the file that defines it; None without one.
+    """Return a hash of the file that defines a class, and of the class's name.
 
-    In a notebook, which is no file, its methods count.
+    A class of a notebook is in no file, so that the source of its methods counts.
+
+    Args:
+        declaring: the class, or an object of it.
+
+    Returns:
+        The hash; None if no source is found.
     """
     kind = declaring if isinstance(declaring, type) else type(declaring)
     try:
@@ -72,13 +94,18 @@ def file_fingerprint(declaring: object) -> str | None:
 
 
 def content_of(text: str) -> str:
-    """Return a hash of the file or checkpoint that a text names; the text if it names neither."""
+    """Return a hash of the file or checkpoint that a text names; the text if it names neither.
+
+    A checkpoint is a folder with a `CHECKPOINT_FILE`; all files in it count.
+    """
     files = [Path(text)]
-    content = ""
+    hashes = ""
     with contextlib.suppress(OSError):  # what cannot be read is reported where it is used
         if Path(f"{text}/{CHECKPOINT_FILE}").is_file():
             files = sorted(Path(text).iterdir())
         for path in files:
             if path.is_file():
-                content += file_hash(path)
-    return short_hash(content) if content else text or "empty"
+                hashes += file_hash(path)
+    if hashes:
+        return short_hash(hashes)
+    return text or "empty"

@@ -28,6 +28,8 @@ class RandomState:
         self._python = random.Random(seed).getstate()
         self._numpy: Any = np.random.RandomState(seed % 2**32).get_state()
         self._torch: tuple[Any, ...] | None = None
+        """PyTorch's generators: of the processor, then of each device. None if the episode has not
+        used PyTorch; empty before their states are kept for the first time."""
 
     def __enter__(self) -> None:
         if RandomState._active is not self:
@@ -53,18 +55,24 @@ class RandomState:
 
         What draws numbers next, outside of any episode, does not change those of an episode.
         """
-        active, cls._active = cls._active, None
+        active = cls._active
+        cls._active = None
         if active is not None:
             active._keep()  # noqa: SLF001 - of the same class
 
     def _keep(self) -> None:
-        self._python, self._numpy = random.getstate(), np.random.get_state()  # noqa: NPY002
+        """Keep the states of this process's generators, for the next turn of this episode."""
+        self._python = random.getstate()
+        self._numpy = np.random.get_state()  # noqa: NPY002
         torch = sys.modules.get("torch")
         if torch is not None and self._torch is not None:
-            devices = torch.cuda.get_rng_state_all() if torch.cuda.is_initialized() else ()
+            devices = ()
+            if torch.cuda.is_initialized():
+                devices = torch.cuda.get_rng_state_all()
             self._torch = (torch.get_rng_state(), *devices)
 
     def _restore(self) -> None:
+        """Set this process's generators to the states that were kept."""
         random.setstate(self._python)
         np.random.set_state(self._numpy)  # noqa: NPY002 - what policies may use
         if self._torch:

@@ -1,4 +1,8 @@
-"""The scripted hands: follow subgoals in words with the motions of the scripted expert."""
+"""The scripted hands: follow subgoals in words with the motions of the scripted expert.
+
+A subgoal such as ``pick up the red cube at <120, 87>`` becomes a motion of the expert, a
+*primitive* (`roboirg.core.episode.Primitive`), whose moves are planned one by one.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +47,20 @@ _EFFECTS: dict[str, tuple[str, ...]] = {
 
 class RefusedError(Exception):
     """A subgoal fits nothing or several things; caught by `ScriptedHands.follow`."""
+
+
+class _Meant(NamedTuple):
+    """The motion that a subgoal asks for, and the name of the object that it means, if any."""
+
+    motion: Primitive
+    thing: str | None
+
+
+class _Outcome(NamedTuple):
+    """How a motion ended, and why if it had no effect."""
+
+    how: EndKind
+    why: str = ""
 
 
 @dataclass
@@ -92,157 +110,219 @@ class ScriptedHands(AttachedPolicy):
         self.endings = []
         self._underway: _Underway | None = None
         self._last: _Underway | None = None
-        self._expert, self._began = MotionPrimitives(self._world), self._world.elapsed
+        self._expert = MotionPrimitives(self._world)
+        self._began = self._world.elapsed
 
     def usage(self) -> dict[str, float]:
         """Return how many subgoals were refused, and how many came to nothing."""
-        ends = Counter(one.how for one in self.endings)
-        refused = ends["refused"]
-        return {"refused": refused, "missed": ends.total() - ends["done"] - refused}
+        counts = Counter(end.how for end in self.endings)
+        refused = counts["refused"]
+        return {"refused": refused, "missed": counts.total() - counts["done"] - refused}
 
     def follow(self, subgoal: str) -> None:
-        """Begin the motion of a subgoal, or refuse it; without effect while a motion is made."""
+        """Begin the motion of a subgoal, or report at once how it ended; ignored during a motion.
+
+        A subgoal that was just done, in the same words or as the same act, is reported as done
+        again, so that a planner may repeat it. One that fits no thing or several is refused.
+        """
         self.settle()
         if self._underway is not None:
             return
-        if self._last is not None and _says_the_same(subgoal, self._last.subgoal):
-            self._report(subgoal, "done", thing=self._last.thing)
+        last = self._last
+        if last is not None and _says_the_same(subgoal, last.subgoal):
+            self._report(subgoal, _Outcome("done"), last.thing)
             return
         try:
             motion, thing = self._find_motion(subgoal)
         except RefusedError as error:
-            self._report(subgoal, "refused", str(error))
+            self._report(subgoal, _Outcome("refused", str(error)))
             return
-        if self._last is not None and _act_of(motion) == _act_of(self._last.motion):
-            self._report(subgoal, "done", thing=thing)
+        if last is not None and _act_of(motion) == _act_of(last.motion):
+            self._report(subgoal, _Outcome("done"), thing)
             return
-        if motion.kind == "hold":
-            moves = iter([self._still(motion.steps)] if motion.steps else [])
-        else:
+
+        if motion.kind != "hold":
             moves = self._expert.execute(motion)
+        elif motion.steps:
+            moves = iter([self._still(motion.steps)])
+        else:
+            moves = iter([])
         self._underway = _Underway(subgoal, motion, thing, moves, self._world.elapsed)
 
     def settle(self) -> None:
         """Plan the next move of the motion under way, and report the motion if it is over."""
-        now = self._underway
-        if now is None or now.next is not None:
+        underway = self._underway
+        if underway is None or underway.next is not None:
             return
-        how: EndKind | None = None
-        if self._world.elapsed - now.since > MOST_STEPS and now.motion.kind != "hold":
-            how, why = "time-out", f"it took more than {MOST_STEPS} steps"
-        else:
-            try:
-                now.next = next(now.chunks, None)
-                if now.next is None:
-                    how, why = self._outcome(now)
-            except MotionPlanningError as error:
-                how, why = "blocked", str(error)
-        if how is not None:
-            self._underway = None
-            self._last = now if how == "done" and now.motion.kind != "hold" else None
-            self._report(now.subgoal, how, why, now.thing)
+        outcome = self._advance(underway)
+        if outcome is None:
+            return
+        self._underway = None
+        self._last = None
+        if outcome.how == "done" and underway.motion.kind != "hold":
+            self._last = underway
+        self._report(underway.subgoal, outcome, underway.thing)
 
     def act(self, observation: Observation) -> Actions:  # noqa: ARG002
         """Return the next move; without a motion, actions that hold still."""
         self.settle()
         if self._underway is None or self._underway.next is None:
             return self._still(WAIT_STEPS)
-        rows, self._underway.next = self._underway.next, None
-        return rows
+        actions = self._underway.next
+        self._underway.next = None
+        return actions
 
     @property
     def _world(self) -> World:
         return self.env.session.world
 
-    def _report(self, subgoal: str, how: EndKind, why: str = "", thing: str | None = None) -> None:
+    def _report(self, subgoal: str, outcome: _Outcome, thing: str | None = None) -> None:
         step = self._world.elapsed - self._began
-        self.endings.append(SubgoalEnd(subgoal, how, why, thing, step))
+        self.endings.append(SubgoalEnd(subgoal, outcome.how, outcome.why, thing, step))
 
-    def _find_motion(self, subgoal: str) -> tuple[Primitive, str | None]:
-        """Return the motion of a subgoal, and the name of the object that it means."""
+    def _advance(self, underway: _Underway) -> _Outcome | None:
+        """Plan the next move of a motion; return how the motion ended, or None if it goes on."""
+        steps = self._world.elapsed - underway.since
+        if steps > MOST_STEPS and underway.motion.kind != "hold":
+            return _Outcome("time-out", f"it took more than {MOST_STEPS} steps")
+        try:
+            underway.next = next(underway.chunks, None)
+        except MotionPlanningError as error:
+            return _Outcome("blocked", str(error))
+        if underway.next is not None:
+            return None
+        if self._had_effect(underway):
+            return _Outcome("done")
+        if underway.motion.kind in PICKS:
+            return _Outcome("missed", "nothing is in the gripper")
+        return _Outcome("missed", "the motion had no effect")
+
+    def _find_motion(self, subgoal: str) -> _Meant:
+        """Return the motion that a subgoal asks for, and the name of the object that it means.
+
+        A motion that handles what is held has that as its subject, and the object as its place.
+
+        Raises:
+            RefusedError: it fits nothing or several things.
+        """
         from roboirg.simulation.expert.things import held_thing
-        from roboirg.tasks.choices import choices_of
 
         request = read_subgoal(subgoal)
         if request is None:
             raise RefusedError(UNKNOWN_WORDS)
         held = held_thing(self._world)
-        if request.kind in HANDLES_HELD and held is None:
+        kind = request.kind
+        if kind in HANDLES_HELD and held is None:
             raise RefusedError(EMPTY_HAND)
+        if kind == "hold":
+            return _Meant(Primitive("hold", ROBOT, steps=request.steps), None)
+
         thing = None if request.thing is None else self._select(request)
-        match request.kind:
-            case "hold":
-                return Primitive("hold", ROBOT, steps=request.steps), None
-            case "press":  # the point may be that of a target
-                is_meant = request.thing == "button"
-                button = str(thing) if is_meant else self._select(Request("press", "button"))
-                is_above = Fact("hovering", ROBOT, button) in self._world.facts
-                return Primitive("press_below" if is_above else "press", button), thing
-            case "put_down":  # at the height at which this task's expert lets go
-                motions = (one.primitives[0] for one in choices_of(self.env.episode))
-                usual = Primitive("put_down", ROBOT).height
-                height = next((one.height for one in motions if one.kind == "put_down"), usual)
-                return Primitive("put_down", str(held), height=height), held
-            case kind if kind in HANDLES_HELD:
-                return Primitive(kind, str(held), thing), thing
-            case kind:
-                return Primitive(kind, str(thing)), thing
+        if kind == "press":
+            return _Meant(self._press(request, str(thing)), thing)
+        if kind == "put_down":
+            return _Meant(Primitive("put_down", str(held), height=self._release_height()), held)
+        if kind in HANDLES_HELD:
+            return _Meant(Primitive(kind, str(held), thing), thing)
+        return _Meant(Primitive(kind, str(thing)), thing)
+
+    def _press(self, request: Request, thing: str) -> Primitive:
+        """Return the press of a button, from where the tool is if it hovers above it already.
+
+        *Press the button to stop the cube on the target* means the target, and its point may be
+        that of the target; then the scene's only button is pressed.
+        """
+        button = thing
+        if request.thing != "button":
+            button = self._select(Request("press", "button"))
+        is_above = Fact("hovering", ROBOT, button) in self._world.facts
+        return Primitive("press_below" if is_above else "press", button)
+
+    def _release_height(self) -> float:
+        """Return the height at which this task's expert lets go of what it puts down."""
+        from roboirg.tasks.choices import choices_of
+
+        for choice in choices_of(self.env.episode):
+            motion = choice.primitives[0]
+            if motion.kind == "put_down":
+                return motion.height
+        return Primitive("put_down", ROBOT).height
 
     def _select(self, request: Request) -> str:
-        """Return the name of the object that the point means, or else the words."""
+        """Return the name of the object that a request means: by its point, else by its words.
+
+        Raises:
+            RefusedError: nothing is near the point, or the words fit nothing or several things.
+        """
         from roboirg.simulation.expert.things import nearest_thing, present_things
 
         things = present_things(self._world, (str(request.thing),))
         if request.point is not None:
-            found = nearest_thing(things, request.point)
-            if found is None or found[1] > REACH_PIXELS:
-                row, column = request.point
-                raise RefusedError(
-                    f"no {request.thing} is within {REACH_PIXELS} pixels of <{row}, {column}>"
-                )
-            return found[0].item.name
-        fits = [one.item for one in things if request.color in (None, one.item.color)]
+            nearest = nearest_thing(things, request.point)
+            if nearest is not None:
+                thing, pixels = nearest
+                if pixels <= REACH_PIXELS:
+                    return thing.item.name
+            row, column = request.point
+            raise RefusedError(
+                f"no {request.thing} is within {REACH_PIXELS} pixels of <{row}, {column}>"
+            )
+
+        fits = [thing.item for thing in things if request.color in (None, thing.item.color)]
         if request.side is not None and fits:
-            position = self._world.bodies
-            by_y = sorted(fits, key=lambda one: position[one.name].position.y)
-            fits = [by_y[0 if request.side == "right" else -1]]
-        if len(fits) != 1:
-            count = "nothing fits" if not fits else f"{len(fits)} things fit"
-            side = request.side and f"{request.side}-side"
-            meant = " ".join(word for word in (side, request.color, request.thing) if word)
-            raise RefusedError(f"{count} the words {meant!r}; a point would say which")
-        return fits[0].name
+            bodies = self._world.bodies
+            # From right to left: the one with the least y is farthest to the right.
+            in_order = sorted(fits, key=lambda item: bodies[item.name].position.y)
+            fits = in_order[:1] if request.side == "right" else in_order[-1:]
+        if len(fits) == 1:
+            return fits[0].name
+        count = f"{len(fits)} things fit" if fits else "nothing fits"
+        raise RefusedError(f"{count} the words {_words_of(request)!r}; a point would say which")
 
     def _still(self, steps: int) -> NDArray[np.float64]:
         """Return actions that keep the arm and the gripper as they are."""
         arm = self._world.robot.arm_positions
         return np.tile(np.append(arm, self._expert.gripper), (steps, 1))
 
-    def _outcome(self, now: _Underway) -> tuple[EndKind, str]:
-        """Return how a motion ended that was made to its end, and why it had no effect."""
-        session, motion = self.env.session, now.motion
+    def _had_effect(self, underway: _Underway) -> bool:
+        """Return whether a motion that was made to its end has had its effect.
+
+        A press has it if the button was pressed since it began, as that is over at once. For other
+        motions, one of the facts in `_EFFECTS` must hold now.
+        """
+        motion = underway.motion
+        session = self.env.session
         if motion.kind in ("press", "press_below"):
-            late = (one for one in session.events if one.step > now.since and one.holds)
-            came = any(one.fact == Fact("pressed", motion.subject) for one in late)
-        else:
-            is_hover = motion.kind == "hover"
-            things = (ROBOT, motion.subject) if is_hover else (motion.subject, motion.place)
-            wanted = {Fact(kind, *things) for kind in _EFFECTS.get(motion.kind, ())}
-            came = not wanted or not wanted.isdisjoint(session.world.facts)
-        if came:
-            return "done", ""
-        is_pick = motion.kind in PICKS
-        return "missed", "nothing is in the gripper" if is_pick else "the motion had no effect"
+            pressed = Fact("pressed", motion.subject)
+            late = [event for event in session.events if event.step > underway.since]
+            return any(event.holds and event.fact == pressed for event in late)
+        things = (motion.subject, motion.place)
+        if motion.kind == "hover":
+            things = (ROBOT, motion.subject)
+        effects = {Fact(kind, *things) for kind in _EFFECTS.get(motion.kind, ())}
+        return not effects or not effects.isdisjoint(session.world.facts)
+
+
+def _words_of(request: Request) -> str:
+    """Return the object of a request as its words give it, such as ``left-side red cube``."""
+    words = [request.color, request.thing]
+    if request.side is not None:
+        words.insert(0, f"{request.side}-side")
+    return " ".join(word for word in words if word)
 
 
 def _says_the_same(subgoal: str, other: str) -> bool:
-    """Return whether two subgoals have the same words, and points that may mean the same thing."""
-    (words, point), (other_words, other_point) = split_point(subgoal), split_point(other)
+    """Return whether two subgoals mean the same: equal words, and points near each other.
+
+    Without a point in one of them, the texts must be equal.
+    """
+    words, point = split_point(subgoal)
+    other_words, other_point = split_point(other)
     if point is None or other_point is None:
         return subgoal == other
     return words == other_words and math.dist(point, other_point) <= REACH_PIXELS
 
 
 def _act_of(motion: Primitive) -> tuple[str, ...]:
-    """Return what a motion does, however it gets there."""
+    """Return what a motion does, however it gets there: ``press_below``, from a hover, presses."""
     return motion.kind.removesuffix("_below"), motion.subject, motion.place or ""

@@ -32,7 +32,10 @@ UNKNOWN = CheckpointFacts(dict.fromkeys(CAMERAS))
 
 
 def read_facts(place: str) -> CheckpointFacts:
-    """Return what a checkpoint takes, as far as a configuration on this computer gives it.
+    """Return what a checkpoint takes, as far as its configuration is on this computer.
+
+    That is in a folder, or in the cache of the Hub. Without it, or if it cannot be read, `UNKNOWN`
+    is returned.
 
     Args:
         place: a folder, or the id of a repository of the Hub; nothing is downloaded.
@@ -47,16 +50,21 @@ def read_facts(place: str) -> CheckpointFacts:
 
             path = Path(str(try_to_load_from_cache(place, CHECKPOINT_FILE)))
         config = json.loads(path.read_text(encoding="utf-8"))
-        shapes = {name: one.get("shape") for name, one in config["input_features"].items()}
+        features = config["input_features"]
+        shapes = {name: feature.get("shape") for name, feature in features.items()}
         limit = config.get("tokenizer_max_length")
     except (ImportError, OSError, ValueError, TypeError, KeyError, AttributeError):
         return UNKNOWN  # LeRobot names what is wrong where it loads the checkpoint
-    is_limit = isinstance(limit, int) and limit > 0
-    return CheckpointFacts(picture_sizes(place, shapes), limit if is_limit else None)
+    sizes = picture_sizes(place, shapes)
+    if isinstance(limit, int) and limit > 0:
+        return CheckpointFacts(sizes, limit)
+    return CheckpointFacts(sizes)
 
 
 def picture_sizes(place: str, shapes: Mapping[str, object]) -> dict[str, int | None]:
-    """Return the width of the square pictures that a checkpoint takes, by camera; else None.
+    """Return the cameras whose pictures a checkpoint takes, each with the width of the picture.
+
+    The width is None if the checkpoint declares none, or pictures that are not square.
 
     Args:
         place: of the checkpoint.
@@ -65,13 +73,14 @@ def picture_sizes(place: str, shapes: Mapping[str, object]) -> dict[str, int | N
     Raises:
         InvalidValueError: one of them does not exist here.
     """
-    names = {PICTURE.format(camera): camera for camera in CAMERAS}
+    cameras = {PICTURE.format(camera): camera for camera in CAMERAS}
+    inputs = [STATE, *cameras]
     for name in shapes:
-        if name.startswith("observation.") and name not in (STATE, *names):
+        if name.startswith("observation.") and name not in inputs:
             raise InvalidValueError(
-                f"The checkpoint {place!r} needs {name!r}; there are {', '.join((STATE, *names))}."
+                f"The checkpoint {place!r} needs {name!r}; there are {', '.join(inputs)}."
             )
-    return {camera: _width(shapes[name]) for name, camera in names.items() if name in shapes}
+    return {camera: _width(shapes[name]) for name, camera in cameras.items() if name in shapes}
 
 
 def _width(shape: object) -> int | None:

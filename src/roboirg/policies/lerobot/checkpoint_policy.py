@@ -33,7 +33,10 @@ from roboirg.policies.lerobot.checkpoint_facts import PICTURE, STATE, picture_si
 from roboirg.util.media import scaled_square
 
 _MAX_BRIGHTNESS = 255.0
-_BATCH = 8
+_GPU_BATCH = 8
+"""Episodes that a checkpoint on a GPU is asked about at once, by default."""
+_SEEDS = 2**32
+"""PyTorch's generators take seeds below this."""
 _WORDLESS = frozenset({"act", "diffusion", "tdmpc", "vqbet"})
 """Types of checkpoints that have no input for text."""
 _QUEUED = frozenset({
@@ -99,11 +102,13 @@ class LeRobotPolicy:
     def __init__(self, url: str, seed: int = 0) -> None:  # noqa: ARG002
         parts = split_url(url)
         self.options = read_options(parts, LeRobotPolicyOptions)
-        self.place, self.version = parts.target, self.options.version
+        self.place = parts.target
+        self.version = self.options.version
         facts = read_facts(parts.target)
         self.cameras = tuple(facts.sizes)
         self.prompt_tokens = self.options.prompt_tokens or facts.prompt_tokens
-        self.prompt_added, self.tokenizer = self.options.prompt_added, self.options.tokenizer
+        self.prompt_added = self.options.prompt_added
+        self.tokenizer = self.options.tokenizer
         self.metadata: Mapping[str, Any] = {}
         self.model: Any = None  # records name its number types and devices
 
@@ -123,9 +128,9 @@ class LeRobotPolicy:
         if self.model is None:
             self._load()
         model = copy.copy(self.model)
-        for name, one in vars(self.model).items():
-            if callable(getattr(one, "reset", None)):  # such as what ensembles actions over time
-                setattr(model, name, copy.copy(one))
+        for name, part in vars(self.model).items():
+            if callable(getattr(part, "reset", None)):  # such as what ensembles actions over time
+                setattr(model, name, copy.copy(part))
         model.reset()
         return CheckpointEpisode(np.random.default_rng(seed), model)
 
@@ -135,9 +140,12 @@ class LeRobotPolicy:
         """Return the checkpoint's next actions, (n, 8) for each episode."""
         import torch
 
-        size = 1  # the noise of an episode, or what is remembered of it, would depend on the others
+        # One at a time, unless the model takes batches: the noise of an episode, or what the model
+        # remembers of it, would else depend on the other episodes.
+        size = 1
         if self._takes_batches:
-            size = self.options.batch or (1 if self.options.device == "cpu" else _BATCH)
+            default = 1 if self.options.device == "cpu" else _GPU_BATCH
+            size = self.options.batch or default
         chunks: list[Actions] = []
         with torch.inference_mode():
             for start in range(0, len(states), size):
@@ -148,63 +156,83 @@ class LeRobotPolicy:
     def _ask(
         self, states: Sequence[CheckpointEpisode], observations: Sequence[Observation], size: int
     ) -> list[Actions]:
-        """Ask the model about at most `size` episodes; the last one fills up the batch."""
+        """Return the model's actions for at most `size` episodes, in one batch.
+
+        A batch always has `size` rows, as a model's rounding depends on their number: the last
+        episode is repeated to fill it up, and the surplus rows are dropped.
+        """
         import torch
 
         count = len(states)
-        seeds = [int(state.rng.integers(2**32)) for state in states]
-        torch.manual_seed(seeds[0])
-        batch = self._before(self._batch([*observations, *[observations[-1]] * (size - count)]))
+        missing = size - count
+        seeds = [int(state.rng.integers(_SEEDS)) for state in states]
+        torch.manual_seed(seeds[0])  # before all that may draw random numbers
+        filled_observations = [*observations, *[observations[-1]] * missing]
+        batch = self._before(self._batch(filled_observations))
         if size == 1:
             rows = self._select(states[0].model, batch)
         else:
-            rows = self._predict(states[0].model, [*seeds, *[seeds[-1]] * (size - count)], batch)
-        rows = torch.stack([self._after(rows[:, i]) for i in range(rows.shape[1])], dim=1)
+            filled_seeds = [*seeds, *[seeds[-1]] * missing]
+            rows = self._predict(states[0].model, filled_seeds, batch)
+        # The postprocessor takes the actions of one step.
+        steps = [self._after(rows[:, step]) for step in range(rows.shape[1])]
+        rows = torch.stack(steps, dim=1)
         actions: NDArray[np.float64] = rows[:count].cpu().numpy().astype(np.float64)
         return list(actions)
 
     def _predict(self, model: Any, seeds: Sequence[int], batch: dict[str, Any]) -> Any:  # noqa: ANN401
-        """Return the chunks of several episodes, of which the model remembers nothing."""
+        """Return the chunks of several episodes (episodes, n, 8), each with noise of its own seed.
+
+        The model must remember nothing of an episode, as all are asked about with the same one.
+        """
         import torch
 
         options = {}
         if self._noise is not None:
-            noise = [
-                torch.randn(self._noise, generator=torch.Generator().manual_seed(seed))
-                for seed in seeds
-            ]
+            noise = []
+            for seed in seeds:
+                generator = torch.Generator().manual_seed(seed)
+                noise.append(torch.randn(self._noise, generator=generator))
             options["noise"] = torch.stack(noise).to(self.options.device)
         steps = getattr(self._config, "n_action_steps", None)
         return model.predict_action_chunk(batch, **options)[:, :steps]
 
     def _select(self, model: Any, batch: dict[str, Any]) -> Any:  # noqa: ANN401
-        """Return the actions of one episode that no observation can change any more, (1, n, 8)."""
+        """Return the next actions of one episode (1, n, 8), as ``lerobot-eval`` asks for them.
+
+        That asks before every action; the model answers from a queue until it is empty. Here, all
+        are taken from the queue at once that the next observations cannot change any more.
+        """
         import torch
 
         rows = [model.select_action(batch)]
         if self._config.type in _QUEUED:
-            # The last ones wait for the observations that the next answer depends on.
+            # A model that remembers several observations has to see those before its next answer,
+            # so as many actions stay in the queue.
             queues = getattr(model, "_queues", None) or {}
-            decided = len(queues.get("action", getattr(model, "_action_queue", ())))
-            settled = decided - (self._config.n_obs_steps - 1)
-            rows += [model.select_action(batch) for _ in range(settled)]
+            queue = queues.get("action", getattr(model, "_action_queue", ()))
+            settled = len(queue) - (self._config.n_obs_steps - 1)
+            for _ in range(settled):
+                rows.append(model.select_action(batch))
         return torch.stack(rows, dim=1)
 
     def _batch(self, observations: Sequence[Observation]) -> dict[str, Any]:
         """Return observations in LeRobot's form: pictures (n, 3, H, W) in [0, 1]."""
         import torch
 
-        states = [np.append(one["joint_positions"], one["gripper"][0]) for one in observations]
+        states = []  # seven joints and the first finger
+        for observation in observations:
+            states.append(np.append(observation["joint_positions"], observation["gripper"][0]))
         batch: dict[str, Any] = {
             STATE: torch.from_numpy(np.stack(states).astype(np.float32)),
-            "task": [one["instruction"] for one in observations],
+            "task": [observation["instruction"] for observation in observations],
         }
         for camera, width in self._sizes.items():
-            seen = [one[f"{camera}_rgb"] for one in observations]  # type: ignore[literal-required]
-            if width is not None and width != len(seen[0]):
-                seen = [scaled_square(one, width) for one in seen]
+            pictures = [seen[f"{camera}_rgb"] for seen in observations]  # type: ignore[literal-required]
+            if width is not None and width != len(pictures[0]):
+                pictures = [scaled_square(picture, width) for picture in pictures]
             # In LeRobot's layout of memory, on which a model's rounding depends.
-            channels_first = torch.from_numpy(np.stack(seen)).permute(0, 3, 1, 2).contiguous()
+            channels_first = torch.from_numpy(np.stack(pictures)).permute(0, 3, 1, 2).contiguous()
             batch[PICTURE.format(camera)] = channels_first.float() / _MAX_BRIGHTNESS
         return batch
 
@@ -226,57 +254,85 @@ class LeRobotPolicy:
             ) from error
 
     def _load_model(self) -> None:
+        """Load configuration, processors and weights; find out how the model may be asked."""
         from lerobot.configs.policies import PreTrainedConfig
         from lerobot.policies.factory import get_policy_class, make_pre_post_processors
 
-        place, device = self.place, self.options.device
-        config = PreTrainedConfig.from_pretrained(place)
+        config = PreTrainedConfig.from_pretrained(self.place)
         if self.options.execute is not None:  # checked by LeRobot
-            single = {"temporal_ensemble_coeff": None}
-            unset = single if hasattr(config, "temporal_ensemble_coeff") else {}
-            config = replace(config, n_action_steps=self.options.execute, **unset)
-        config.device, self._config = device, config
-        features = config.input_features or {}
-        shapes = {name: getattr(one, "shape", None) for name, one in features.items()}
-        self._sizes = picture_sizes(place, shapes)
-        model = get_policy_class(config.type).from_pretrained(place, config=config)
+            changes: dict[str, Any] = {"n_action_steps": self.options.execute}
+            if hasattr(config, "temporal_ensemble_coeff"):
+                changes["temporal_ensemble_coeff"] = None
+            config = replace(config, **changes)
+        config.device = self.options.device
+        self._config = config
+
+        shapes: dict[str, object] = {}
+        for name, feature in (config.input_features or {}).items():
+            shapes[name] = getattr(feature, "shape", None)
+        self._sizes = picture_sizes(self.place, shapes)
+
+        model = get_policy_class(config.type).from_pretrained(self.place, config=config)
         self._before, self._after = make_pre_post_processors(
             config,
-            pretrained_path=place,
-            preprocessor_overrides={"device_processor": {"device": device}},
+            pretrained_path=self.place,
+            preprocessor_overrides={"device_processor": {"device": self.options.device}},
         )
-        takes = inspect.signature(model.predict_action_chunk).parameters
-        shape = getattr(config, "chunk_size", None), getattr(config, "max_action_dim", None)
-        self._noise = shape if "noise" in takes and None not in shape else None
-        # Of other types, ACT alone draws no noise; ensembling needs each episode's own plans.
+        self._noise = _noise_shape(config, model)
+        # Several episodes can be asked about at once if each can get its own noise, or none is
+        # drawn. Of types without noise as an argument, only ACT draws none; with ensembling the
+        # model remembers its earlier plans, which belong to one episode.
         is_ensembled = getattr(config, "temporal_ensemble_coeff", None) is not None
-        self._takes_batches = self._noise is not None or (config.type == "act" and not is_ensembled)
+        draws_nothing = config.type == "act" and not is_ensembled
+        self._takes_batches = self._noise is not None or draws_nothing
         self.metadata = _describe(config, self._before, self._after)
-        self.model = model.to(device).eval()
+        self.model = model.to(self.options.device).eval()
+
+
+def _noise_shape(config: Any, model: Any) -> tuple[int, int] | None:  # noqa: ANN401
+    """Return the shape of the noise that a chunk is made of; None if the model takes none."""
+    steps = getattr(config, "chunk_size", None)
+    dimensions = getattr(config, "max_action_dim", None)
+    takes_noise = "noise" in inspect.signature(model.predict_action_chunk).parameters
+    if not takes_noise or steps is None or dimensions is None:
+        return None
+    return steps, dimensions
 
 
 def _describe(config: Any, before: object, after: object) -> dict[str, Any]:  # noqa: ANN401
-    """Return a checkpoint's metadata, from its configuration and its processors."""
-    inputs = [
-        f"{name} {getattr(one, 'shape', '')}".strip()
-        for name, one in (config.input_features or {}).items()
-    ]
-    names = _step_names(before)
-    found: dict[str, Any] = {
+    """Return what records say of a checkpoint: how inputs are processed, and settings.
+
+    Args:
+        config: LeRobot's configuration of it.
+        before: its preprocessor.
+        after: its postprocessor.
+    """
+    inputs: list[str] = []
+    for name, feature in (config.input_features or {}).items():
+        shape = getattr(feature, "shape", "")
+        inputs.append(f"{name} {shape}".strip())
+    steps_before = _step_names(before)
+    metadata: dict[str, Any] = {
         "preprocessing": f"the checkpoint declares the inputs {', '.join(inputs)}; roboirg resizes "
         "pictures from 256 × 256 pixels to the declared height and width, if these are another "
         "square (whether training did likewise: not reported by the checkpoint), and scales their "
         "brightness to [0, 1], the range in which LeRobot's datasets deliver pictures; then the "
         "preprocessor that training saved with it is applied to all inputs, in the steps "
-        f"{', '.join(names) or 'none'}; its postprocessor is applied to the actions, in the steps "
-        f"{', '.join(_step_names(after)) or 'none'}"
+        f"{', '.join(steps_before) or 'none'}; its postprocessor is applied to the actions, in the "
+        f"steps {', '.join(_step_names(after)) or 'none'}"
     }
-    if tokenizers := [name for name in names if "tokenizer" in name]:
-        found |= {"reads_text": "yes", "text_normalization": ", ".join(tokenizers)}
+    tokenizers = [name for name in steps_before if "tokenizer" in name]
+    if tokenizers:
+        metadata["reads_text"] = "yes"
+        metadata["text_normalization"] = ", ".join(tokenizers)
     elif config.type in _WORDLESS:
-        found["reads_text"] = f"no, a policy of type {config.type} has no input for text"
-    sizes = {"chunk": "chunk_size", "execute": "n_action_steps"}
-    return found | {key: vars(config)[one] for key, one in sizes.items() if one in vars(config)}
+        metadata["reads_text"] = f"no, a policy of type {config.type} has no input for text"
+    settings = vars(config)
+    if "chunk_size" in settings:
+        metadata["chunk"] = settings["chunk_size"]
+    if "n_action_steps" in settings:
+        metadata["execute"] = settings["n_action_steps"]
+    return metadata
 
 
 def _step_names(processor: object) -> list[str]:

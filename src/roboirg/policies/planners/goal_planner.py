@@ -41,7 +41,8 @@ class GoalPlanner(OraclePlanner):
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode; decide on a goal if everything has been said."""
-        self._index = self._retries = 0
+        self._index = 0
+        self._retries = 0
         self._since: int | None = None
         self._decider.reset(instruction, demonstration)
 
@@ -50,18 +51,26 @@ class GoalPlanner(OraclePlanner):
         self._decider.hear(text, step)
 
     def learn(self, end: SubgoalEnd) -> None:
-        """Go on to the next stage, or repeat one that came to nothing."""
+        """Go on to the next stage, or repeat one that came to nothing.
+
+        A stage that was refused, or failed too often, ends the planning: no stage comes after it.
+        """
         stages = self._decider.stages
         if end.how == "done":
             self._index += 1
         elif end.how != "refused" and self._retries < MAX_RETRIES:
             self._retries += 1
-            self._index -= stages[self._index].primitive.kind in HANDLES_HELD and self._index > 0
+            # A stage that handles what is held needs it picked up again, in the stage before.
+            if stages[self._index].primitive.kind in HANDLES_HELD and self._index > 0:
+                self._index -= 1
         else:
             self._index = len(stages)
 
     def plan(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
-        """Return the next stage in words, as things are now; None after the last."""
+        """Return the next stage in words, as things are now; None after the last.
+
+        If the hands do not report how subgoals end, the world shows how many stages are completed.
+        """
         stages = self._decider.stages
         if stages and not self.reports:
             if self._since is None:
@@ -69,6 +78,5 @@ class GoalPlanner(OraclePlanner):
             self._index = completed_stages(self.env, stages, self._since)
         if self._index >= len(stages):
             return None
-        return stage_subgoal(
-            self.env, stages, self._index, grounded=self.options.subgoals == "grounded"
-        )
+        is_grounded = self.options.subgoals == "grounded"
+        return stage_subgoal(self.env, stages, self._index, grounded=is_grounded)

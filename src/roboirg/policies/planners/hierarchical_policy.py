@@ -56,21 +56,22 @@ class PlannerParts:
 
     def hear(self, text: str, step: int) -> None:
         """Pass an utterance on to all that remember language."""
-        for one in self._all:
-            tell_policy(one, [{"text": text, "step": step}])
+        for part in self._all:
+            tell_policy(part, [{"text": text, "step": step}])
 
     def usage(self) -> dict[str, float]:
-        """Return the cost of all."""
+        """Return the costs of planner and policy, added up by name."""
         total: Counter[str] = Counter()
-        for one in self._all:
-            total.update(one.usage() if hasattr(one, "usage") else {})
+        for part in self._all:
+            if hasattr(part, "usage"):
+                total.update(part.usage())
         return dict(total)
 
     def close(self) -> None:
         """Close all, the others even if closing one fails."""
         with contextlib.ExitStack() as stack:
-            for one in reversed(self._all):
-                stack.callback(close_policy, one)
+            for part in reversed(self._all):
+                stack.callback(close_policy, part)
 
 
 class HierarchicalPolicy(PlannerParts):
@@ -105,24 +106,25 @@ class HierarchicalPolicy(PlannerParts):
         self.planner = planner
         self.policy = policy
         self.name = name
-        if any(hasattr(one, "attach") for one in (planner, policy)):
+        if hasattr(planner, "attach") or hasattr(policy, "attach"):
             self.attach = functools.partial(_attach, (planner, policy))
-        own = PolicyNeeds.of(policy)
-        of_planner = PolicyNeeds.of_planner(planner)
-        self._parts = of_planner, own
-        self.needs = own.merge(of_planner)
+
+        self._planner_needs = PolicyNeeds.of_planner(planner)
+        self._policy_needs = PolicyNeeds.of(policy)
+        self.needs = self._policy_needs.merge(self._planner_needs)
         self._many_steps = self.needs.action_space.takes_many_steps
         if self._many_steps and self.needs.observe_every is None:
             # Only the history shows how many control steps an action took.
             self.needs = replace(self.needs, observe_every=1)
         self.needs.declare_on(self)
-        reports = isinstance(policy, ReportingFollower)
-        if getattr(planner, "asked", None) == WHEN_DONE and not reports:
+
+        self.reports = isinstance(policy, ReportingFollower)
+        if getattr(planner, "asked", None) == WHEN_DONE and not self.reports:
             raise InvalidValueError(
                 f"The planner is asked {WHEN_DONE}, but {type(policy).__name__} does not report "
                 "how subgoals end; set asked=each-chunk or asked='every N steps'."
             )
-        planner.reports = self.reports = reports  # type: ignore[attr-defined]
+        planner.reports = self.reports  # type: ignore[attr-defined]
 
     @property
     def endings(self) -> list[SubgoalEnd]:
@@ -141,36 +143,47 @@ class HierarchicalPolicy(PlannerParts):
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Begin an episode with both."""
         self.subgoal: str | None = None
-        self._observed = self._step = self._rows = self._reported = 0
+        self._step = 0
+        """Control steps of the policy so far."""
+        self._observed = 0
+        """Observations in the histories so far."""
+        self._rows = 0
+        """Actions of the last chunk."""
+        self._reported = 0
+        """Ends of subgoals that the planner has got."""
         self._gave_up = False
-        views = [
-            DemonstrationSubset(
-                demonstration, self.needs.demonstration_frames, one.demonstration_frames
-            )
-            for one in self._parts
-        ]
-        self.planner.reset(instruction, views[0])
-        self.policy.reset(instruction, views[1])
+        subset = functools.partial(
+            DemonstrationSubset, demonstration, self.needs.demonstration_frames
+        )
+        self.planner.reset(instruction, subset(self._planner_needs.demonstration_frames))
+        self.policy.reset(instruction, subset(self._policy_needs.demonstration_frames))
 
     def act(self, observation: Observation) -> Actions:
-        """Pass the planner's subgoal to the policy, and return the policy's actions."""
+        """Pass the planner's subgoal to the policy, and return the policy's actions.
+
+        Each of the two sees its own part of the history.
+        """
+        every = self.needs.observe_every
+        # Control steps since the last call: as many as rows were returned, unless an action takes
+        # several; then the history, with an observation every so many steps, shows them.
         history = observation.get("history", ())
-        self._step += (
-            len(history) * (self.needs.observe_every or 1) if self._many_steps else self._rows
-        )
-        views = [
-            select_history(observation, self._observed, self.needs.observe_every, one.observe_every)
-            for one in self._parts
-        ]
+        if self._many_steps:
+            self._step += len(history) * (1 if every is None else every)
+        else:
+            self._step += self._rows
+        select = functools.partial(select_history, observation, self._observed, every)
         self._observed += len(history)
         if not self._gave_up:
-            self._lead(views[0])
-        rows = self.policy.act(views[1])
+            self._lead(select(self._planner_needs.observe_every))
+        rows = self.policy.act(select(self._policy_needs.observe_every))
         self._rows = len(np.atleast_2d(rows))
         return rows
 
     def _lead(self, view: Observation) -> None:
-        """Pass the planner's subgoal on; ask again where the policy refuses it."""
+        """Pass the planner's subgoal to the policy; ask the planner again if it is refused.
+
+        After `MOST_REFUSALS` in a row, the planner is not asked any more in this episode.
+        """
         if isinstance(self.policy, ReportingFollower):
             self.policy.settle()
         for _ in range(MOST_REFUSALS):
@@ -180,7 +193,8 @@ class HierarchicalPolicy(PlannerParts):
                 return
             self.subgoal = subgoal
             self.policy.follow(subgoal)
-            if not any(one.how == "refused" for one in self.endings[self._reported :]):
+            new_ends = self.endings[self._reported :]
+            if not any(end.how == "refused" for end in new_ends):
                 return
             # The planner has the history already.
             view = cast("Observation", {**view, "history": ()})
@@ -189,21 +203,26 @@ class HierarchicalPolicy(PlannerParts):
 
     def _report_endings(self) -> None:
         """Report how subgoals ended since the last call to a planner that learns from it."""
-        new = self.endings[self._reported :]
-        self._reported += len(new)
-        for end in new if hasattr(self.planner, "learn") else ():
-            # Names of objects are the world's: they would do the remembering.
-            self.planner.learn(end._replace(thing=None))  # type: ignore[attr-defined]
+        new_ends = self.endings[self._reported :]
+        self._reported += len(new_ends)
+        if hasattr(self.planner, "learn"):
+            for end in new_ends:
+                # Names of objects are the world's: they would do the remembering.
+                self.planner.learn(end._replace(thing=None))
 
 
 def _attach(parts: tuple[object, ...], env: RoboIRGEnv) -> None:
-    """Pass the environment on; no method, as the cycle would keep the world."""
-    for one in parts:
-        if hasattr(one, "attach"):
-            one.attach(env)
+    """Pass the environment on to the parts that read it.
+
+    It is not a method: a policy that holds its own method would keep the world until the next
+    collection of garbage.
+    """
+    for part in parts:
+        if hasattr(part, "attach"):
+            part.attach(env)
 
 
 def joint_version(*parts: object) -> str:
     """Return the versions of a planner and its policy as one; of a part's file if it has none."""
-    found = (read_version(one) or file_fingerprint(one) or UNKNOWN_VERSION for one in parts)
-    return BETWEEN_VERSIONS.join(found)
+    versions = [read_version(part) or file_fingerprint(part) or UNKNOWN_VERSION for part in parts]
+    return BETWEEN_VERSIONS.join(versions)

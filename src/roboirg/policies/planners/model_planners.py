@@ -11,6 +11,7 @@ from pydantic import Field
 
 from roboirg.core.observations import Observation, Pixels
 from roboirg.core.subgoal_text import split_point
+from roboirg.policies.contract.base import SubgoalEnd
 from roboirg.policies.planners.planner import WHEN_DONE
 from roboirg.policies.planners.points import normalize_subgoal, parse_points
 from roboirg.policies.planners.vlm_planner import (
@@ -61,18 +62,33 @@ class QwenPlanner(VLMPlanner[QwenOptions]):
         self._history: list[str] = []
 
     def query(self, observation: Observation) -> ModelQuery:
-        """Show demonstration, task, past subgoals and the newest picture."""
-        history = "; ".join(f"{number}. {one}" for number, one in enumerate(self._history, 1))
-        said = self.fill("history", history=history) if history else self.fill("first")
-        video = self.video_parts(self.options.video_frames)
-        now = (self.fill("now"), Picture(front_picture(observation)))
-        return self.single((*video, self.goal(), said, *now, self.fill("question", **self.forms())))
+        """Return a query with demonstration, task, past subgoals and the newest picture."""
+        said = self.fill("first")
+        if self._history:
+            # Such as "1. press the button; 2. pick up the red cube at <|box_start|>…".
+            past = [f"{number}. {subgoal}" for number, subgoal in enumerate(self._history, 1)]
+            said = self.fill("history", history="; ".join(past))
+        parts = [
+            *self.video_parts(self.options.video_frames),
+            self.goal(),
+            said,
+            self.fill("now"),
+            Picture(front_picture(observation)),
+            self.fill("question", **self.forms()),
+        ]
+        return self.single(parts)
 
     def take(self, text: str) -> str:
-        """Return the subgoal; add it to the history if its words are new."""
+        """Return the subgoal in a reply; add it to the history unless it repeats the last one.
+
+        Points do not count: the same words with another point are the same subgoal.
+        """
         subgoal = parse_points(text)
-        last = parse_points(self._history[-1]) if self._history else ""
-        if not last or split_point(last)[0] != split_point(subgoal)[0]:
+        words, _ = split_point(subgoal)
+        last_words = None
+        if self._history:
+            last_words, _ = split_point(parse_points(self._history[-1]))
+        if words != last_words:
             self._history.append(normalize_subgoal(text))
         return subgoal
 
@@ -119,12 +135,17 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
         self._frames += frames
 
     def query(self, observation: Observation) -> ModelQuery:
-        """Add a turn with the frames since the last one."""
-        self._frames = self._frames or [front_picture(observation)]
-        fields = {"description": TEXT, "subgoal": TEXT}
-        if not self._turns:
+        """Return a query with one more turn, which has the frames since the last turn.
+
+        Only in the first turn the model has to list all subgoals (``subgoal_sequence``).
+        """
+        if not self._frames:
+            self._frames = [front_picture(observation)]
+        if self._turns:
+            fields = {"description": TEXT, "subgoal": TEXT}
+        else:
             fields = {"subgoal_sequence": _list_of(TEXT), "subgoal": TEXT}
-        self._turn = ChatTurn("user", tuple(self._parts("next" if self._turns else "first")))
+        self._turn = ChatTurn("user", tuple(self._parts()))
         system = self.fill("system", **self.forms())
         return ModelQuery(system, (*self._turns, self._turn), object_schema(fields))
 
@@ -138,20 +159,31 @@ class GeminiPlanner(VLMPlanner[GeminiOptions]):
         self._frames = []
         return subgoal
 
-    def _parts(self, when: str) -> Iterator[Part]:
+    def _parts(self) -> Iterator[Part]:
+        """Yield the parts of a turn: what is said if that is new, the frames, and the question.
+
+        The first turn shows the demonstration as a clip, with the first frame at its end. A later
+        turn shows a clip if there are enough frames, else only the newest frame as a picture.
+        """
         frames = self._frames
-        has_clip = len(self._frames) >= MIN_CLIP_FRAMES
-        clip = "clip"
-        if when == "first":
-            clip = "video"
+        if self._turns:
+            when = "next"
+            clip_prompt = "next_clip"
+            has_clip = len(frames) >= MIN_CLIP_FRAMES
+        else:
+            when = "first"
+            clip_prompt = "first_video"
             has_clip = self.video is not None
             if self.video is not None:
                 frames = [*self.video, *frames]
         if self._quoted != self.instruction:  # the first turn, or more has been said since
             yield self.goal()
-        yield self.fill(f"{when}_{clip}" if has_clip else f"{when}_picture")
-        rate = Fraction(VIDEO_RATE, self.options.observe_every)
-        yield Clip(np.stack(frames), rate) if has_clip else Picture(frames[-1])
+        if has_clip:
+            yield self.fill(clip_prompt)
+            yield Clip(np.stack(frames), Fraction(VIDEO_RATE, self.options.observe_every))
+        else:
+            yield self.fill(f"{when}_picture")
+            yield Picture(frames[-1])
         yield self.fill(f"{when}_question")
 
 
@@ -189,20 +221,24 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
         self._last_step = 0
 
     def watch(self, observation: Observation, step: int) -> None:
-        """Keep the frames to send: the newest, and those at multiples of the period before it."""
+        """Keep the frames to send: the newest, and the one of each period before it.
+
+        With a period of 16 steps and three frames, at step 50 these are of the steps 50, 34 and 18,
+        or where there is no frame of a step, the last one before it.
+        """
+        every = self.options.observe_every
         for earlier in observation.get("history", ()):
-            self._last_step += self.options.observe_every
+            self._last_step += every
             self._recent[self._last_step] = front_picture(earlier)
         self._recent[step] = front_picture(observation)
-        # The history has no frames at odd distances from the newest; the nearest before serve.
-        kept = {
-            max(
-                (at for at in self._recent if at <= step - back * self.options.observe_every),
-                default=-1,
-            )
-            for back in range(self.options.recent)
-        }
-        self._recent = {at: self._recent[at] for at in sorted(kept & self._recent.keys())}
+
+        kept: set[int] = set()
+        for periods in range(self.options.recent):
+            latest = step - periods * every
+            steps_until = [kept_step for kept_step in self._recent if kept_step <= latest]
+            if steps_until:
+                kept.add(max(steps_until))
+        self._recent = {kept_step: self._recent[kept_step] for kept_step in sorted(kept)}
 
     def query(self, observation: Observation) -> ModelQuery:  # noqa: ARG002
         """Show the demonstration, the task, the key frames and the recent frames."""
@@ -211,9 +247,12 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
         return self.single(self._parts(), object_schema(fields))
 
     def take(self, text: str) -> str:
-        """Return the subgoal; add the chosen frames, which are counted from 1."""
+        """Return the subgoal in a reply; remember the frames that it chooses.
+
+        It names positions in the recent frames, from 1 on. Of frames near each other one is kept,
+        and of all at most the newest `most`.
+        """
         reply = json_object(text)
-        count = len(self._recent)
         subgoal = parse_points(text_of(reply, "current_subtask"))
         positions = reply.get("keyframe_positions")
         if not isinstance(positions, list):
@@ -222,23 +261,28 @@ class MemerPlanner(VLMPlanner[MemerOptions]):
             )
         steps = tuple(self._recent)
         frames = dict(self.frames)
-        for position in map(whole_number, positions):
-            if position is None or not 1 <= position <= count:
+        for given in positions:
+            position = whole_number(given)
+            if position is None or not 1 <= position <= len(steps):
                 raise UnparsableReplyError(
-                    f"Positions of frames are whole numbers from 1 to {count}."
+                    f"Positions of frames are whole numbers from 1 to {len(steps)}."
                 )
             step = steps[position - 1]
             frames[step] = self._recent[step]
-        kept = merge_keyframes(frames, self.options.near)[-(self.options.most or len(frames)) :]
+        kept = merge_keyframes(frames, self.options.near)
+        if self.options.most is not None:
+            kept = kept[-self.options.most :]
         self.frames = {step: frames[step] for step in kept}
         return subgoal
 
     def _parts(self) -> Iterator[Part]:
+        """Yield the parts of a query: video, what was said, key frames, recent frames, question."""
         yield from self.video_parts(self.options.video_frames)
         yield self.goal()
         for name, frames in (("remembered", self.frames), ("recent", self._recent)):
             yield self.fill(f"{name}_begin")
-            yield from (Picture(frame) for frame in frames.values())
+            for frame in frames.values():
+                yield Picture(frame)
             yield self.fill(f"{name}_end")
         yield self.fill("question", count=str(len(self._recent)), **self.forms())
 
@@ -279,23 +323,26 @@ class StatelessPlanner(VLMPlanner[StatelessOptions]):
         return self.single(self._parts(observation))
 
     def take(self, text: str) -> str:
-        """Return the subgoal in the last line of the reply; the policy reports what comes of it."""
-        lines = [line for line in text.splitlines() if normalize_subgoal(line)]
-        subgoal = parse_points(lines[-1] if lines else "")
+        """Return the subgoal in the last line with words of a reply; `FINISHED` at the end."""
+        last_line = ""
+        for line in text.splitlines():
+            if normalize_subgoal(line):
+                last_line = line
+        subgoal = parse_points(last_line)
         return FINISHED if self.finishes(subgoal) else subgoal
 
     def _parts(self, observation: Observation) -> Iterator[Part]:
+        """Yield the parts of a query: video, what was said, how subgoals ended, past, now."""
         options = self.options
         if self.video is not None:
             yield self.fill("video")
             yield from _sheets(self.video, options.video_frames, 1)
         yield self.goal()
-        said = "\n".join(
-            f"{number}. {end.subgoal}: {end.how}{f', {end.why}' if end.why else ''} "
-            f"(step {end.step})"
-            for number, end in enumerate(self.ends, 1)
-        )
-        yield self.fill("history", history=said) if said else self.fill("first")
+        if self.ends:
+            lines = [f"{number}. {_in_words(end)}" for number, end in enumerate(self.ends, 1)]
+            yield self.fill("history", history="\n".join(lines))
+        else:
+            yield self.fill("first")
         if self._past:
             yield self.fill("past")
             yield from _sheets(np.stack(self._past), options.past, options.observe_every)
@@ -304,10 +351,25 @@ class StatelessPlanner(VLMPlanner[StatelessOptions]):
         yield self.fill("question", **self.forms())
 
 
+def _in_words(end: SubgoalEnd) -> str:
+    """Return how a subgoal ended: ``press the button: missed, it had no effect (step 40)``."""
+    words = f"{end.subgoal}: {end.how}"
+    if end.why:
+        words += f", {end.why}"
+    return f"{words} (step {end.step})"
+
+
 def _sheets(frames: Pixels, most: int, every: int) -> Iterator[Picture]:
-    """Yield sheets of at most `most` evenly spread frames, each with its control step."""
+    """Yield sheets of at most `most` evenly spread frames, each with its control step.
+
+    Args:
+        frames: uint8 (T, height, width, 3).
+        most: maximum of frames on all sheets.
+        every: control steps between two frames, and before the first.
+    """
     kept = evenly_spaced(len(frames), most)
-    for sheet in contact_sheets(frames[kept], [str((place + 1) * every) for place in kept]):
+    steps = [str((place + 1) * every) for place in kept]
+    for sheet in contact_sheets(frames[kept], steps):
         yield Picture(sheet)
 
 
@@ -316,7 +378,9 @@ def _list_of(item: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def merge_keyframes(steps: Iterable[int], near: int = MAX_GAP) -> tuple[int, ...]:
-    """Replace each group of near steps by its middle one, of two the later.
+    """Replace each group of near steps by its middle one; of two middle ones, by the later.
+
+    With `near` 5, the steps 1, 4, 7, 20 become 4, 20: each of the first three is near the next.
 
     Args:
         steps: of the frames, in any order, possibly repeated.

@@ -1,4 +1,8 @@
-"""Select what a planner or its policy needs of an environment that serves both."""
+"""Select what a planner or its policy needs of an environment that serves both.
+
+The environment shows what either needs: with every second observation for the planner and every
+third for the policy, that is every one.
+"""
 
 from __future__ import annotations
 
@@ -29,13 +33,14 @@ class DemonstrationSubset(Mapping[str, NDArray[Any]]):
         available: DemonstrationFrames,
         wanted: DemonstrationFrames,
     ) -> None:
-        own, other = (1 if one in ("all", "none") else int(one) for one in (wanted, available))
         self._all = demonstration
-        self._stride = max(own // other, 1)
+        self._stride = max(_frames_between(wanted) // _frames_between(available), 1)
 
     def __getitem__(self, field: str) -> NDArray[Any]:
         """Return the selected entries of a field."""
-        return self._all[field][:: self._stride if field in PICTURE_FIELDS else 1]
+        if field in PICTURE_FIELDS:
+            return self._all[field][:: self._stride]
+        return self._all[field][:]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._all)
@@ -45,10 +50,17 @@ class DemonstrationSubset(Mapping[str, NDArray[Any]]):
         return len(self._all)
 
 
+def _frames_between(frames: DemonstrationFrames) -> int:
+    """Return how far apart the frames of a video are; those of none count as all."""
+    return 1 if frames in ("all", "none") else int(frames)
+
+
 def select_history(
     observation: Observation, earlier: int, every: int | None, wanted: int | None
 ) -> Observation:
-    """Return an observation with the part of its history that one of the two wants.
+    """Return an observation with the part of its history that a planner, or its policy, wants.
+
+    A history with an observation every 2 steps, of which one every 4 is wanted, keeps every second.
 
     Args:
         observation: of the environment.
@@ -58,10 +70,14 @@ def select_history(
     """
     if every is None or wanted == every:
         return observation
-    selected = {name: value for name, value in observation.items() if name != "history"}
+    selected: dict[str, Any] = dict(observation)
+    history = selected.pop("history")
     if wanted is not None:
         stride = wanted // every
+        chosen: list[Any] = []
         # Observations are taken at multiples of the period, counted from the start of the turn.
-        numbered = enumerate(observation["history"], start=earlier + 1)
-        selected["history"] = tuple(one for number, one in numbered if number % stride == 0)
+        for number, past in enumerate(history, start=earlier + 1):
+            if number % stride == 0:
+                chosen.append(past)
+        selected["history"] = tuple(chosen)
     return cast("Observation", selected)

@@ -68,7 +68,12 @@ class OraclePlanner(AttachedPolicy):
         self._last = end
 
     def plan(self, observation: Observation, step: int) -> str | None:  # noqa: ARG002
-        """Return the current stage in words."""
+        """Return the stage that is due in words; None when there is none.
+
+        Hands that report how subgoals end get the stage before the due one again if that is what
+        has to be repeated: if the hand has lost what the stage handles, or if the stage before is
+        still the published one.
+        """
         judge = self.env.session.judge
         stage = judge.published
         if not self.reports or stage is None:
@@ -76,10 +81,11 @@ class OraclePlanner(AttachedPolicy):
         index = judge.index
         kind = stage.primitive.kind
         end = self._last
-        fell = end is not None and (end.how == "missed" or end.why == EMPTY_HAND)
-        lost = fell and kind in HANDLES_HELD
+        is_hand_empty = end is not None and (end.how == "missed" or end.why == EMPTY_HAND)
+        is_lost = kind in HANDLES_HELD and is_hand_empty
         # A stage is published one step longer than it is due, which counts for waiting only.
-        if lost or (kind != "hold_until" and judge.stages[index] is not stage):
+        is_published_late = kind != "hold_until" and judge.stages[index] is not stage
+        if is_lost or is_published_late:
             index -= 1
         # The environment's own pixel is of what is seen: the arm may hide the object in part.
         return stage_subgoal(self.env, judge.stages, index, grounded=self.grounded)
@@ -97,12 +103,17 @@ def stage_subgoal(env: RoboIRGEnv, stages: Sequence[Stage], index: int, *, groun
     from roboirg.simulation.expert.things import origin_pixel
 
     stage = stages[index]
+    world = env.session.world
     if stage.primitive.kind == "hold_until":
+        # A press that follows has its own step, at which it has to end: it begins earlier.
+        until = stage.primitive.steps
         following = stages[index + 1].primitive
-        is_last = following.kind == "press_below"
-        until = following.steps - PRESS_STEPS if is_last else stage.primitive.steps
-        return f"{stage.subgoal} for {max(until - env.session.world.elapsed, 0)} steps"
-    pixel = origin_pixel(env.session.world.bodies[stage.points_at]) if stage.points_at else None
-    if not grounded or pixel is None:
-        return stage.subgoal.replace(" {at}", "")
-    return stage.subgoal.replace("{at}", f"at <{pixel[0]}, {pixel[1]}>")
+        if following.kind == "press_below":
+            until = following.steps - PRESS_STEPS
+        return f"{stage.subgoal} for {max(until - world.elapsed, 0)} steps"
+    if grounded and stage.points_at:
+        pixel = origin_pixel(world.bodies[stage.points_at])
+        if pixel is not None:
+            row, column = pixel
+            return stage.subgoal.replace("{at}", f"at <{row}, {column}>")
+    return stage.subgoal.replace(" {at}", "")

@@ -13,6 +13,9 @@ from roboirg.policies.contract.base import SubgoalEnd
 from roboirg.policies.planners.hierarchical_policy import PlannerParts
 from roboirg.policies.planners.planner import Planner
 
+_ACTION_SIZE = 8
+"""Seven joints and the gripper."""
+
 
 class PlannerAlone(PlannerParts):
     """Names subgoals and does nothing; its process holds no world.
@@ -42,11 +45,17 @@ class PlannerAlone(PlannerParts):
         self.planner.reset(instruction, demonstration)
 
     def act(self, observation: Observation) -> NDArray[np.float64]:
-        """Let the planner name a subgoal; the action means nothing."""
+        """Let the planner name a subgoal; the returned action means nothing, as the hands act.
+
+        The process of the hands adds two entries to the observation, which are taken out before
+        the planner sees it: the ``step``, and how subgoals have ended since the last call
+        (``ends``), which a planner with the method ``learn`` gets.
+        """
         seen: dict[str, Any] = dict(observation)
         ends = seen.pop("ends")
         step = seen.pop("step")
-        for end in ends if hasattr(self.planner, "learn") else ():
-            self.planner.learn(SubgoalEnd(*end))
+        if hasattr(self.planner, "learn"):
+            for end in ends:
+                self.planner.learn(SubgoalEnd(*end))
         self.subgoal = self.planner.plan(cast("Observation", seen), step)
-        return np.zeros((1, 8))
+        return np.zeros((1, _ACTION_SIZE))  # one row, as every policy must return one

@@ -16,6 +16,7 @@ PICTURE_SIZE = 256
 SCALE = 1000
 """The whole height or width in a model's coordinates."""
 
+# Such as (120, 87), <|box_start|>(120,87)<|box_end|>, or <120, 87>.
 _POINT = re.compile(
     r"(?:<\|box_start\|>)?\(\s*(\d+)\s*,\s*(\d+)\s*\)(?:<\|box_end\|>)?|<\s*(\d+)\s*,\s*(\d+)\s*>"
 )
@@ -33,10 +34,10 @@ def to_pixel(value: int) -> int:
 
 
 def parse_points(text: str) -> str:
-    """Convert a subgoal with a model's points to one with pixels, in one pass.
+    """Return the subgoal in a model's text, with its points in pixels, ``<row, column>``.
 
-    Points are ``<y, x>``, or box tokens ``<|box_start|>(y,x)<|box_end|>``; the tokens around the
-    numbers may be missing, as servers strip them by default.
+    A model writes points as ``<y, x>``, or as box tokens ``<|box_start|>(y,x)<|box_end|>``, from
+    which servers may strip the tokens. All are replaced at once, so that none is replaced twice.
 
     Raises:
         UnparsableReplyError: there is no subgoal, or its points are malformed.
@@ -66,6 +67,8 @@ def says_finished(subgoal: str) -> bool:
 
 
 def _as_pixels(found: re.Match[str]) -> str:
+    """Return a model's point as a pixel: ``(500, 250)`` becomes ``<128, 64>``."""
+    # Either the first two groups hold the numbers, or the last two.
     row, column = (int(number) for number in found.groups() if number is not None)
     if max(row, column) > SCALE:
         raise UnparsableReplyError(f"The point {found[0]} is outside of 0 to {SCALE}.")

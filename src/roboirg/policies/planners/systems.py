@@ -39,11 +39,26 @@ class System(BaseModel):
     policy: str
     planner: dict[str, Any] | None = None
 
+    @property
+    def planner_kind(self) -> str:
+        """The planner's kind, or its class as ``package.module:Class``; empty without a planner."""
+        return "" if self.planner is None else str(self.planner.get("kind", ""))
+
+    @property
+    def planner_options(self) -> dict[str, Any]:
+        """The planner's entries besides its kind; empty without a planner."""
+        options = dict(self.planner or {})
+        options.pop("kind", None)
+        return options
+
 
 def all_systems() -> tuple[str, ...]:
     """Return the names of the systems in this package."""
-    names = (one.name for one in resources.files(PACKAGE).joinpath(FOLDER).iterdir())
-    return tuple(sorted(name.removesuffix(SUFFIX) for name in names if name.endswith(SUFFIX)))
+    names: list[str] = []
+    for file in resources.files(PACKAGE).joinpath(FOLDER).iterdir():
+        if file.name.endswith(SUFFIX):
+            names.append(file.name.removesuffix(SUFFIX))
+    return tuple(sorted(names))
 
 
 def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
@@ -59,43 +74,77 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
         UnknownNameError: there is no such system or option.
         InvalidValueError: the file cannot be read, or an option has an invalid value.
     """
+    origin = f"system {name_or_file}"
+    system = check_options(System, _read_entries(name_or_file), origin)
+
+    # Each override is one of the policy's URL, or else one of the planner.
+    policy = system.policy
+    planner_overrides: dict[str, str] = {}
+    for option, value in overrides.items():
+        if option == SERVER or option.startswith(POLICY):
+            policy = _policy_with(policy, option, value, origin)
+        elif option == VLM:
+            planner_overrides["base_url"] = value
+        else:
+            planner_overrides[option] = value
+
+    if system.planner is not None:
+        # Other hands replace the whole policy, whatever its URL has become.
+        policy = planner_overrides.pop(HANDS, policy)
+        planner = with_options(system.planner, planner_overrides)
+        return System(name=system.name, policy=policy, planner=planner)
+    if planner_overrides:
+        unknown = min(planner_overrides)
+        known = [SERVER, f"{POLICY}OPTION"]
+        raise UnknownNameError(f"option of {origin}, which has no planner,", unknown, known)
+    return System(name=system.name, policy=policy)
+
+
+def _read_entries(name_or_file: str) -> dict[str, Any]:
+    """Return the entries of a system's TOML file, given as a path or by a name in this package."""
     file: Path | Traversable = Path(name_or_file)
     if name_or_file in all_systems():
         file = resources.files(PACKAGE).joinpath(FOLDER, f"{name_or_file}{SUFFIX}")
     elif not name_or_file.endswith(SUFFIX):
         raise UnknownNameError("system", name_or_file, [*all_systems(), f"FILE{SUFFIX}"])
     try:
-        entries = tomllib.loads(file.read_text(encoding="utf-8"))
+        return tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:  # not Unicode, or not TOML
         raise InvalidValueError(
             f"System {name_or_file!r} cannot be read as TOML ({error})."
         ) from error
-    origin = f"system {name_or_file}"
-    system = check_options(System, entries, origin)
-    policy = system.policy
-    planner = system.planner
-    own = {"base_url" if option == VLM else option: value for option, value in overrides.items()}
-    for option in [one for one in own if one == SERVER or one.startswith(POLICY)]:
-        policy = _policy_with(policy, option, own.pop(option), origin)
-    if planner is not None:
-        policy = own.pop(HANDS, policy)
-        planner = with_options(planner, own)
-    elif own:
-        known = [SERVER, f"{POLICY}OPTION"]
-        raise UnknownNameError(f"option of {origin}, which has no planner,", min(own), known)
-    return System(name=system.name, policy=policy, planner=planner)
 
 
 def with_options(planner: Mapping[str, Any], options: Mapping[str, str]) -> dict[str, Any]:
-    """Return a planner's entries with options set; those of its model stand next to the others."""
-    of_model = {name: value for name, value in options.items() if name in ModelOptions.model_fields}
-    own = {name: value for name, value in options.items() if name not in of_model}
-    model = {**planner.get("model", {}), **of_model}
-    return {**planner, **own, **({"model": model} if model else {})}
+    """Return a planner's entries with options set.
+
+    Options of its model, which are typed next to the others, go into its table ``model``:
+    ``{"video_frames": "4", "temperature": "1"}`` sets ``video_frames`` and ``model.temperature``.
+    """
+    entries = dict(planner)
+    model = dict(planner.get("model", {}))
+    for name, value in options.items():
+        if name in ModelOptions.model_fields:
+            model[name] = value
+        else:
+            entries[name] = value
+    if model:
+        entries["model"] = model
+    return entries
 
 
 def _policy_with(spec: str, option: str, value: str, origin: str) -> str:
-    """Return a policy's URL with another server or another option."""
+    """Return a policy's URL with another server or another option.
+
+    Of ``openpi://a:1?execute=5``, the option ``server`` with ``b:2`` makes
+    ``openpi://b:2?execute=5``, and ``policy.execute`` with ``8`` makes ``openpi://a:1?execute=8``.
+
+    Args:
+        spec: of the policy, which must be a URL.
+        option: `SERVER`, or `POLICY` followed by the option's name.
+        value: of it.
+        origin: of the spec, for errors.
+    """
     if not is_url(spec):
         raise InvalidValueError(
             f"Option {option!r}: the policy of {origin} is {spec!r}, which is not a URL."

@@ -30,6 +30,7 @@ MOST_USELESS = 5
 
 
 Asked = Annotated[str, Field(pattern=rf"^({EACH_CHUNK}|{WHEN_DONE}|every [1-9]\d* steps)$")]
+"""When a planner is asked, such as ``every 48 steps``."""
 
 
 class PlannerOptions(SubgoalOptions):
@@ -83,6 +84,10 @@ class VLMPlanner(ABC, Generic[Options]):
         self.options = options
         self.kind = kind
         self.asked = options.asked
+        # Such as "every 16 steps".
+        number = re.search(r"\d+", options.asked)
+        self._period = None if number is None else int(number[0])
+        """Control steps between two queries; None if these do not depend on the time."""
         self.observe_every: int | None = getattr(options, "observe_every", None)
         self.prompts = load_prompts(kind, options.prompts)
         self.shared = load_prompts(SHARED)
@@ -111,10 +116,16 @@ class VLMPlanner(ABC, Generic[Options]):
         self.instruction = instruction
         self.subgoal: str | None = None
         self.ends: list[SubgoalEnd] = []
-        self._periods = self._useless = 0
-        self._news = self._refused = self._finished = False
-        seen = len(demonstration.get("joint_positions", ()))
-        self.video: Pixels | None = demonstration["front_rgb"] if seen else None
+        self._periods_begun = 0
+        self._useless = 0
+        """Replies in a row that were of no use."""
+        self._has_news = False
+        """Whether something was said or a subgoal ended since the last query."""
+        self._was_refused = False
+        self._is_finished = False
+        self.video: Pixels | None = None
+        if len(demonstration.get("joint_positions", ())):
+            self.video = demonstration["front_rgb"]
         self._summary: Clip | None = None
         self.forget()
 
@@ -124,29 +135,37 @@ class VLMPlanner(ABC, Generic[Options]):
     def hear(self, text: str, step: int) -> None:  # noqa: ARG002
         """Remember an utterance; the next query quotes everything that was said."""
         self.instruction = f"{self.instruction} {text}"
-        self._news = True
+        self._has_news = True
 
     def learn(self, end: SubgoalEnd) -> None:
-        """Remember how a subgoal ended; one that stands is done once."""
-        self._news = True
-        self._refused = end.how == "refused"
-        if not self.ends or self.ends[-1][:3] != end[:3]:
-            self.ends.append(end)
+        """Remember how a subgoal ended; the same end several times in a row counts once."""
+        self._has_news = True
+        self._was_refused = end.how == "refused"
+        if self.ends:
+            last = self.ends[-1]
+            is_same = (last.subgoal, last.how, last.why) == (end.subgoal, end.how, end.why)
+            if is_same:
+                return
+        self.ends.append(end)
 
     def plan(self, observation: Observation, step: int) -> str | None:
-        """Return the subgoal from now on: a new one if a query is due, else the last."""
-        if not self._refused:
+        """Return the subgoal from now on: a new one if a query is due, else the last.
+
+        After a refused subgoal a query is always due. Without a usable reply the last one stays.
+        """
+        if not self._was_refused:
             self.watch(observation, step)
-            if self._finished or not self._due(step):
+            if self._is_finished or not self._is_due(step):
                 return self.subgoal
-        self._news = self._refused = False
+        self._has_news = False
+        self._was_refused = False
         subgoal = self.vlm.ask(self.query(observation), self.take)
         if subgoal is None:
             self._useless += 1
-            self._news = True
+            self._has_news = True
         else:
             self._useless = 0
-            self._finished = subgoal == FINISHED
+            self._is_finished = subgoal == FINISHED
             self.subgoal = subgoal or None
         return self.subgoal
 
@@ -156,8 +175,12 @@ class VLMPlanner(ABC, Generic[Options]):
         ``finished``: it said that the task is complete; ``unreadable``: its last replies were of no
         use.
         """
-        ended = {"finished": self._finished, "unreadable": self._useless > 0}
-        return {**self.vlm.usage(), **{name: 1.0 for name, holds in ended.items() if holds}}
+        usage = self.vlm.usage()
+        if self._is_finished:
+            usage["finished"] = 1.0
+        if self._useless > 0:
+            usage["unreadable"] = 1.0
+        return usage
 
     def watch(self, observation: Observation, step: int) -> None:
         """Record an observation; called at every chunk, with or without a query."""
@@ -187,14 +210,17 @@ class VLMPlanner(ABC, Generic[Options]):
 
     def video_parts(self, most: int) -> Iterator[Part]:
         """Yield the demonstration as a clip of at most `most` frames, encoded once."""
-        if self.video is not None:
-            self._summary = self._summary or summary_clip(self.video, most, len(self.video))
-            yield self.fill("video")
-            yield self._summary
+        if self.video is None:
+            return
+        if self._summary is None:
+            self._summary = summary_clip(self.video, most, len(self.video))
+        yield self.fill("video")
+        yield self._summary
 
     def single(self, parts: Iterable[Part], schema: dict[str, Any] | None = None) -> ModelQuery:
         """Return a query of one turn."""
-        return ModelQuery(self.fill("system"), (ChatTurn("user", tuple(parts)),), schema)
+        turn = ChatTurn("user", tuple(parts))
+        return ModelQuery(self.fill("system"), (turn,), schema)
 
     def finishes(self, subgoal: str) -> bool:
         """Return whether a subgoal says that the task is complete; not before anything was done."""
@@ -203,17 +229,28 @@ class VLMPlanner(ABC, Generic[Options]):
             raise UnparsableReplyError("Nothing has been done yet.")
         return is_end
 
-    def _due(self, step: int) -> bool:
-        """Return whether to query the model now."""
+    def _is_due(self, step: int) -> bool:
+        """Return whether to query the model now; called once for each chunk.
+
+        A planner that is asked every N steps is due at the first chunk of each period; one that is
+        asked when a subgoal is done, after news. Without any subgoal yet, both are due.
+        """
+        begins_period = True
+        if self._period is not None:
+            number = step // self._period
+            begins_period = number > self._periods_begun
+            self._periods_begun = number
         waits = self.asked == WHEN_DONE
-        period = re.search(r"\d+", self.asked)
-        number = step // int(period[0]) if period else 0
-        is_new = period is None or number > self._periods
-        self._periods = number
         if waits and self._useless >= MOST_USELESS:
             return False
         if self.subgoal is None:
             return True
-        words, _ = split_point(self.subgoal)
-        is_held = step <= self.holds.get(words, -1) or step < self.options.first_pause
-        return is_new and (self._news or not waits) and not is_held
+        if waits and not self._has_news:
+            return False
+        return begins_period and not self._is_held(self.subgoal, step)
+
+    def _is_held(self, subgoal: str, step: int) -> bool:
+        """Return whether a subgoal is kept at a control step, whatever the model would answer."""
+        words, _ = split_point(subgoal)
+        is_kept = words in self.holds and step <= self.holds[words]
+        return is_kept or step < self.options.first_pause

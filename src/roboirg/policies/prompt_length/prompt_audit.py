@@ -1,8 +1,9 @@
 """What of an instruction reaches a language model that reads a limited number of tokens.
 
-A prompt is cut at its end. Before it is counted, it is stripped, and underscores and line breaks
-become spaces, as openpi and LeRobot do. A tokenizer says where its tokens end; without one there
-are two bounds, between which every tokenizer of the compared systems lies.
+An instruction is one message or several, each with its utterances. A prompt is cut at its end.
+Before it is counted, it is stripped, and underscores and line breaks become spaces, as openpi and
+LeRobot do. A tokenizer says where its tokens end; without one there are two bounds, between which
+every tokenizer of the compared systems lies.
 """
 
 from __future__ import annotations
@@ -78,46 +79,56 @@ class InstructionAudit(NamedTuple):
     verdict: PromptVerdict
 
     def lost(self, spans: Iterable[tuple[int, int]]) -> tuple[int, ...]:
-        """Return the indices of the spans that certainly do not arrive whole.
+        """Return the indices of the spans that certainly do not reach the model whole.
 
-        What is not said yet is not lost.
+        A span in an utterance that was not said yet is not lost.
 
         Args:
             spans: of each the utterance and the character after its end.
         """
-        return tuple(
-            index
-            for index, (utterance, end) in enumerate(spans)
-            if utterance < len(self.reached) and end > self.reached[utterance]
-        )
+        lost: list[int] = []
+        for index, (utterance, end) in enumerate(spans):
+            is_said = utterance < len(self.reached)
+            if is_said and end > self.reached[utterance]:
+                lost.append(index)
+        return tuple(lost)
 
 
 def clean_prompt(text: str, *, lowers: bool = False) -> str:
     """Return a prompt as it is counted; all characters but outer blanks keep their places."""
     text = text.translate(_BLANK)
     if lowers:
-        # A few letters of other alphabets become two.
-        text = "".join(low if len(low := letter.lower()) == 1 else letter for letter in text)
+        text = "".join(map(_lowered, text))
     return text.strip()
+
+
+def _lowered(letter: str) -> str:
+    """Return a letter in lower case; a few of other alphabets would become two, and stay."""
+    low = letter.lower()
+    return low if len(low) == 1 else letter
 
 
 def fewest_tokens(text: str) -> Tokens:
     """Return the tokens of a vocabulary that has every word: no tokenizer joins words."""
-    return Tokens(0, tuple(found.end() for found in _WORD_OR_MARK.finditer(text)), 0)
+    ends = tuple(word.end() for word in _WORD_OR_MARK.finditer(text))
+    return Tokens(0, ends, 0)
 
 
 def most_tokens(text: str) -> Tokens:
-    """Return the tokens of a vocabulary of 32,000 pieces (`roboirg.language.token_counts`).
+    """Return an upper bound of a text's tokens: those of a vocabulary of 32,000 pieces.
 
-    The pieces of a word end with the word, so that a word counts once it is whole.
+    It is not known where in a word its pieces end. All but the last are placed at the word's begin,
+    so that the word is not reached before all its tokens are: ``table`` in three pieces that begins
+    at 4 has the ends 4, 4 and 9.
     """
     ends: list[int] = []
     for found in _WORD.finditer(text):
         word = found[0]
-        start = found.start()
         # A letter beyond ASCII may need a token for each of its bytes.
-        count = count_tokens(word) - ADDED_TOKENS + len(word.encode()) - len(word)
-        ends += [start] * (count - 1) + [found.end()]
+        more_bytes = len(word.encode()) - len(word)
+        count = count_tokens(word) - ADDED_TOKENS + more_bytes
+        ends += [found.start()] * (count - 1)
+        ends.append(found.end())
     return Tokens(ADDED_TOKENS - LINE_BREAK_TOKENS, tuple(ends), LINE_BREAK_TOKENS)
 
 
@@ -128,28 +139,52 @@ def audit_instruction(messages: Sequence[Sequence[str]], limit: PromptLimit) -> 
         messages: each with its utterances, which are sent together, joined by spaces.
         limit: of every message.
     """
-    least = most = 0
+    least = 0
+    most = 0
     reached: list[int] = []
-    for turns in messages:
-        low, high, end = _audit_message(" ".join(turns), limit)
-        least, most = max(least, low), max(most, high)
-        for turn in turns:
-            reached.append(min(max(end, 0), len(turn)))
-            end -= len(turn) + 1
-    verdict: PromptVerdict = "cut" if least > limit.tokens else "unknown"
-    return InstructionAudit(
-        least, most, tuple(reached), "heard" if most <= limit.tokens else verdict
-    )
+    for utterances in messages:
+        audit = _audit_message(" ".join(utterances), limit)
+        least = max(least, audit.least)
+        most = max(most, audit.most)
+        left = audit.reached  # characters of the message that reach the model
+        for utterance in utterances:
+            reached.append(min(max(left, 0), len(utterance)))
+            left -= len(utterance) + 1  # and the space behind it
+
+    verdict: PromptVerdict = "unknown"
+    if most <= limit.tokens:
+        verdict = "heard"
+    elif least > limit.tokens:
+        verdict = "cut"
+    return InstructionAudit(least, most, tuple(reached), verdict)
 
 
-def _audit_message(text: str, limit: PromptLimit) -> tuple[int, int, int]:
-    """Return the fewest and the most tokens of a message, and how many characters arrive."""
-    # Lower case needs no more tokens than what is counted without a tokenizer.
-    cleaned = clean_prompt(text, lowers=limit.lowers and limit.tokenize is not None)
-    least = (limit.tokenize or fewest_tokens)(cleaned)
-    most = most_tokens(cleaned) if limit.tokenize is None else least
-    room = limit.tokens - least.before
+class _MessageAudit(NamedTuple):
+    """The fewest and the most tokens of a message, and how many of its characters arrive."""
+
+    least: int
+    most: int
+    reached: int
+
+
+def _audit_message(text: str, limit: PromptLimit) -> _MessageAudit:
+    """Return least and most tokens of a message, and how many of its characters surely arrive.
+
+    Without a tokenizer, an upper and a lower bound are counted; with one, both are equal.
+    """
+    if limit.tokenize is None:
+        # Lower case needs no more tokens than what is counted without a tokenizer.
+        cleaned = clean_prompt(text)
+        least = fewest_tokens(cleaned)
+        most = most_tokens(cleaned)
+    else:
+        least = limit.tokenize(clean_prompt(text, lowers=limit.lowers))
+        most = least
+    room = limit.tokens - least.before  # for tokens of words
     reached = len(text)
     if room < len(least.ends):
-        reached = len(text) - len(text.lstrip()) + (least.ends[room - 1] if room > 0 else 0)
-    return least.total, most.total + limit.added, reached
+        # Blanks at the begin are stripped before tokens are counted, so the ends lack them.
+        reached = len(text) - len(text.lstrip())
+        if room > 0:
+            reached += least.ends[room - 1]
+    return _MessageAudit(least.total, most.total + limit.added, reached)

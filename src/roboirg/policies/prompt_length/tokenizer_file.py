@@ -20,7 +20,9 @@ from roboirg.policies.prompt_length.prompt_audit import (
 from roboirg.util.regular_file import read_regular
 
 JSON = ".json"
+"""Ends the names of files of the library `tokenizers`."""
 _MAX_BYTES = 256 * 2**20
+"""Of a tokenizer's file."""
 
 
 @functools.cache
@@ -36,9 +38,9 @@ def read_tokenizer(path: str) -> Tokenize:
         raise InvalidValueError(
             f"The tokenizer {path!r} is not a file; give a SentencePiece model or a tokenizer.json."
         ) from error
+    read = _read_json if path.endswith(JSON) else _read_sentencepiece
     with _attributed_to(path):
-        tokenize = (_read_json if path.endswith(JSON) else _read_sentencepiece)(path, content)
-
+        tokenize = read(path, content)
     return _attributed_to(path)(tokenize)
 
 
@@ -50,13 +52,14 @@ def _attributed_to(path: str) -> Iterator[None]:
     except (RoboIRGError, KeyboardInterrupt):
         raise
     except BaseException as error:
-        kind = (
-            "tokenizer of the library tokenizers" if path.endswith(JSON) else "SentencePiece model"
-        )
+        kind = "SentencePiece model"
+        if path.endswith(JSON):
+            kind = "tokenizer of the library tokenizers"
         raise InvalidValueError(f"The tokenizer {path!r} cannot be used as a {kind}.") from error
 
 
 def _read_sentencepiece(path: str, content: bytes) -> Tokenize:
+    """Return the tokenizer of a SentencePiece model, given as the content of its file."""
     with extra_needed(f"The tokenizer {path!r} needs sentencepiece", "tokens"):
         import sentencepiece
     model: Any = sentencepiece.SentencePieceProcessor()
@@ -66,10 +69,12 @@ def _read_sentencepiece(path: str, content: bytes) -> Tokenize:
     encode = getattr(model, "encode_as_immutable_proto", None) or model.encode_as_proto
 
     def tokenize(text: str) -> Tokens:
-        ends = tuple(one.end for one in encode(text).pieces)
-        content = text.encode()
-        if ends and ends[-1] == len(content) != len(text):
-            ends = tuple(len(content[:end].decode(errors="ignore")) for end in ends)
+        ends = tuple(piece.end for piece in encode(text).pieces)
+        in_bytes = text.encode()
+        # In a text beyond ASCII, the last end shows whether the ends count bytes.
+        counts_bytes = len(in_bytes) != len(text) and ends[-1:] == (len(in_bytes),)
+        if counts_bytes:
+            ends = tuple(len(in_bytes[:end].decode(errors="ignore")) for end in ends)
         # The beginning of the text is a token too.
         return Tokens(1, ends, LINE_BREAK_TOKENS)
 
@@ -77,6 +82,7 @@ def _read_sentencepiece(path: str, content: bytes) -> Tokenize:
 
 
 def _read_json(path: str, content: bytes) -> Tokenize:
+    """Return the tokenizer of the library `tokenizers`, given as the content of its file."""
     with extra_needed(f"The tokenizer {path!r} needs tokenizers", "tokens"):
         import tokenizers
     model: Any = tokenizers.Tokenizer.from_buffer(content)
@@ -86,8 +92,9 @@ def _read_json(path: str, content: bytes) -> Tokenize:
     kept = int(model.num_special_tokens_to_add(is_pair=False))
 
     def tokenize(text: str) -> Tokens:
-        found = model.encode(text, add_special_tokens=False).offsets
-        return Tokens(kept, tuple(end for _, end in found), LINE_BREAK_TOKENS)
+        offsets = model.encode(text, add_special_tokens=False).offsets
+        ends = tuple(end for _, end in offsets)
+        return Tokens(kept, ends, LINE_BREAK_TOKENS)
 
     return tokenize
 
@@ -96,11 +103,9 @@ def prompt_limit(needs: PolicyNeeds) -> PromptLimit | None:
     """Return the limit that a policy declares; None if it declares none."""
     if needs.prompt_tokens is None:
         return None
-    path = needs.tokenizer
-    return PromptLimit(
-        needs.prompt_tokens,
-        needs.prompt_added,
-        None if path is None else read_tokenizer(str(Path(path).absolute())),
-        None if path is None else Path(path).name,
-        needs.lowers_prompt,
-    )
+    limit = PromptLimit(needs.prompt_tokens, needs.prompt_added, lowers=needs.lowers_prompt)
+    if needs.tokenizer is None:
+        return limit
+    path = Path(needs.tokenizer)
+    tokenize = read_tokenizer(str(path.absolute()))
+    return limit._replace(tokenize=tokenize, tokenizer=path.name)

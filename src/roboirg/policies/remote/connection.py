@@ -36,7 +36,8 @@ with extra_needed("Remote policies need websockets 17.4 or newer", "remote"):
     from websockets.protocol import State
     from websockets.sync.client import ClientConnection, connect
 
-FIRST_PAUSE, MAX_PAUSE = 0.1, 5.0
+FIRST_PAUSE = 0.1
+MAX_PAUSE = 5.0
 """Seconds between two attempts to connect; each pause is twice the one before."""
 CLOSE_TIMEOUT = 2.0
 """Seconds to wait for a server's closing frame."""
@@ -46,6 +47,12 @@ _TOO_BIG = 1009
 """Websocket close code for a message above the size limit."""
 _RETRYABLE = frozenset({408, 425, 429, 500, 502, 503, 504})
 """HTTP statuses of a server, or of a proxy, while the server starts."""
+_REFUSED_KEY = (401, 403)
+"""HTTP statuses of a server to which the client has sent no key, or a wrong one."""
+_MIN_TIMEOUT = 0.001
+"""Seconds that an attempt to connect has at least."""
+_MICROSECONDS = 1_000_000
+"""In a second."""
 _MAX_ERROR_LENGTH = 300
 _MAX_TRACEBACK_END = 4096
 
@@ -63,7 +70,9 @@ class ServerConnection:
     """
 
     def __init__(self, scheme: str, endpoints: Sequence[Endpoint], options: RemoteOptions) -> None:
-        self._scheme, self._endpoints, self._options = scheme, endpoints, options
+        self._scheme = scheme
+        self._endpoints = endpoints
+        self._options = options
         self.endpoint = endpoints[0]
         self._websocket: ClientConnection | None = None
         self._held = contextlib.ExitStack()
@@ -102,10 +111,10 @@ class ServerConnection:
             PolicyTimeoutError: the server took too long.
             PolicyReplyError: the server replied with an error, or with no message.
         """
-        websocket, options = self._websocket, self._options
+        websocket = self._websocket
         if websocket is None:
             raise PolicyConnectionError(f"{self} is not connected; call reset() first.")
-        seconds = options.connect if data is None else options.timeout
+        seconds = self._options.connect if data is None else self._options.timeout
         end = time.monotonic() + seconds
         try:
             with waiting(f"the reply of {self._scheme}://{self.endpoint}"):
@@ -113,65 +122,80 @@ class ServerConnection:
                     if not is_numbered:
                         self._refuse_surplus(websocket)
                     websocket.send(data)
-                while awaited and (left := end - time.monotonic()) > 0:
-                    with contextlib.suppress(TimeoutError):
-                        return self._read(websocket.recv(timeout=min(_CHECK_S, left)))
-                    if websocket.state is not State.OPEN:
-                        # The server does not end what the library has refused.
-                        _shut_down(websocket)
+                if not awaited:
+                    return {}
+                message = _next_message(websocket, end)
         except ConnectionClosed as error:
             raise self._broken(error) from error
-        if awaited:
+        if message is None:
             raise PolicyTimeoutError(f"{self} did not send {awaited} within {seconds:g} s.")
-        return {}
+        return self._read(message)
 
     def end(self, *, is_broken: bool = False) -> None:
         """Disconnect and unlock the server; repeated calls do nothing.
 
         A broken connection is ended without the server, which may not take part in that.
         """
-        websocket, self._websocket = self._websocket, None
+        websocket = self._websocket
+        self._websocket = None
         if is_broken and websocket is not None:
             _shut_down(websocket)  # a thread that sends holds the lock that closing needs
         self._held.close()
 
     def error_reply(self, text: str) -> PolicyReplyError:
-        """Return the error for a server's traceback, of which the last line says most."""
+        """Return the error for a traceback that a server has sent; its last line is shown."""
         text = without_keys(text)  # before it is cut, perhaps within a key
         # Only the end is split into lines: there may be millions.
         lines = text[-_MAX_TRACEBACK_END:].rstrip().splitlines()
-        words = lines[-1].strip()[:_MAX_ERROR_LENGTH].rstrip(".") if lines else "an empty text"
+        words = "an empty text"
+        if lines:
+            words = lines[-1].strip()[:_MAX_ERROR_LENGTH].rstrip(".")
         return PolicyReplyError(f"{self} replied with an error: {words}.")
 
     def _connect(self) -> None:
-        """Connect, with growing pauses between attempts."""
-        seconds, pause = self._options.connect, FIRST_PAUSE
+        """Connect to the chosen server, with growing pauses between attempts.
+
+        Raises:
+            PolicyConnectionError: it could not be reached in time, or another attempt cannot help.
+        """
+        seconds = self._options.connect
+        pause = FIRST_PAUSE
         end = time.monotonic() + seconds
         with waiting(f"a connection to {self._scheme}://{self.endpoint}"):
-            while isinstance(found := self._attempt(end - time.monotonic()), str):
+            found = self._attempt(end - time.monotonic())
+            while isinstance(found, str):  # why there is no connection yet
                 if time.monotonic() + pause >= end:
                     raise PolicyConnectionError(
                         f"{self} cannot be reached ({found}); tried for {seconds:g} s."
                     )
                 time.sleep(pause)
                 pause = min(2 * pause, MAX_PAUSE)
-        # The kernel ends a send that a server does not take in; the library has no limit for it.
-        whole = int(self._options.timeout)
-        limit = struct.pack("ll", whole, int(1e6 * (self._options.timeout - whole)))
+                found = self._attempt(end - time.monotonic())
+        # The library has no limit for a send that a server does not take in; the kernel's is set.
+        # It is a C struct of seconds and microseconds.
+        whole_seconds = int(self._options.timeout)
+        microseconds = int(_MICROSECONDS * (self._options.timeout - whole_seconds))
+        limit = struct.pack("ll", whole_seconds, microseconds)
         found.socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
         self._websocket = found
 
     def _attempt(self, left: float) -> ClientConnection | str:
-        """Return a connection, or why there is none yet; raise if another attempt cannot help."""
-        endpoint, options, headers = self.endpoint, self._options, self._options.headers
+        """Return a connection, or why there is none yet; raise if another attempt cannot help.
+
+        Args:
+            left: seconds that are left to connect.
+        """
+        endpoint = self.endpoint
+        scheme = "wss" if self._options.tls else "ws"
+        headers = self._options.headers
         try:
             return self._held.enter_context(
                 connect(
-                    f"{'wss' if options.tls else 'ws'}://{endpoint}",
+                    f"{scheme}://{endpoint}",
                     additional_headers=headers,
                     compression=None,
-                    max_size=int(options.max_reply_mib * MIB),
-                    open_timeout=max(left, 0.001),
+                    max_size=int(self._options.max_reply_mib * MIB),
+                    open_timeout=max(left, _MIN_TIMEOUT),
                     close_timeout=CLOSE_TIMEOUT,
                     ping_interval=None,
                     proxy=None,
@@ -183,7 +207,9 @@ class ServerConnection:
             status = error.response.status_code
             if status in _RETRYABLE:
                 return f"HTTP status {status}"
-            hint = "; name the key with api_key_env=NAME" if status in (401, 403) else ""
+            hint = ""
+            if status in _REFUSED_KEY:
+                hint = "; name the key with api_key_env=NAME"
             raise PolicyConnectionError(
                 f"{self} refused the connection with HTTP status {status}{hint}."
             ) from error
@@ -205,6 +231,7 @@ class ServerConnection:
             raise PolicyReplyError(f"{self} sent a message without a request.")
 
     def _read(self, data: bytes | str) -> dict[str, Any]:
+        """Return what a server has sent; a text is an error of the server."""
         if isinstance(data, str):
             raise self.error_reply(data)
         try:
@@ -215,7 +242,7 @@ class ServerConnection:
             ) from error
 
     def _broken(self, error: ConnectionClosed) -> RoboIRGError:
-        """Return the error for a connection that has ended."""
+        """Return the error for a connection that has ended, by what the library found out of it."""
         if isinstance(error.__cause__, BlockingIOError):
             seconds = self._options.timeout
             return PolicyTimeoutError(f"{self} did not take in a message within {seconds:g} s.")
@@ -226,8 +253,27 @@ class ServerConnection:
                 f"{self} sent a reply of more than {self._options.max_reply_mib:g} MiB; "
                 "option max_reply_mib raises that limit."
             )
-        code = f"close code {error.rcvd.code}" if error.rcvd else "without a close code"
+        code = "without a close code"
+        if error.rcvd is not None:
+            code = f"close code {error.rcvd.code}"
         return PolicyConnectionError(f"{self} ended the connection ({code}).")
+
+
+def _next_message(websocket: ClientConnection, end: float) -> bytes | str | None:
+    """Return the next message of a server; None if none comes until `end` of the monotonic clock.
+
+    Raises:
+        ConnectionClosed: the connection broke.
+    """
+    left = end - time.monotonic()
+    while left > 0:
+        with contextlib.suppress(TimeoutError):
+            return websocket.recv(timeout=min(_CHECK_S, left))
+        if websocket.state is not State.OPEN:
+            # The library has refused a message and waits for the server to close; that may never.
+            _shut_down(websocket)
+        left = end - time.monotonic()
+    return None
 
 
 def _shut_down(websocket: ClientConnection) -> None:
@@ -237,7 +283,9 @@ def _shut_down(websocket: ClientConnection) -> None:
 
 
 def _describe(error: BaseException) -> str:
+    """Return why a connection failed, such as ``OSError: Network is unreachable``."""
     if isinstance(error, ConnectionRefusedError):
         return "nothing listens there"
+    kind = type(error).__name__
     message = " ".join(str(error).split()).rstrip(".")
-    return f"{type(error).__name__}: {message}" if message else type(error).__name__
+    return f"{kind}: {message}" if message else kind

@@ -37,8 +37,9 @@ class Endpoint(NamedTuple):
     @property
     def identity(self) -> str:
         """A file name, the same for every spelling of this computer's address."""
-        here = self.host in LOOPBACK_NAMES
-        host = f"{socket.gethostname()}-itself" if here else self.host.replace(":", "_")
+        host = self.host.replace(":", "_")
+        if self.host in LOOPBACK_NAMES:
+            host = f"{socket.gethostname()}-itself"
         return f"{host}-{self.port}{quote(self.path, safe='')}"
 
 
@@ -99,14 +100,16 @@ def read_endpoints(url: PolicyRef) -> tuple[Endpoint, ...]:
 
 
 def _endpoint(url: PolicyRef, text: str) -> Endpoint:
+    """Return the server of a part of a URL, such as ``localhost:8001`` or ``host:80/path``."""
+    complaint = InvalidValueError(
+        f"Policy {url.spec!r}: {text!r} is not a server; write {url.kind}://host:port, several "
+        "with commas."
+    )
     try:
         parts = urlsplit(f"//{text}")
-        host, port = parts.hostname, parts.port
+        port = parts.port
     except ValueError:
-        host, port = None, None
-    if not host or not port or parts.fragment or " " in text:
-        raise InvalidValueError(
-            f"Policy {url.spec!r}: {text!r} is not a server; write {url.kind}://host:port, "
-            "several with commas."
-        )
-    return Endpoint(host, port, parts.path.rstrip("/"))
+        raise complaint from None
+    if not parts.hostname or not port or parts.fragment or " " in text:
+        raise complaint
+    return Endpoint(parts.hostname, port, parts.path.rstrip("/"))

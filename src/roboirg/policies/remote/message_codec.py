@@ -68,6 +68,17 @@ def unpack(data: bytes) -> dict[str, Any]:
 
 
 def _encode(text_keys: bool, value: object) -> object:
+    """Return an array or scalar of NumPy in a form that msgpack can pack.
+
+    Args:
+        text_keys: the dialect. If true, an array is a map with texts as keys and a scalar a plain
+            number; else both are maps, with bytes as keys.
+        value: of the message.
+
+    Raises:
+        TypeError: it is not of NumPy.
+        ValueError: its dtype is not sent.
+    """
     if not isinstance(value, np.ndarray | np.generic):
         raise TypeError(f"type {type(value).__name__} cannot be encoded")
     if value.dtype.kind in _UNSUPPORTED:
@@ -75,31 +86,50 @@ def _encode(text_keys: bool, value: object) -> object:
     if isinstance(value, np.ndarray):
         # A view, as pictures are large: a contiguous array is copied once, into the message.
         data = np.ascontiguousarray(value).reshape(-1).view(np.uint8).data
-        found = {"__ndarray__": True, "data": data, "dtype": value.dtype.str, "shape": value.shape}
+        packed = {"__ndarray__": True, "data": data, "dtype": value.dtype.str, "shape": value.shape}
     elif text_keys:
         return value.item()
     else:
-        found = {"__npgeneric__": True, "data": value.item(), "dtype": value.dtype.str}
-    return found if text_keys else {key.encode(): held for key, held in found.items()}
+        packed = {"__npgeneric__": True, "data": value.item(), "dtype": value.dtype.str}
+    if text_keys:
+        return packed
+    return {key.encode(): entry for key, entry in packed.items()}
 
 
-def _decode(found: dict[Any, Any]) -> object:
-    """Return what a map stands for: an array, a scalar, or itself."""
-    held = {key.decode("latin-1") if isinstance(key, bytes) else key: found[key] for key in found}
-    if "__ndarray__" in held:
-        return _array(held.get("dtype"), held.get("shape"), held.get("data"))
-    if "__npgeneric__" in held:
-        data, dtype = held.get("data"), _dtype(held.get("dtype"))
-        if not isinstance(data, int | float | str):
-            raise ValueError(f"a NumPy scalar holds {type(data).__name__}")
-        return dtype.type(data)
-    # Of msgpack-numpy, a kind marks structures and pickled objects.
-    if held.keys() >= {"nd", "type", "data"} and not held.get("kind"):
-        return _array(held["type"], held.get("shape", []), held["data"])
-    return found
+def _decode(packed: dict[Any, Any]) -> object:
+    """Return what a map of a message stands for: an array, a scalar, or the map itself.
+
+    Maps of all dialects are read: ours with texts or bytes as keys, and those of msgpack-numpy.
+    """
+    entries: dict[Any, Any] = {}
+    for key, value in packed.items():
+        name = key.decode("latin-1") if isinstance(key, bytes) else key
+        entries[name] = value
+    if "__ndarray__" in entries:
+        return _array(entries.get("dtype"), entries.get("shape"), entries.get("data"))
+    if "__npgeneric__" in entries:
+        return _scalar(entries.get("dtype"), entries.get("data"))
+    # Of msgpack-numpy. If a map has a kind, it is a structure or pickled object, which is not read.
+    is_array = "nd" in entries and "type" in entries and "data" in entries
+    if is_array and not entries.get("kind"):
+        return _array(entries["type"], entries.get("shape", []), entries["data"])
+    return packed
+
+
+def _scalar(described: object, data: object) -> object:
+    """Return a scalar of NumPy from the description of its dtype and its value."""
+    dtype = _dtype(described)
+    if not isinstance(data, int | float | str):
+        raise ValueError(f"a NumPy scalar holds {type(data).__name__}")
+    return dtype.type(data)
 
 
 def _array(described: object, shape: Any, data: object) -> np.ndarray[Any, Any]:  # noqa: ANN401
+    """Return the array that a message describes by dtype (such as ``<f4``), shape and bytes.
+
+    Raises:
+        ValueError: they do not fit each other, or the dtype is not accepted.
+    """
     dtype = _dtype(described)
     if not isinstance(data, bytes):
         raise ValueError(f"the data of an array is {type(data).__name__}, not bytes")
@@ -111,6 +141,7 @@ def _array(described: object, shape: Any, data: object) -> np.ndarray[Any, Any]:
 
 
 def _dtype(text: object) -> np.dtype[Any]:
+    """Return the dtype that a text such as ``<f4`` describes; raise if it is not accepted."""
     if not isinstance(text, str) or len(text) > _MAX_DTYPE_LENGTH:
         raise ValueError(f"the dtype of an array is {str(text)[:_MAX_DTYPE_LENGTH]!r}")
     dtype = np.dtype(text)

@@ -19,6 +19,11 @@ from roboirg.policies.contract.json_values import as_json
 from roboirg.policies.contract.policy_urls import read_options, split_url
 from roboirg.policies.remote.endpoints import RemoteOptions, read_endpoints
 
+_MOST_SHOWN = 80
+"""Characters of a server's value in an error message."""
+_MOST_KEYS = 8
+"""Keys of a server's reply in an error message."""
+
 
 class RemotePolicy(ABC):
     """A policy on a server, connected from `reset` to `close`.
@@ -67,8 +72,10 @@ class RemotePolicy(ABC):
     @property
     def version(self) -> str:
         """Version of the checkpoint: the URL's, else the server's, else ``unknown``."""
+        if self.options.version is not None:
+            return self.options.version
         version = self.metadata.get("version")
-        return self.options.version or (UNKNOWN_VERSION if version is None else str(version))
+        return UNKNOWN_VERSION if version is None else str(version)
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Lock a server, connect, and begin an episode.
@@ -81,8 +88,11 @@ class RemotePolicy(ABC):
         self.instruction = instruction
         with self._closed_on_error():
             self.connection.begin()
-            server = {"server": str(self.connection.endpoint), **as_json(self.greet())}
-            self.metadata = server | {"execute": getattr(self.options, "execute", None) or "all"}
+            self.metadata = {
+                "server": str(self.connection.endpoint),
+                **as_json(self.greet()),
+                "execute": getattr(self.options, "execute", None) or "all",
+            }
             self.begin_episode(demonstration)
 
     def act(self, observation: Observation) -> Actions:
@@ -131,11 +141,12 @@ class RemotePolicy(ABC):
         Raises:
             PolicyReplyError: it does not.
         """
-        reply = self.request(message)
-        if reply.get(key) is not True:
+        confirmed = self.request(message).get(key)
+        if confirmed is not True:
+            request = next(iter(message))  # its first key says what it asks for
             raise PolicyReplyError(
-                f"{self.connection} did not confirm {next(iter(message))!r}: {key!r} in its "
-                f"reply is {str(reply.get(key))[:80]}."
+                f"{self.connection} did not confirm {request!r}: {key!r} in its reply is "
+                f"{str(confirmed)[:_MOST_SHOWN]}."
             )
 
     def read_actions(self, reply: Mapping[str, Any]) -> NDArray[np.float64]:
@@ -172,4 +183,5 @@ class RemotePolicy(ABC):
 
 
 def _listed(names: Mapping[Any, Any]) -> str:
-    return ", ".join(map(repr, list(names)[:8])) or "nothing"
+    """Return the first keys of a reply, for a message."""
+    return ", ".join(map(repr, list(names)[:_MOST_KEYS])) or "nothing"

@@ -9,6 +9,7 @@ computer.
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import threading
 import time
@@ -44,7 +45,7 @@ class ServerLock(NamedTuple):
 def lock_server(
     endpoints: Sequence[Endpoint], *, wait: float, shared: bool = False, folder: Path | None = None
 ) -> ServerLock:
-    """Lock one of several servers as soon as one is free.
+    """Lock one of several servers as soon as one is free, for all processes of this user.
 
     Args:
         endpoints: the servers to choose from.
@@ -56,24 +57,34 @@ def lock_server(
         PolicyTimeoutError: none was free in time.
         PolicyConnectionError: this thread itself holds all of them.
     """
-    folder = folder or lock_folder()
     # Processes start at different servers, which spreads those that share.
     start = os.getpid() % len(endpoints)
     order = [*endpoints[start:], *endpoints[:start]]
-    if (lock := _lock_any(order, folder, shared=shared)) is not None:
+    attempt = functools.partial(_lock_any, order, folder or lock_folder(), shared=shared)
+    lock = attempt()
+    if lock is not None:
         return lock
-    names, end = ", ".join(map(str, endpoints)), time.monotonic() + wait
-    if all((threading.get_ident(), endpoint.identity) in _held for endpoint in endpoints):
+
+    names = ", ".join(map(str, endpoints))
+    if all(_is_held(endpoint) for endpoint in endpoints):
         raise PolicyConnectionError(f"Another policy of this thread uses {names}; close() it.")
+    end = time.monotonic() + wait
     with waiting(f"a free server: {names}", is_queue=True):
         while time.monotonic() < end:
-            time.sleep(min(_PAUSE, max(0.0, end - time.monotonic())))
-            if (lock := _lock_any(order, folder, shared=shared)) is not None:
+            left = end - time.monotonic()
+            time.sleep(min(_PAUSE, max(0.0, left)))
+            lock = attempt()
+            if lock is not None:
                 return lock
     raise PolicyTimeoutError(
         f"Other episodes used {names} for {wait:g} s; give each worker a server of its own "
         "(host:8001,host:8002), use fewer workers, or raise wait=."
     )
+
+
+def _is_held(endpoint: Endpoint) -> bool:
+    """Return whether this thread holds a server, so that it would wait for itself."""
+    return (threading.get_ident(), endpoint.identity) in _held
 
 
 def lock_folder() -> Path:
@@ -91,12 +102,13 @@ def lock_folder() -> Path:
 
 
 def _lock_any(endpoints: Sequence[Endpoint], folder: Path, *, shared: bool) -> ServerLock | None:
-    """Return a lock on the first server that is free."""
+    """Return a lock on the first server whose lock file can be locked; None if none is free."""
     for endpoint in endpoints:
         with contextlib.ExitStack() as stack:
-            file = stack.enter_context((folder / f"{endpoint.identity}.lock").open("a"))
-            if take_lock(file.fileno(), Path(file.name), shared=shared):
-                stack.pop_all()
+            path = folder / f"{endpoint.identity}.lock"
+            file = stack.enter_context(path.open("a"))
+            if take_lock(file.fileno(), path, shared=shared):
+                stack.pop_all()  # the file stays open, as closing it would unlock it
                 _held[threading.get_ident(), endpoint.identity] = file
                 return ServerLock(endpoint, file)
     return None

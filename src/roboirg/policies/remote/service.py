@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,10 @@ from roboirg.policies.contract.base import Policy, close_policy, tell_policy
 from roboirg.policies.remote.endpoints import MIB
 
 Message = Mapping[str, Any]
+"""Names and values, as the codec has read them."""
+Numbers = Literal["uint8", "real numbers"]
+_REAL_KINDS = "fiu"
+"""NumPy's letters for the dtypes of real numbers: floats, and integers with and without a sign."""
 
 
 class Service(ABC):
@@ -73,7 +77,8 @@ class Service(ABC):
         Raises:
             InvalidActionError: the policy gave something else.
         """
-        start, policy = time.perf_counter(), cast("Policy", self.policy)
+        start = time.perf_counter()
+        policy = cast("Policy", self.policy)
         space = PolicyNeeds.of(policy, "actions").action_space
         actions = check_chunk(policy.act(observation), space)
         return actions, 1000 * (time.perf_counter() - start)
@@ -84,28 +89,38 @@ class Service(ABC):
         self.policy = None
 
 
-def read_array(message: Message, key: str, kinds: str, shape: tuple[int | str, ...]) -> Any:  # noqa: ANN401
-    """Return an array of a message.
+def read_array(message: Message, key: str, numbers: Numbers, shape: tuple[int | str, ...]) -> Any:  # noqa: ANN401
+    """Return an array of a message; raise if it has another type or shape than it must have.
 
     Args:
         message: that holds it.
         key: its name.
-        kinds: of NumPy's dtypes; ``u1`` for bytes.
-        shape: with letters where any length will do.
+        numbers: what it must hold.
+        shape: with letters where any length will do, such as ``("T", 8)``.
 
     Raises:
         ValueError: it is missing, or has another shape or type.
     """
     array = np.asarray(message.get(key))
-    fits = array.ndim == len(shape) and all(
-        isinstance(right, str) or right == size
-        for right, size in zip(shape, array.shape, strict=True)
-    )
-    if not fits or (array.dtype.str[1:] != kinds and array.dtype.kind not in kinds):
-        wanted = "uint8" if kinds == "u1" else "real numbers"
+    if numbers == "uint8":
+        has_numbers = array.dtype == np.uint8
+    else:
+        has_numbers = array.dtype.kind in _REAL_KINDS
+    if not has_numbers or not _fits(array.shape, shape):
+        wanted = ", ".join(map(str, shape))
         got = "nothing" if message.get(key) is None else f"{array.dtype} {array.shape}"
-        raise ValueError(f"{key!r} must be {wanted} ({', '.join(map(str, shape))}); got {got}.")
+        raise ValueError(f"{key!r} must be {numbers} ({wanted}); got {got}.")
     return array
+
+
+def _fits(sizes: tuple[int, ...], shape: tuple[int | str, ...]) -> bool:
+    """Return whether sizes fit a shape: (5, 8) fits ("T", 8), as a letter stands for any size."""
+    if len(sizes) != len(shape):
+        return False
+    for size, wanted in zip(sizes, shape, strict=True):
+        if isinstance(wanted, int) and wanted != size:
+            return False
+    return True
 
 
 def split_state(state: NDArray[Any]) -> dict[str, NDArray[np.float32]]:
@@ -124,10 +139,11 @@ def read_request(message: Message) -> Observation:
     Raises:
         ValueError: something is missing or malformed.
     """
+    state = read_array(message, "observation/state", "real numbers", (8,))
     observation: Any = {
-        **split_state(read_array(message, "observation/state", "fiu", (8,))),
-        "front_rgb": read_array(message, "observation/image", "u1", ("H", "W", 3)),
-        "wrist_rgb": read_array(message, "observation/wrist_image", "u1", ("H", "W", 3)),
+        **split_state(state),
+        "front_rgb": read_array(message, "observation/image", "uint8", ("H", "W", 3)),
+        "wrist_rgb": read_array(message, "observation/wrist_image", "uint8", ("H", "W", 3)),
         "instruction": str(message["prompt"]),
     }
     return cast("Observation", observation)

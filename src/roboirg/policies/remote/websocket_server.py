@@ -67,12 +67,15 @@ class WebsocketServer:
     def __init__(
         self, service: Service, metadata: Mapping[str, Any], options: ServerOptions
     ) -> None:
-        self._service, self._metadata, self._options = service, pack(metadata), options
+        self._service = service
+        self._metadata = pack(metadata)
+        self._options = options
         self.socket = listen(options.host, options.port)
         # One thread, as a policy may belong to the thread that made it.
         self._policy = ThreadPoolExecutor(1, "policy")
         self._runner = asyncio.Runner(loop_factory=asyncio.new_event_loop)
-        self._loop, self._stop = self._runner.get_loop(), asyncio.Event()
+        self._loop = self._runner.get_loop()
+        self._stop = asyncio.Event()
 
     def serve_forever(self) -> None:
         """Answer until `shutdown` is called by another thread; policies are closed at the end."""
@@ -99,9 +102,12 @@ class WebsocketServer:
             await self._stop.wait()
 
     def _check_request(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Return the response to a request that opens no connection."""
-        headers, options = request.headers, self._options
-        names = {*names_of_this_machine(), options.host.lower()}
+        """Return the response that refuses a request or says that all is well; None to connect.
+
+        Pages of other websites are refused first, as a browser sends their requests, too.
+        """
+        headers = request.headers
+        names = {*names_of_this_machine(), self._options.host.lower()}
         if not is_own_request(headers.get_all("Host"), headers.get_all("Origin"), names):
             return connection.respond(
                 http.HTTPStatus.FORBIDDEN,
@@ -110,19 +116,26 @@ class WebsocketServer:
             )
         if request.path == "/healthz":
             return connection.respond(http.HTTPStatus.OK, "OK\n")
-        sent = "\n".join(headers.get_all("Authorization")).encode()
-        if options.key is not None and not hmac.compare_digest(
-            sent, f"Api-Key {options.key}".encode()
-        ):
+        if not self._has_key("\n".join(headers.get_all("Authorization"))):
             return connection.respond(
                 http.HTTPStatus.UNAUTHORIZED, "The key is missing or wrong.\n"
             )
         return None
 
+    def _has_key(self, authorization: str) -> bool:
+        """Return whether a request has the server's key, if there is one."""
+        if self._options.key is None:
+            return True
+        expected = f"Api-Key {self._options.key}"
+        return hmac.compare_digest(authorization.encode(), expected.encode())
+
     async def _converse(self, connection: ServerConnection) -> None:
-        service, timeout_s = self._service.connection(), self._options.timeout_s
+        """Send the metadata, then reply to each message until the client or an error ends it."""
+        service = self._service.connection()
+        timeout_s = self._options.timeout_s
         with contextlib.ExitStack() as ends, contextlib.suppress(ConnectionClosed, TimeoutError):
-            if service is not self._service:  # no other connection has its policy
+            if service is not self._service:
+                # The policy is this connection's alone, so it is closed with it, in its thread.
                 ends.callback(self._policy.submit, service.forget)
             await connection.send(self._metadata)
             while True:
@@ -138,7 +151,7 @@ class WebsocketServer:
 
 
 def _answer(service: Service, data: bytes | str) -> bytes | str:
-    """Return the reply to a message, or the traceback of an error as text."""
+    """Return the reply to a message in bytes, or the traceback of an error as a text."""
     try:
         if isinstance(data, str):
             raise TypeError("Messages must be binary, not text.")

@@ -1,5 +1,8 @@
 """All goals of a task as a JSON schema, and the goal of an answer.
 
+An answer has a field for each slot of a goal, such as ``{"color": "red", "times": 3}``. Where a
+goal counts cubes by color, each color is a field: ``{"blue": 0, "green": 2, "red": 1}``.
+
 The names of the slots and all their values come from the goals of the task's training scenes.
 Nothing comes from the scene of the episode.
 """
@@ -48,21 +51,26 @@ class Field:
     def schema(self) -> dict[str, Any]:
         """Return the JSON schema of the field."""
         kind = "integer" if self.is_number else "string"
-        one: dict[str, Any] = {"type": kind, "enum": list(self.values)}
+        item: dict[str, Any] = {"type": kind, "enum": list(self.values)}
         if self.lengths is None:
-            return one
+            return item
         least, most = self.lengths
-        return {"type": "array", "items": one, "minItems": least, "maxItems": most}
+        return {"type": "array", "items": item, "minItems": least, "maxItems": most}
 
     def allows(self, value: object) -> bool:
         """Return whether a value in JSON is one of the field's."""
-        items = [value] if self.lengths is None else value
-        least, most = self.lengths or (1, 1)
+        if self.lengths is None:
+            return self._has(value)
+        least, most = self.lengths
         return (
-            isinstance(items, list)
-            and least <= len(items) <= most
-            and all(type(one) is type(self.values[0]) and one in self.values for one in items)
+            isinstance(value, list)
+            and least <= len(value) <= most
+            and all(self._has(item) for item in value)
         )
+
+    def _has(self, item: object) -> bool:
+        """Return whether a single value is one of the field's; True is not 1."""
+        return type(item) is type(self.values[0]) and item in self.values
 
 
 @dataclass(frozen=True)
@@ -93,13 +101,13 @@ class GoalSchema:
         return object_schema(properties)
 
     def read(self, text: str) -> Goal:
-        """Return the goal that a reply names.
+        """Return the goal that a reply names in a JSON object.
 
         Raises:
-            UnparsableReplyError: it names none; the message says why.
+            UnparsableReplyError: it names none; the message, which the model gets, says why.
         """
         reply = json_object(text)
-        answer = {}
+        answer: dict[str, Any] = {}
         for field in self.fields:
             if field.name not in reply:
                 raise UnparsableReplyError(f"The field {field.name!r} is missing.")
@@ -108,10 +116,10 @@ class GoalSchema:
         if goal is not None:
             return goal
         for field in self.fields:
-            if not field.allows(answer[field.name]):
+            value = answer[field.name]
+            if not field.allows(value):
                 raise UnparsableReplyError(
-                    f"The field {field.name!r} cannot be "
-                    f"{json.dumps(answer[field.name])[:MAX_QUOTE_LENGTH]}; "
+                    f"The field {field.name!r} cannot be {json.dumps(value)[:MAX_QUOTE_LENGTH]}; "
                     f"its values are {', '.join(map(str, field.values))}."
                 )
         raise UnparsableReplyError("These values cannot be meant together.")
@@ -129,18 +137,31 @@ def object_schema(fields: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
 
 @functools.cache
 def goal_schema(task: str) -> GoalSchema:
-    """Return the goal schema of a task."""
+    """Return the form of an answer that names a goal of a task, and all goals by their answers.
+
+    The goals are those of the training split. Answers with colors that are counted have a field for
+    each color; a goal has no entry for a color that it does not want, so 0 is filled in.
+    """
     known_task = get_task(task)
-    episodes = split_episodes([known_task.name], ["train"])
-    goals = dict.fromkeys(goal for episode in episodes for goal in known_task.goals(episode.scene))
-    answers = [_answer(goal) for goal in goals]
-    names = max(answers, key=len)
-    # A goal does not name the colors of which it has none.
-    zeros = dict.fromkeys(names, 0)
-    filled = [{**zeros, **answer} for answer in answers]
-    fields = tuple(_field(name, [answer[name] for answer in filled]) for name in names)
-    named = dict(zip(map(_canonical, filled), goals, strict=True))
-    return GoalSchema(fields, named, known_task.commands.colored)
+    goals: dict[Goal, None] = {}  # a set that keeps its order
+    for episode in split_episodes([known_task.name], ["train"]):
+        goals.update(dict.fromkeys(known_task.goals(episode.scene)))
+
+    short_answers = {goal: _answer(goal) for goal in goals}
+    names = max(short_answers.values(), key=len)  # the longest answer has all fields
+    absent = dict.fromkeys(names, 0)
+    answers: list[dict[str, Any]] = []
+    goals_by_answer: dict[str, Goal] = {}
+    for goal, short_answer in short_answers.items():
+        answer = absent | dict(short_answer)
+        answers.append(answer)
+        goals_by_answer[_canonical(answer)] = goal
+
+    fields: list[Field] = []
+    for name in names:
+        values = [answer[name] for answer in answers]
+        fields.append(_field(name, values))
+    return GoalSchema(tuple(fields), goals_by_answer, known_task.things.colored)
 
 
 def _answer(goal: Goal) -> Answer:
@@ -152,25 +173,40 @@ def _answer(goal: Goal) -> Answer:
 
 
 def _field(name: str, values: list[Any]) -> Field:
-    """Return a field with all its values; a name that is no slot's is a color that is counted."""
-    kind: str = "color" if name in COLOR_SLOTS else SLOT_TYPE_NAMES.get(name, "amount")
-    lengths = None
+    """Return a field of an answer, with the values that it has in the answers of all goals.
+
+    Args:
+        name: a slot of the task; or a color, whose number is asked for.
+        values: of the field; tuples of colors if it is a list.
+    """
     if isinstance(values[0], tuple):
-        kind, lengths = "colors", (min(map(len, values)), max(map(len, values)))
-        values = [item for value in values for item in value]
-    return Field(name, kind, tuple(sorted(set(values))), lengths)
+        lengths = [len(colors) for colors in values]
+        items: set[Any] = set()
+        for colors in values:
+            items.update(colors)
+        return Field(name, "colors", tuple(sorted(items)), (min(lengths), max(lengths)))
+    kind: str = SLOT_TYPE_NAMES.get(name, "amount")
+    if name in COLOR_SLOTS:
+        kind = "color"
+    return Field(name, kind, tuple(sorted(set(values))))
 
 
 def _normalize(value: object, is_number: bool) -> object:
-    """Return a value with its words in lower case and stripped; 3.0 and "3" become 3."""
+    """Return a value of a reply as goals have it: ``" Red"`` becomes ``"red"``.
+
+    In a field of numbers, ``3.0`` and ``"3"`` become 3. A list is treated item by item.
+    """
     if isinstance(value, list):
         return [_normalize(item, is_number) for item in value]
     if isinstance(value, str):
         value = value.strip().lower()
-    number = whole_number(value) if is_number else None
-    return value if number is None else number
+    if is_number:
+        number = whole_number(value)
+        return value if number is None else number
+    return value
 
 
 def _canonical(answer: Answer) -> str:
+    """Return an answer as a text that identifies it, whatever the order of its fields."""
     # JSON distinguishes true and 1.0 from 1; Python dictionaries do not.
     return json.dumps(answer, sort_keys=True)

@@ -56,16 +56,20 @@ def question_texts(
         reasoning: meaning of the field in which the model may think; None without it.
     """
     fields = "\n".join(_describe_fields(prompts, schema, reasoning))
+    video = prompts.fill("no_video")
+    if steps:
+        video = prompts.fill("video", steps=str(steps))
     return QuestionTexts(
         system=prompts.fill("system"),
         instruction=prompts.fill("instruction", instruction=instruction),
-        video=prompts.fill("video", steps=str(steps)) if steps else prompts.fill("no_video"),
+        video=video,
         now=prompts.fill("now"),
         question=prompts.fill("question", fields=fields),
     )
 
 
 def _describe_fields(prompts: Prompts, schema: GoalSchema, reasoning: str | None) -> Iterator[str]:
+    """Yield a line for each field of the answer: its name, its meaning and its values."""
     if reasoning is not None:
         yield f"- reasoning: {reasoning}"
     for field in schema.fields:
@@ -74,6 +78,6 @@ def _describe_fields(prompts: Prompts, schema: GoalSchema, reasoning: str | None
         if field.lengths is None:
             values = prompts.fill("values.one", values=values)
         else:
-            least, most = map(str, field.lengths)
-            values = prompts.fill("values.list", values=values, least=least, most=most)
+            least, most = field.lengths
+            values = prompts.fill("values.list", values=values, least=str(least), most=str(most))
         yield prompts.fill("field", name=field.name, meaning=meaning, values=values)

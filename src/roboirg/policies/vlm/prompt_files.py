@@ -52,9 +52,10 @@ class Prompts:
         try:
             return self[name].substitute(fields)
         except (KeyError, ValueError) as error:
+            allowed = ", ".join(f"${field}" for field in fields) or "none"
             raise InvalidValueError(
                 f"Prompts {self.origin}: text {name!r} has a field that cannot be filled "
-                f"({error}); it may have {', '.join(f'${field}' for field in fields) or 'none'}."
+                f"({error}); it may have {allowed}."
             ) from error
 
     def lines(self, name: str) -> tuple[str, ...]:
@@ -70,7 +71,7 @@ class Prompts:
 
 
 def load_prompts(name: str, file: str | None = None) -> Prompts:
-    """Load our own prompts of that name, or those of a file with the same entries.
+    """Load our own prompts of a name, or those of a file with the same entries in their place.
 
     Raises:
         InvalidValueError: the file cannot be read or is not TOML.

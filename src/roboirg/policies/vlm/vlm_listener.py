@@ -82,7 +82,8 @@ class VLMListener(ScriptedPolicy):
         self.options = options
         self.demonstration_frames: int | str = options.frames_every
         if not options.pictures:
-            self.cameras, self.demonstration_frames = (), "none"
+            self.cameras = ()
+            self.demonstration_frames = "none"
         self.prompts = load_prompts(PROMPTS, options.prompts)
         self._about = {
             "model": options.model.about(),
@@ -105,8 +106,10 @@ class VLMListener(ScriptedPolicy):
 
         There is no key among them.
         """
-        goal = self.understood
-        return {**self._about, "understood": None if goal is None else dict(goal.as_mapping())}
+        understood = None
+        if self.understood is not None:
+            understood = dict(self.understood.as_mapping())
+        return {**self._about, "understood": understood}
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Query the goal and begin to execute it, or first hear the rest of the instruction.
@@ -117,28 +120,49 @@ class VLMListener(ScriptedPolicy):
             PolicyReplyError: it replied with an error.
         """
         self._vlm.start()
-        self._demonstration, self.understood, self._impossible = demonstration, None, False
+        self._demonstration = demonstration
+        self.understood = None
+        self._impossible = False
         super().reset(instruction, demonstration)
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
-        """Return the goal that the model names; None if it names none, or none of this scene."""
+        """Return the goal that the model names; None if it names none, or one not in this scene."""
         schema = goal_schema(env.episode.task)
         query = self._build_query(env, schema, instruction)
-        goal = self.understood = self._vlm.ask(query, schema.read)
-        self._impossible = goal is not None and goal not in goals_of(env.episode)
-        return None if self._impossible else goal
+        goal = self._vlm.ask(query, schema.read)
+        self.understood = goal
+        if goal is not None and goal not in goals_of(env.episode):
+            self._impossible = True
+            return None
+        return goal
 
     def usage(self) -> dict[str, float]:
         """Return the cost of the episode."""
         return {**self._vlm.usage(), "impossible": int(self._impossible)}
 
     def _build_query(self, env: RoboIRGEnv, schema: GoalSchema, instruction: str) -> ModelQuery:
-        reasoning = self.prompts.fill("reasoning_field") if self.options.reasoning else None
+        """Return the query for the goal of an instruction, with video and picture if it has any.
+
+        Args:
+            env: shows the scene.
+            schema: of the answer.
+            instruction: everything that was said.
+        """
+        reasoning = None
+        if self.options.reasoning:
+            reasoning = self.prompts.fill("reasoning_field")
         steps = len(self._demonstration.get("joint_positions", ()))
         texts = question_texts(self.prompts, schema, instruction, steps, reasoning)
-        parts: tuple[Part, ...] = texts.instruction, texts.question
         if self.options.pictures:
-            shown, most = self._demonstration, self.options.frames
-            video = (summary_clip(shown[f"{CAMERA}_rgb"], most, steps),) if steps else ()
-            parts = texts.parts(video, Picture(env.picture(CAMERA)))
-        return ModelQuery(texts.system, (ChatTurn("user", parts),), schema.schema(reasoning))
+            parts = texts.parts(self._video(steps), Picture(env.picture(CAMERA)))
+        else:
+            parts = (texts.instruction, texts.question)
+        turn = ChatTurn("user", parts)
+        return ModelQuery(texts.system, (turn,), schema.schema(reasoning))
+
+    def _video(self, steps: int) -> tuple[Part, ...]:
+        """Return the demonstration as a clip; none without one."""
+        if not steps:
+            return ()
+        frames = self._demonstration[f"{CAMERA}_rgb"]
+        return (summary_clip(frames, self.options.frames, steps),)

@@ -27,8 +27,9 @@ UNREAD = ModelReply("")
 TRIES = 2
 FIRST_PAUSE_S = 1.0
 LONGEST_PAUSE_S = 60.0
-ALWAYS = ("calls", "input_tokens", "output_tokens", "unparsed", "cost_usd")
-"""Counts that stand in records even if they are 0; the cost only if prices are known."""
+COST = "cost_usd"
+ALWAYS = ("calls", "input_tokens", "output_tokens", "unparsed")
+"""Counts that stand in records even if they are 0; so does the cost if prices are known."""
 
 
 @dataclass
@@ -51,7 +52,9 @@ class VLMQuery:
         self.start()
 
     def ask(self, query: ModelQuery, parse: Callable[[str], Value]) -> Value | None:
-        """Return the parsed answer of the reply; None if `parse` rejects two.
+        """Return the parsed answer of the model; None if `parse` rejects `TRIES` answers.
+
+        After a rejected one the model is asked again, with the answer and why it was rejected.
 
         Raises:
             PolicyConnectionError: the service cannot be reached or is overloaded.
@@ -65,15 +68,17 @@ class VLMQuery:
                 return parse(answer)
             except UnparsableReplyError as error:
                 rejected = ChatTurn("model", (answer or SILENCE,))
-                retry = ChatTurn("user", (self.again.substitute(why=str(error)),))
+                why = self.again.substitute(why=str(error))
+                retry = ChatTurn("user", (why,))
                 query = query._replace(turns=(*query.turns, rejected, retry))
         self._counts["unparsed"] += 1
         return None
 
     def start(self) -> None:
         """Reset the counts for a new episode."""
-        known = ALWAYS if self.options.has_prices else ALWAYS[:-1]
-        self._counts = defaultdict[str, float](int, dict.fromkeys(known, 0))
+        self._counts = defaultdict[str, float](int, dict.fromkeys(ALWAYS, 0))
+        if self.options.has_prices:
+            self._counts[COST] = 0
 
     def usage(self) -> dict[str, float]:
         """Return calls, tokens and queries without a usable reply; the cost if prices are known.
@@ -85,8 +90,10 @@ class VLMQuery:
         """
         usage = {}
         for name, count in self._counts.items():
-            if count or name in ALWAYS:
-                usage[name] = round(count, 3) if name.endswith("_s") else count
+            is_always_there = name == COST or name in ALWAYS
+            if count or is_always_there:
+                is_seconds = name.endswith("_s")
+                usage[name] = round(count, 3) if is_seconds else count
         return usage
 
     @contextlib.contextmanager
@@ -97,6 +104,7 @@ class VLMQuery:
         self._counts[name] += time.monotonic() - start
 
     def _request(self, query: ModelQuery) -> ModelReply:
+        """Return the reply to a query, and count it."""
         self._counts["calls"] += 1
         reply = self._find_or_send(query)
         self._count(reply)
@@ -107,29 +115,43 @@ class VLMQuery:
         self._counts["input_tokens"] += reply.input_tokens
         self._counts["output_tokens"] += reply.output_tokens
         if self.options.has_prices:
-            self._counts["cost_usd"] += self.options.cost_usd(reply)
+            self._counts[COST] += self.options.cost_usd(reply)
 
     def _find_or_send(self, query: ModelQuery) -> ModelReply:
-        """Return the run's reply to a query; a new one is stored before anything sees it."""
+        """Return the stored reply to a query, or send it and store the reply.
+
+        A new reply is stored before anything sees it, so that an interrupted run repeats nothing.
+        """
         store = current_store()
         if store is None:
             return self._send(query, None)
-        sent, stored = digest(query, self.options), store.replies()
+        sent = digest(query, self.options)
+        stored = store.replies()
         reply = stored.get(sent)
-        if reply is None:
+        if reply is not None:
+            self._counts["stored"] += 1
+        else:
             store.check_budget(self.options)
-            self._counts["anew"] += bool(stored)
+            self._counts["anew"] += 1 if stored else 0
             reply = self._send(query, store)
             store.keep(sent, reply, self.options.cost_usd(reply))
-        else:
-            self._counts["stored"] += 1
         store.calls += 1
         return reply
 
     def _send(self, query: ModelQuery, store: ReplyStore | None) -> ModelReply:
-        """Send a query, again while the service is busy or, a few times, cannot be reached."""
-        model = self._model = self._model or self.connect(self.options)
-        pause, unreachable = FIRST_PAUSE_S, 0
+        """Send a query until there is a reply.
+
+        It is sent again while the service is busy, for `patience_s` in all, and `retries` times if
+        it cannot be reached. Any other error is raised.
+
+        Args:
+            query: for the model.
+            store: of the run, through which its processes take turns; None without a run.
+        """
+        if self._model is None:
+            self._model = self.connect(self.options)
+        pause = FIRST_PAUSE_S
+        failures = 0
         end = time.monotonic() + self.options.patience_s
         while True:
             if store is not None:
@@ -137,13 +159,14 @@ class VLMQuery:
                     store.wait_for_turn(self._service, self.options.requests_per_minute)
             try:
                 with self._timed("answered_s"):
-                    reply = model.answer(query)
+                    reply = self._model.answer(query)
                 return _as_stored(reply)
             except PolicyConnectionError as error:
-                is_busy = isinstance(error, ModelBusyError)
-                unreachable += not is_busy
                 seconds = getattr(error, "retry_after_s", None) or pause
-                if unreachable > self.options.retries or time.monotonic() + seconds > end:
+                is_busy = isinstance(error, ModelBusyError)
+                if not is_busy:
+                    failures += 1
+                if failures > self.options.retries or time.monotonic() + seconds > end:
                     raise
             except UnknownCostError:
                 self._count(UNREAD)

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from roboirg.core.footprints import Circle, Footprint, Rectangle, overlap
+from roboirg.core.motions import Point
 from roboirg.core.object_sizes import HALF_WIDTHS
 from roboirg.simulation.bodies import Body
 
@@ -22,40 +23,63 @@ FINGER_OFFSET = 0.048
 """From the tool's axis to the middle of an open finger, m."""
 FINGER_HALF = (0.008, 0.011)
 """Half sides of a fingertip, along the closing axis and across it, m."""
+STEEPEST_SIDE = math.sqrt(0.5)
+"""Vertical part of a unit vector that slopes by 45 degrees; with less it counts as horizontal."""
+
+Direction = NDArray[np.float64]
+"""A horizontal direction as a unit vector (2)."""
 
 
 def grasp_rotations(name: str, bodies: Mapping[str, Body], tool: Rotation) -> list[Rotation]:
-    """Return rotations of the tool for grasping an object, best first, given the current one."""
-    matrix = bodies[name].entity.pose.to_transformation_matrix()[:3, :3]
-    flat = [axis[:2] for axis in matrix.T if abs(axis[2]) < math.sqrt(0.5)]
-    sides = [
-        sign * axis / np.linalg.norm(axis) for axis, sign in itertools.product(flat, (1.0, -1.0))
-    ]
+    """Return rotations of the tool for grasping an object, best first.
+
+    Args:
+        name: of the object.
+        bodies: all objects, by name.
+        tool: the tool's current rotation.
+    """
+    grasped = bodies[name]
+    center = grasped.position
     closing_now = tool.as_matrix()[:2, 1]
-    obstacles = [
-        area for other, body in bodies.items() if other != name for area in _footprints(body)
-    ]
-    x, y, _ = bodies[name].position
+    obstacles: list[Footprint] = []
+    for other, body in bodies.items():
+        if other != name:
+            obstacles += _footprints(body)
 
-    def cost(side: NDArray[np.float64]) -> tuple[bool, float]:
-        fingers = _fingers(x, y, side)
-        blocked = any(overlap(*pair) for pair in itertools.product(fingers, obstacles))
-        return blocked, -float(side @ closing_now)
+    def cost(side: Direction) -> tuple[bool, float]:
+        """Rank free sides before blocked ones, then those that need a shorter turn."""
+        fingers = _fingers(center, side)
+        return _is_blocked(fingers, obstacles), -float(side @ closing_now)
 
-    return [_rotation(side) for side in sorted(sides, key=cost)]
+    return [_rotation(side) for side in sorted(_sides(grasped), key=cost)]
 
 
-def _fingers(x: float, y: float, side: NDArray[np.float64]) -> list[Rectangle]:
+def _sides(body: Body) -> list[Direction]:
+    """Return the directions in which an object's horizontal axes point, both ways."""
+    sides: list[Direction] = []
+    for axis in body.entity.pose.to_transformation_matrix()[:3, :3].T:
+        if abs(axis[2]) < STEEPEST_SIDE:
+            along = axis[:2]
+            length = np.linalg.norm(along)
+            sides += [along / length, -along / length]
+    return sides
+
+
+def _is_blocked(fingers: Sequence[Rectangle], obstacles: Sequence[Footprint]) -> bool:
+    """Return whether a finger would hit an obstacle."""
+    pairs = itertools.product(fingers, obstacles)
+    return any(overlap(finger, obstacle) for finger, obstacle in pairs)
+
+
+def _fingers(center: Point, side: Direction) -> list[Rectangle]:
+    """Return the areas of open fingers around a point that will close along a direction."""
     yaw = math.atan2(side[1], side[0])
-    return [
-        Rectangle(
-            x + sign * side[0] * FINGER_OFFSET,
-            y + sign * side[1] * FINGER_OFFSET,
-            *FINGER_HALF,
-            yaw,
-        )
-        for sign in (1.0, -1.0)
-    ]
+    fingers = []
+    for sign in (1.0, -1.0):
+        x = center.x + sign * side[0] * FINGER_OFFSET
+        y = center.y + sign * side[1] * FINGER_OFFSET
+        fingers.append(Rectangle(x, y, *FINGER_HALF, yaw))
+    return fingers
 
 
 def _footprints(body: Body) -> Iterator[Footprint]:
@@ -68,8 +92,8 @@ def _footprints(body: Body) -> Iterator[Footprint]:
         yield Rectangle(x, y, half, half, body.yaw)
 
 
-def _rotation(closing: NDArray[np.float64]) -> Rotation:
-    """Return the rotation with fingers down, closing along a horizontal direction (2)."""
+def _rotation(closing: Direction) -> Rotation:
+    """Return the tool's rotation with the fingers down, closing along a direction."""
     along = np.array([*closing, 0.0])
     approach = np.array([0.0, 0.0, -1.0])
     return Rotation.from_matrix(np.stack([np.cross(along, approach), along, approach], axis=1))

@@ -1,7 +1,9 @@
 """Motion planning: straight moves of the tool and inverse kinematics, all deterministic.
 
-A move is a straight line in SE(3) from the current tool pose to the goal. Differential inverse
-kinematics follows it in joint space; the path is then time-parameterized.
+Forward kinematics gives the tool's pose for joint positions; inverse kinematics the other way
+around, here by Newton steps, each of which corrects most of the error that is left. A move follows
+a straight line from the tool's pose to the goal, position and rotation alike, at waypoints close to
+each other; `trajectory_timing` turns them into control steps.
 """
 
 from __future__ import annotations
@@ -43,7 +45,7 @@ MAX_NEWTON_STEP = 0.3
 MAX_JOINT_STEP = 0.35
 """Radians between waypoints; above this the arm would swing around."""
 
-
+POSE_ERROR_SIZE = 6
 Vector = NDArray[np.float64]
 """Arm joint positions (7,) in radians, a position (3,) or a pose error (6,); several are rows."""
 
@@ -62,10 +64,11 @@ class MotionPlanner:
         self._model = robot.articulation.create_pinocchio_model()
         names = [link.name for link in robot.articulation.links]
         self._tool = names.index(TOOL_LINK)
-        limits = np.asarray(robot.articulation.get_qlimits(), dtype=np.float64)[:ARM_JOINTS]
-        self._low, self._high = limits[:, 0], limits[:, 1]
-        anywhere = np.random.default_rng(0).random((INVERSE_STARTS - 2, ARM_JOINTS))
-        self._other_starts = self._low + anywhere * (self._high - self._low)
+        limits = np.asarray(robot.articulation.get_qlimits(), dtype=np.float64)
+        self._low = limits[:ARM_JOINTS, 0]
+        self._high = limits[:ARM_JOINTS, 1]
+        shares = np.random.default_rng(0).random((INVERSE_STARTS - 2, ARM_JOINTS))
+        self._other_starts = self._low + shares * (self._high - self._low)
 
     def forward_kinematics(self, arm: Vector) -> ToolPose:
         """Return the tool pose at arm joint positions (7)."""
@@ -117,42 +120,52 @@ class MotionPlanner:
         arm = np.clip(start, self._low, self._high)
         error = self._pose_error(arm, goal)
         for _ in range(INVERSE_ITERATIONS):
-            if float(np.abs(error).max()) < POSE_TOLERANCE:
+            if _largest(error) < POSE_TOLERANCE:
                 break
-            near = np.clip(error, -MAX_NEWTON_ERROR, MAX_NEWTON_ERROR)
-            step = self._limited_newton_step(arm, near)
-            largest = float(np.abs(step).max())
+            clipped_error = np.clip(error, -MAX_NEWTON_ERROR, MAX_NEWTON_ERROR)
+            step = self._limited_newton_step(arm, clipped_error)
+            largest = _largest(step)
             if largest > MAX_NEWTON_STEP:
                 step *= MAX_NEWTON_STEP / largest
             arm = np.clip(arm + step, self._low, self._high)
             error = self._pose_error(arm, goal)
-        return arm if float(np.abs(error).max()) <= INVERSE_TOLERANCE else None
+        if _largest(error) > INVERSE_TOLERANCE:
+            return None
+        return arm
 
     def _limited_newton_step(self, arm: Vector, error: Vector) -> Vector:
-        """Return a Newton step of the joints that are not blocked by a limit."""
-        free = np.ones(ARM_JOINTS, dtype=bool)
+        """Return a Newton step of the joints that are not blocked by a limit.
+
+        Without the blocked joints the others move farther, which can block some of them as well.
+        """
+        is_free = np.ones(ARM_JOINTS, dtype=bool)
         step = self._newton_step(arm, error)
         for _ in range(ARM_JOINTS):
-            blocked = ((arm <= self._low) & (step < 0.0)) | ((arm >= self._high) & (step > 0.0))
-            if not bool((blocked & free).any()):
+            leaves_below = (arm <= self._low) & (step < 0.0)
+            leaves_above = (arm >= self._high) & (step > 0.0)
+            is_blocked = leaves_below | leaves_above
+            if not bool((is_blocked & is_free).any()):
                 break
-            free &= ~blocked
-            step = self._newton_step(arm, error, free)
+            is_free &= ~is_blocked
+            step = self._newton_step(arm, error, is_free)
         return step
 
     def _newton_step(
-        self,
-        arm: Vector,
-        error: Vector,
-        free: NDArray[np.bool_] | None = None,
+        self, arm: Vector, error: Vector, is_free: NDArray[np.bool_] | None = None
     ) -> Vector:
-        """Return the smallest change of the (free) joints that corrects a small pose error."""
-        jacobian = np.asarray(
-            self._model.compute_single_link_local_jacobian(_with_fingers(arm), self._tool)
-        )[:, :ARM_JOINTS]
-        if free is not None:
-            jacobian = jacobian * free
-        gain = jacobian @ jacobian.T + DAMPING * np.eye(6)
+        """Return the smallest change of the joints that corrects a small pose error.
+
+        Args:
+            arm: joint positions (7), rad.
+            error: as of `_pose_error`.
+            is_free: joints that may change; None for all.
+        """
+        joints = _with_fingers(arm)
+        jacobian = np.asarray(self._model.compute_single_link_local_jacobian(joints, self._tool))
+        jacobian = jacobian[:, :ARM_JOINTS]
+        if is_free is not None:
+            jacobian = jacobian * is_free
+        gain = jacobian @ jacobian.T + DAMPING * np.eye(POSE_ERROR_SIZE)
         return np.asarray(jacobian.T @ np.linalg.solve(gain, error))
 
     def _pose_error(self, arm: Vector, goal: ToolPose) -> Vector:
@@ -160,27 +173,25 @@ class MotionPlanner:
         current = self.forward_kinematics(arm)
         # Clipped, because huge offsets would overflow.
         offset = np.clip(goal.position - current.position, -MAX_TRAVEL, MAX_TRAVEL)
-        back = current.rotation.inv()
-        return np.concatenate([back.apply(offset), (back * goal.rotation).as_rotvec()])
+        to_tool = current.rotation.inv()
+        turn = to_tool * goal.rotation
+        return np.concatenate([to_tool.apply(offset), turn.as_rotvec()])
 
     def _waypoints(self, arm: Vector, goal: ToolPose) -> Vector:
+        """Return joint positions (n, 7) along a straight line of the tool, its ends included."""
         start = self.forward_kinematics(arm)
-        turn = (start.rotation.inv() * goal.rotation).as_rotvec()
-        if float(np.abs(goal.position - start.position).max()) > MAX_TRAVEL:
+        offset = goal.position - start.position
+        if _largest(offset) > MAX_TRAVEL:
             raise MotionPlanningError(f"{_format_position(goal)} is out of reach.")
-        travel = float(np.linalg.norm(goal.position - start.position))
-        count = max(
-            1,
-            math.ceil(travel / WAYPOINT_DISTANCE),
-            math.ceil(float(np.linalg.norm(turn)) / WAYPOINT_ANGLE),
-        )
+        turn = (start.rotation.inv() * goal.rotation).as_rotvec()
+        count_by_distance = math.ceil(float(np.linalg.norm(offset)) / WAYPOINT_DISTANCE)
+        count_by_angle = math.ceil(float(np.linalg.norm(turn)) / WAYPOINT_ANGLE)
+        count = max(1, count_by_distance, count_by_angle)
         points = [arm]
         for share in np.linspace(0.0, 1.0, count + 1)[1:]:
-            pose = ToolPose(
-                start.position + share * (goal.position - start.position),
-                start.rotation * Rotation.from_rotvec(share * turn),
-            )
-            points.append(self._solve_near(pose, points[-1]))
+            position = start.position + share * offset
+            rotation = start.rotation * Rotation.from_rotvec(share * turn)
+            points.append(self._solve_near(ToolPose(position, rotation), points[-1]))
         return np.stack(points)
 
     def _solve_near(self, pose: ToolPose, seed: Vector) -> Vector:
@@ -188,7 +199,7 @@ class MotionPlanner:
         arm = seed.copy()
         for _ in range(MAX_ITERATIONS):
             error = self._pose_error(arm, pose)
-            if float(np.abs(error).max()) < POSE_TOLERANCE:
+            if _largest(error) < POSE_TOLERANCE:
                 return self._check_step(arm, seed)
             arm = arm + self._newton_step(arm, error)
         raise MotionPlanningError(
@@ -196,14 +207,21 @@ class MotionPlanner:
         )
 
     def _check_step(self, arm: Vector, seed: Vector) -> Vector:
+        """Return the joint positions of a waypoint, given those of the one before it."""
         if bool(((arm < self._low) | (arm > self._high)).any()):
             raise MotionPlanningError("A straight move would exceed a joint limit.")
-        if float(np.abs(arm - seed).max()) > MAX_JOINT_STEP:
+        if _largest(arm - seed) > MAX_JOINT_STEP:
             raise MotionPlanningError("A straight move passes too close to a singularity.")
         return arm
 
 
+def _largest(vector: Vector) -> float:
+    """Return the largest absolute value in a vector."""
+    return float(np.abs(vector).max())
+
+
 def _with_fingers(arm: Vector) -> Vector:
+    """Return the robot's joint positions (9) for those of the arm, with closed fingers."""
     return np.append(arm, [0.0, 0.0])
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -31,10 +32,10 @@ CONTAINER_HOVER = 0.2
 CONTAINER_GRASP = 0.01
 """Tool height above a container's origin at which the fingers enclose the knob."""
 TARGET_RELEASE = 0.005
-SITE_RELEASE = 0.01
+RELEASES = {"site": 0.01, "box": 0.065}
+"""Tool heights at which an object is let go over another kind of place; in a box, the open fingers
+stay above the walls."""
 BIN_RELEASE = 0.2
-BOX_RELEASE = 0.065
-"""Tool height that keeps the open fingers above the walls of a box."""
 BIN_RETREAT = 0.1
 """Meters by which the hand moves back towards the robot after releasing over the bin."""
 OVER_TARGET = 0.1
@@ -57,8 +58,15 @@ STRAIGHT_DOWN = Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
 """Fingers down, closing along world y (the rotation at home)."""
 
 
+class Approach(NamedTuple):
+    """A move of the tool, and the rotation that it ends with."""
+
+    trajectory: JointTrajectory
+    rotation: Rotation
+
+
 class MotionPrimitives:
-    """Executes primitives in one world; ``_do_KIND`` is the routine of each kind."""
+    """Plans the movements of primitives in one world; ``_do_KIND`` is the routine of each kind."""
 
     def __init__(self, world: World) -> None:
         self._world = world
@@ -84,19 +92,20 @@ class MotionPrimitives:
     def _grasp_and_lift(self, cube: str, opening: float) -> Iterator[JointTrajectory]:
         """Yield the trajectories that pick a cube with the gripper opened to `opening`."""
         yield self._grip(opening)
-        place = self._position(cube)
-        approach, rotation = self._approach(cube, CUBE_HOVER)
-        yield approach
+        start = self._position(cube)
+        approach = self._approach(cube, CUBE_HOVER)
+        yield approach.trajectory
         yield self._grip(opening)
-        yield self._move(self._position(cube), rotation)
+        yield self._move(self._position(cube), approach.rotation)
         yield self._grip(CLOSED)
-        yield self._move(_above(place, CUBE_HOVER), rotation)
+        yield self._move(_above(start, CUBE_HOVER), approach.rotation)
 
     def _do_place_on(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         """Yield the trajectories that let go of a thing over a place, at its kind's height."""
-        place, rotation = self._place(primitive), self._rotation()
+        place = self._place(primitive)
+        rotation = self._rotation()
         kind = self._world.bodies[str(primitive.place)].item.kind
-        height = {"site": SITE_RELEASE, "box": BOX_RELEASE}.get(kind, TARGET_RELEASE)
+        height = RELEASES.get(kind, TARGET_RELEASE)
         yield self._move(_above(place, CUBE_HOVER), rotation)
         yield self._move(_above(place, height), rotation)
         yield self._grip(OPEN)
@@ -105,7 +114,8 @@ class MotionPrimitives:
     _do_put_into = _do_place_on
 
     def _do_drop_into(self, primitive: Primitive) -> Iterator[JointTrajectory]:
-        place, rotation = self._place(primitive), self._rotation()
+        place = self._place(primitive)
+        rotation = self._rotation()
         yield self._move(_above(place, BIN_RELEASE), rotation)
         yield self._grip(OPEN)
         back = place._replace(x=place.x - BIN_RETREAT)
@@ -119,21 +129,28 @@ class MotionPrimitives:
         yield from self._do_press_below(primitive)
 
     def _do_press_below(self, primitive: Primitive) -> Iterator[JointTrajectory]:
+        """Yield the trajectories that press the button below the hand, when its time has come.
+
+        `primitive.steps` is the step at which it shall be pressed.
+        """
         button = self._position(primitive.subject)
         yield self._grip(CLOSED)
         down = self._move(_above(button, BUTTON_PRESS), STRAIGHT_DOWN)
-        wait = primitive.steps - self._world.elapsed - self._steps_to_press(down)
-        if wait > 0:
-            yield np.tile(down[0], (wait, 1))
+        steps_left = primitive.steps - self._world.elapsed
+        waiting_steps = steps_left - self._steps_to_press(down)
+        if waiting_steps > 0:
+            yield np.tile(down[0], (waiting_steps, 1))
         yield down
         yield self._move(_above(button, CUBE_HOVER), STRAIGHT_DOWN)
 
     def _steps_to_press(self, down: JointTrajectory) -> int:
         """Return the number of control steps of a descent until the button is pressed."""
-        heights = [
-            self._planner.forward_kinematics(arm).position[2] for arm in down[:, :ARM_JOINTS]
-        ]
-        return int(np.count_nonzero(np.array(heights) > BUTTON_CONTACT)) + ARM_LAG
+        steps_above = 0
+        for arm in down[:, :ARM_JOINTS]:
+            tool = self._planner.forward_kinematics(arm)
+            if tool.position[2] > BUTTON_CONTACT:
+                steps_above += 1
+        return steps_above + ARM_LAG
 
     def _do_hover(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._move(_above(self._position(primitive.subject), CUBE_HOVER), STRAIGHT_DOWN)
@@ -142,30 +159,37 @@ class MotionPrimitives:
     def _do_pick_container(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._grip(OPEN)
         container = self._position(primitive.subject)
-        grasp = _above(container, container.z + CONTAINER_GRASP)
-        approach, rotation = self._approach(primitive.subject, CONTAINER_HOVER)
-        yield approach
+        knob = _above(container, container.z + CONTAINER_GRASP)
+        approach = self._approach(primitive.subject, CONTAINER_HOVER)
+        yield approach.trajectory
         yield self._grip(OPEN)
-        yield self._move(grasp, rotation)
+        yield self._move(knob, approach.rotation)
         yield self._grip(CLOSED)
-        yield self._move(_above(container, CONTAINER_HOVER), rotation)
+        yield self._move(_above(container, CONTAINER_HOVER), approach.rotation)
 
     def _do_put_down(self, primitive: Primitive) -> Iterator[JointTrajectory]:
-        held = primitive.subject
-        tool = Point(*self._world.robot.tool_pose.p.tolist())
-        here = tool if held == ROBOT else self._position(held)
+        """Yield the trajectories that let go of what the hand holds where it is.
+
+        An empty hand, of which the subject is the robot, goes down in the same way.
+        """
+        if primitive.subject == ROBOT:
+            start = Point(*self._world.robot.tool_pose.p.tolist())
+        else:
+            start = self._position(primitive.subject)
         rotation = self._rotation()
-        yield self._move(_above(here, primitive.height), rotation)
+        yield self._move(_above(start, primitive.height), rotation)
         yield self._grip(OPEN)
-        yield self._move(_above(here, CUBE_HOVER), rotation)
+        yield self._move(_above(start, CUBE_HOVER), rotation)
 
     def _do_hold(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         for _ in range(0, primitive.steps, GRIPPER_STEPS):
             yield self._grip(OPEN)
 
     def _do_hold_until(self, primitive: Primitive) -> Iterator[JointTrajectory]:
-        while (left := primitive.steps - self._world.elapsed) > 0:
-            yield self._grip(CLOSED)[:left]
+        """Yield trajectories at rest with closed fingers, until step `primitive.steps`."""
+        while self._world.elapsed < primitive.steps:
+            steps_left = primitive.steps - self._world.elapsed
+            yield self._grip(CLOSED)[:steps_left]
 
     def _do_retreat(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._move(ASIDE, self._rotation())
@@ -178,33 +202,33 @@ class MotionPrimitives:
         yield np.tile(HOME_ACTION, (HOMING_STEPS, 1))
 
     def _grip(self, gripper: float) -> JointTrajectory:
-        """Hold the arm still while the gripper opens or closes."""
+        """Hold the arm still while the gripper opens or closes, as later moves keep it."""
         self._gripper = gripper
-        return with_gripper(np.tile(self._world.robot.arm_positions, (GRIPPER_STEPS, 1)), gripper)
+        at_rest = np.tile(self._world.robot.arm_positions, (GRIPPER_STEPS, 1))
+        return with_gripper(at_rest, gripper)
 
-    def _approach(self, name: str, height: float) -> tuple[JointTrajectory, Rotation]:
-        """Plan a move to above an object; returns it with the grasp rotation."""
+    def _approach(self, name: str, height: float) -> Approach:
+        """Plan a move to above an object, with the rotation for grasping it."""
         rotations = grasp_rotations(name, self._world.bodies, self._rotation())
         return self._plan_any(_above(self._position(name), height), rotations)
 
     def _move(self, position: Point, rotation: Rotation) -> JointTrajectory:
         """Plan a straight move to a pose, via home if the straight line is not feasible."""
-        return self._plan_any(position, [rotation])[0]
+        return self._plan_any(position, [rotation]).trajectory
 
-    def _plan_any(
-        self, position: Point, rotations: Sequence[Rotation]
-    ) -> tuple[JointTrajectory, Rotation]:
+    def _plan_any(self, position: Point, rotations: Sequence[Rotation]) -> Approach:
         """Plan a move with the first of some rotations that the wrist can take.
 
         At the edge of the workspace the move ends up to 1 cm nearer to the robot.
         """
-        refused = []
+        errors = []
         for shortfall, rotation in itertools.product(SHORTFALLS, rotations):
+            goal = _towards_robot(position, shortfall)
             try:
-                return self._plan(_towards_robot(position, shortfall), rotation), rotation
+                return Approach(self._plan(goal, rotation), rotation)
             except MotionPlanningError as error:
-                refused.append(error)
-        raise refused[len(rotations) - 1]  # of the place itself, with the last rotation
+                errors.append(error)
+        raise errors[len(rotations) - 1]  # of the place itself, with the last rotation
 
     def _plan(self, position: Point, rotation: Rotation) -> JointTrajectory:
         goal = ToolPose(np.asarray(position, dtype=np.float64), rotation)
@@ -215,6 +239,7 @@ class MotionPrimitives:
         return self._world.bodies[name].position
 
     def _place(self, primitive: Primitive) -> Point:
+        """Return the position of the place that a primitive ends at."""
         return self._position(str(primitive.place))
 
     def _rotation(self) -> Rotation:
@@ -229,6 +254,7 @@ def _above(place: Point, height: float) -> Point:
 
 def _towards_robot(place: Point, distance: float) -> Point:
     """Return the place moved in the plane towards the robot's base."""
-    x, y = place.x - ROBOT_BASE[0], place.y - ROBOT_BASE[1]
+    x = place.x - ROBOT_BASE[0]
+    y = place.y - ROBOT_BASE[1]
     share = distance / math.hypot(x, y)
     return Point(place.x - share * x, place.y - share * y, place.z)

@@ -40,26 +40,42 @@ def present_things(world: World, kinds: Collection[str]) -> tuple[Thing, ...]:
     )
 
 
-def nearest_thing(things: Iterable[Thing], point: Point) -> tuple[Thing, float] | None:
-    """Return the thing whose origin is nearest to a point, and how many pixels; None of none."""
-    measured = [(math.dist(one.pixel, point), one) for one in things if one.pixel is not None]
-    if not measured:
-        return None
-    distance, thing = min(measured, key=lambda one: one[0])
-    return thing, distance
+class NearThing(NamedTuple):
+    """A thing, and how far its origin is from a point, pixels."""
+
+    thing: Thing
+    distance: float
+
+
+def nearest_thing(things: Iterable[Thing], point: Point) -> NearThing | None:
+    """Return the thing whose origin is nearest to a point; None if none is in the picture."""
+    nearest: NearThing | None = None
+    for thing in things:
+        if thing.pixel is None:
+            continue
+        distance = math.dist(thing.pixel, point)
+        if nearest is None or distance < nearest.distance:
+            nearest = NearThing(thing, distance)
+    return nearest
 
 
 def held_thing(world: World) -> str | None:
     """Return the name of what is in the hand; None if it is empty."""
-    facts = sorted(world.facts)
-    return next((fact.subject for kind in _HELD for fact in facts if fact.kind == kind), None)
+    for kind in _HELD:
+        subjects = [fact.subject for fact in world.facts if fact.kind == kind]
+        if subjects:
+            return min(subjects)
+    return None
 
 
 def origin_pixel(body: Body) -> Point | None:
     """Return row and column of an object's origin in the front picture; None outside of it."""
     frame = sapien.Pose(np.asarray(body.position))
     x, y, z = to_front_camera(frame)[:3, 3]
-    if z <= 0:
+    if z <= 0:  # behind the camera
         return None
-    row, column = (round(SIZE / 2 + FOCAL_LENGTH * float(one / z)) for one in (y, x))
-    return (row, column) if 0 <= row < SIZE and 0 <= column < SIZE else None
+    row = round(SIZE / 2 + FOCAL_LENGTH * float(y / z))
+    column = round(SIZE / 2 + FOCAL_LENGTH * float(x / z))
+    if row not in range(SIZE) or column not in range(SIZE):
+        return None
+    return row, column

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import functools
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,29 +46,39 @@ def time_parameterize(points: NDArray[np.float64]) -> NDArray[np.float64]:
     Raises:
         MotionPlanningError: no timing was found.
     """
-    points = _resample(points)
-    if len(points) == 1:
-        return points
+    waypoints = _resample(points)
+    if len(waypoints) == 1:
+        return waypoints
+    for length in PARAMETER_LENGTHS:
+        trajectory = _fastest(waypoints, length)
+        if trajectory is not None:
+            count = max(int(trajectory.duration / CONTROL_PERIOD), 2)
+            times = np.linspace(0.0, trajectory.duration, count)
+            return np.asarray(trajectory(times))
+    raise MotionPlanningError("No timing within the joint limits was found.")
+
+
+def _fastest(waypoints: NDArray[np.float64], length: float) -> Any:  # noqa: ANN401
+    """Return TOPP-RA's fastest trajectory through waypoints; None if it finds none.
+
+    Args:
+        waypoints: (n, 7) joint positions, rad.
+        length: of the spline's parameter.
+    """
     toppra = _toppra()
     limits = np.ones(ARM_JOINTS)
     constraints = [
         toppra.constraint.JointVelocityConstraint(limits * JOINT_SPEED_LIMIT),
         toppra.constraint.JointAccelerationConstraint(limits * JOINT_ACCELERATION_LIMIT),
     ]
-    for length in PARAMETER_LENGTHS:
-        path = toppra.SplineInterpolator(np.linspace(0.0, length, len(points)), points)
-        # Limits hold at the grid points: every waypoint and nine points in between.
-        grid = np.linspace(0.0, length, GRID_INTERVALS * (len(points) - 1) + 1)
-        solver = toppra.algorithm.TOPPRA(
-            constraints, path, gridpoints=grid, parametrizer="ParametrizeConstAccel"
-        )
-        trajectory = solver.compute_trajectory()
-        if trajectory is not None:
-            break
-    else:
-        raise MotionPlanningError("No timing within the joint limits was found.")
-    count = max(int(trajectory.duration / CONTROL_PERIOD), 2)
-    return np.asarray(trajectory(np.linspace(0.0, trajectory.duration, count)))
+    parameters = np.linspace(0.0, length, len(waypoints))
+    path = toppra.SplineInterpolator(parameters, waypoints)
+    # Limits hold at the grid points: every waypoint and nine points in between.
+    grid = np.linspace(0.0, length, GRID_INTERVALS * (len(waypoints) - 1) + 1)
+    solver = toppra.algorithm.TOPPRA(
+        constraints, path, gridpoints=grid, parametrizer="ParametrizeConstAccel"
+    )
+    return solver.compute_trajectory()
 
 
 @functools.cache
@@ -83,12 +94,16 @@ def _toppra() -> ModuleType:
 
 
 def _resample(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Resample a path at a fixed distance; the last point is closer to the one before it."""
-    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    path = np.concatenate([[0.0], np.cumsum(lengths)])
-    marks = np.arange(0.0, path[-1] - SMALLEST_JOINT_STEP, WAYPOINT_SPACING)
-    if len(marks) == 0:
+    """Return points on a path a fixed distance apart; the last is closer to the one before it.
+
+    A path that goes nowhere is one point.
+    """
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    distances = np.concatenate([[0.0], np.cumsum(steps)])  # along the path, from its start
+    total = distances[-1]
+    places = np.arange(0.0, total - SMALLEST_JOINT_STEP, WAYPOINT_SPACING)
+    if len(places) == 0:
         return points[:1]
-    marks = np.append(marks, path[-1])
-    joints = [np.interp(marks, path, points[:, joint]) for joint in range(points.shape[1])]
+    places = np.append(places, total)
+    joints = [np.interp(places, distances, positions) for positions in points.T]
     return np.stack(joints, axis=1)

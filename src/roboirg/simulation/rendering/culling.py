@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import sapien
@@ -28,9 +29,9 @@ HULL_MARGIN = 1e-4
 """Meters by which convex hulls grow; the renderer is 100 times as precise. The hand stays 1 mm
 outside the wrist camera's view, so a larger margin would draw it."""
 
-DRAWN, LEFT_OUT = 0, 99
+DRAWN = 0
+LEFT_OUT = 99
 """Shading modes; SAPIEN does not know the second."""
-
 
 Floats = NDArray[np.float64]
 
@@ -56,26 +57,22 @@ class CullableBodies:
         scene: sapien.Scene,
         cullable_bodies: Mapping[sapien.render.RenderBodyComponent, CullableBody],
     ) -> None:
-        self._bodies = [
-            component
-            for entity in scene.entities
-            for component in entity.components
-            if isinstance(component, sapien.render.RenderBodyComponent)
-        ]
-        known = [cullable_bodies.get(body) for body in self._bodies]
-        self._hulls = [None if one is None else one.hull for one in known]
-        self._boxes = np.stack(
-            [
-                _box(_points(body) if hull is None else hull)
-                for body, hull in zip(self._bodies, self._hulls, strict=True)
-            ]
-        )
-        self._drawn_by = {
-            camera: np.array([one is None or camera in one.cameras for one in known])
-            for camera in CAMERAS
-        }
+        self._bodies = _render_bodies(scene)
+        self._cullable = [cullable_bodies.get(body) for body in self._bodies]
+        boxes = []
+        for body, cullable in zip(self._bodies, self._cullable, strict=True):
+            points = _points(body) if cullable is None else cullable.hull
+            boxes.append(_box(points))
+        self._boxes = np.stack(boxes)
+        self._drawn_by = {camera: self._may_be_drawn_by(camera) for camera in CAMERAS}
+        # Which bodies have the shading mode of drawn ones now, and in each command buffer.
         self._drawn = np.ones(len(self._bodies), dtype=bool)
         self._buffered: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
+
+    def _may_be_drawn_by(self, camera: str) -> NDArray[np.bool_]:
+        """Return for each body whether a camera draws it when it is in view."""
+        may_be_drawn = [body is None or camera in body.cameras for body in self._cullable]
+        return np.array(may_be_drawn)
 
     def poses(self) -> Floats:
         """Return the current poses of the bodies, (n, 4, 4)."""
@@ -89,15 +86,17 @@ class CullableBodies:
             poses: poses of the bodies, (n, 4, 4).
             view: extrinsic matrix of the camera (3, 4).
         """
-        outside = _outside(np.einsum("bij,bkj->bki", poses, self._boxes) @ view.T)
-        seen = self._drawn_by[camera] & ~outside.all(axis=-1).any(axis=0)
-        for number in np.flatnonzero(seen & outside.any(axis=(0, -1))):
-            hull = self._hulls[number]
-            if hull is not None:
+        corners = np.einsum("bij,bkj->bki", poses, self._boxes) @ view.T
+        outside = _outside(corners)  # plane, body, corner
+        visible = self._drawn_by[camera] & ~outside.all(axis=-1).any(axis=0)
+        # Boxes are larger than what they hold: where one crosses a plane, the hull decides.
+        for number in np.flatnonzero(visible & outside.any(axis=(0, -1))):
+            cullable = self._cullable[number]
+            if cullable is not None:
                 to_camera = view @ poses[number]
-                points = hull @ to_camera[:, :3].T + to_camera[:, 3]
-                seen[number] = not _outside(points, HULL_MARGIN).all(axis=-1).any()
-        return np.asarray(seen)
+                points = cullable.hull @ to_camera[:, :3].T + to_camera[:, 3]
+                visible[number] = not _outside(points, HULL_MARGIN).all(axis=-1).any()
+        return np.asarray(visible)
 
     def take_picture(
         self, camera: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]
@@ -114,10 +113,21 @@ class CullableBodies:
         camera.take_picture()
 
 
-def _outside(points: Floats, margin: float = 0.0) -> NDArray[np.bool_]:
-    """Return for each plane of a view's frustum, (5, ...), which points are outside.
+def _render_bodies(scene: sapien.Scene) -> list[sapien.render.RenderBodyComponent]:
+    """Return the components of a scene's entities that are drawn."""
+    return [
+        component
+        for entity in scene.entities
+        for component in entity.components
+        if isinstance(component, sapien.render.RenderBodyComponent)
+    ]
 
-    The half angle of view is 45 degrees, so the planes are z = NEAR, |x| = z and |y| = z.
+
+def _outside(points: Floats, margin: float = 0.0) -> NDArray[np.bool_]:
+    """Return for each plane that bounds a view, (5, ...), which points are outside of it.
+
+    The half angle of view is 45 degrees, so the planes are z = NEAR, |x| = z and |y| = z. A body
+    with all its points outside one plane cannot be seen.
 
     Args:
         points: (..., 3), m, in the camera's frame: x right, y down, z forward (OpenCV).
@@ -134,16 +144,26 @@ def invalidate_command_buffers(body: sapien.render.RenderBodyComponent) -> None:
     body.visibility = 1.0
 
 
-_boxes_of_files: dict[tuple[object, ...], Floats] = {}
+class _Bounds(NamedTuple):
+    """Lowest and highest coordinates, (3) each, m."""
+
+    low: Floats
+    high: Floats
+
+
+_bounds_of_files: dict[tuple[object, ...], _Bounds] = {}
+"""Bounds of meshes by file and scale."""
 
 
 def _box(points: Floats) -> Floats:
     """Return homogeneous corners (8, 4) of the box around points (n, 3), with the margin."""
-    low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+    low = points.min(axis=0) - MARGIN
+    high = points.max(axis=0) + MARGIN
     return np.column_stack([_corners(low, high), np.ones(8)])
 
 
 def _corners(low: Floats, high: Floats) -> Floats:
+    """Return the corners (8, 3) of the box between two opposite ones (3)."""
     grid = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1)
     return grid.reshape(-1, 3)
 
@@ -155,26 +175,30 @@ def _points(body: sapien.render.RenderBodyComponent) -> Floats:
 
 def _shape_corners(shape: sapien.render.RenderShape) -> Floats:
     """Return corners of a shape's box in its entity's frame, (8, 3)."""
-    corners = _corners(*_shape_bounds(shape))
+    bounds = _shape_bounds(shape)
+    corners = _corners(bounds.low, bounds.high)
     matrix = shape.local_pose.to_transformation_matrix()
     return np.asarray(corners @ matrix[:3, :3].T + matrix[:3, 3])
 
 
-def _shape_bounds(
-    shape: sapien.render.RenderShape,
-) -> tuple[Floats, Floats]:
-    """Return lowest and highest coordinates in the shape's own frame."""
+def _shape_bounds(shape: sapien.render.RenderShape) -> _Bounds:
+    """Return a shape's bounds in its own frame; those of a file are computed once per process."""
     if isinstance(shape, sapien.render.RenderShapeBox):
         half = np.asarray(shape.half_size, dtype=np.float64)
-        return -half, half
+        return _Bounds(-half, half)
     if isinstance(shape, sapien.render.RenderShapeCylinder):
         half = np.array([shape.half_length, shape.radius, shape.radius], dtype=np.float64)
-        return -half, half
+        return _Bounds(-half, half)
+    if not shape.filename:
+        return _mesh_bounds(shape)
     key = (shape.filename, *shape.scale)
-    bounds = _boxes_of_files.get(key) if shape.filename else None
-    if bounds is None:
-        points = np.concatenate([part.vertices for part in shape.parts]) * shape.scale
-        bounds = np.stack([points.min(axis=0), points.max(axis=0)]).astype(np.float64)
-        if shape.filename:
-            _boxes_of_files[key] = bounds
-    return bounds[0], bounds[1]
+    if key not in _bounds_of_files:
+        _bounds_of_files[key] = _mesh_bounds(shape)
+    return _bounds_of_files[key]
+
+
+def _mesh_bounds(shape: sapien.render.RenderShapeTriangleMesh) -> _Bounds:
+    """Return the bounds of a mesh in its own frame."""
+    points = np.concatenate([part.vertices for part in shape.parts]) * shape.scale
+    low = points.min(axis=0).astype(np.float64)
+    return _Bounds(low, points.max(axis=0).astype(np.float64))

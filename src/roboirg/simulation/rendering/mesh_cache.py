@@ -18,15 +18,21 @@ Arrays = dict[str, NDArray[np.generic]]
 
 _WORD = 8
 """Alignment of the header and of each array, bytes."""
+_HASH_DIGITS = 24
+"""Hexadecimal digits of the sources' hash in an entry's name."""
 
 
 def cached_arrays(name: str, sources: bytes, make: Callable[[], Arrays]) -> Arrays:
     """Return arrays from the cache, or make and cache them.
 
-    `sources` is everything that determines the arrays.
+    Args:
+        name: beginning of the entry's name, for people who look into the cache.
+        sources: everything that determines the arrays.
+        make: makes them.
     """
     cache = open_cache("meshes")
-    key = f"{name}-{hashlib.sha256(source_code('mesh_cache') + sources).hexdigest()[:24]}"
+    digest = hashlib.sha256(source_code("mesh_cache") + sources).hexdigest()
+    key = f"{name}-{digest[:_HASH_DIGITS]}"
     content = cache.read(key)
     if content is not None:
         return unpack_arrays(content)
@@ -36,14 +42,20 @@ def cached_arrays(name: str, sources: bytes, make: Callable[[], Arrays]) -> Arra
 
 
 def pack_arrays(arrays: Arrays) -> bytes:
-    """Pack arrays after a JSON header with its length.
+    """Pack arrays into bytes: the header's length, a JSON header, then the arrays' numbers.
 
     NumPy's own format takes several times as long to read, because it copies.
     """
-    header = json.dumps({name: (array.dtype.str, array.shape) for name, array in arrays.items()})
+    formats = {name: (array.dtype.str, array.shape) for name, array in arrays.items()}
+    header = json.dumps(formats)
     parts = [len(header).to_bytes(_WORD, "little"), header.encode()]
     parts += [np.ascontiguousarray(array).tobytes() for array in arrays.values()]
-    return b"".join(part + bytes(-len(part) % _WORD) for part in parts)
+    return b"".join(part + _padding(len(part)) for part in parts)
+
+
+def _padding(length: int) -> bytes:
+    """Return the zeros between a part of some length and the next multiple of `_WORD`."""
+    return bytes(-length % _WORD)
 
 
 def unpack_arrays(content: memoryview) -> Arrays:
@@ -53,10 +65,10 @@ def unpack_arrays(content: memoryview) -> Arrays:
     offset = _WORD + size
     arrays: Arrays = {}
     for name, (kind, shape) in header.items():
-        offset += -offset % _WORD
-        count = math.prod(shape)
-        arrays[name] = np.frombuffer(content, kind, count, offset).reshape(shape)
-        offset += arrays[name].nbytes
+        offset += len(_padding(offset))
+        flat = np.frombuffer(content, kind, math.prod(shape), offset)
+        arrays[name] = flat.reshape(shape)
+        offset += flat.nbytes
     return arrays
 
 

@@ -35,8 +35,10 @@ REMEDY = (
 # processor as a physics device and cannot render.
 _SOFTWARE_ALIAS = "pci:0000:00:00.0"
 _SOFTWARE_NAMES = ("llvmpipe", "lavapipe", "swiftshader")
+"""Parts of the names of devices with which the processor draws."""
 _PCI_DEVICES = Path("/sys/bus/pci/devices")
 _DISPLAY_CLASS = "0x03"
+"""Beginning of the class of PCI devices that are display controllers."""
 _MAX_CUDA_DEVICES = 64
 
 
@@ -57,9 +59,11 @@ class RenderDevice:
 
 def describe_device(device: sapien.Device) -> RenderDevice:
     """Return the description of a SAPIEN device."""
-    alias = f"cuda:{device.cuda_id}" if device.cuda_id >= 0 else f"pci:{device.pci_string}"
     name = str(device.name)
-    return RenderDevice(name, alias, any(word in name.lower() for word in _SOFTWARE_NAMES))
+    has_cuda = device.cuda_id >= 0
+    alias = f"cuda:{device.cuda_id}" if has_cuda else f"pci:{device.pci_string}"
+    is_software = any(word in name.lower() for word in _SOFTWARE_NAMES)
+    return RenderDevice(name, alias, is_software)
 
 
 def find_render_device() -> sapien.Device:
@@ -72,22 +76,19 @@ def find_render_device() -> sapien.Device:
         MissingDependencyError: SAPIEN is not installed.
         RenderDeviceError: the named device cannot render or does not exist, or none can.
     """
-    name = os.environ.get(DEVICE_VARIABLE) or None
-    if name is not None:
+    name = os.environ.get(DEVICE_VARIABLE)
+    if name:
         return _named_device(name)
-    software = None
-    for alias in _aliases():
-        device = _device(alias)
-        if device is None or not device.can_render():
-            continue
+    first_software: sapien.Device | None = None
+    for device in _rendering_devices():
         if not describe_device(device).is_software:
             return device
-        software = software or device
-    if software is None:
+        first_software = first_software or device
+    if first_software is None:
         raise RenderDeviceError(
             f"No Vulkan device can render; {to_unset(*DRIVER_VARIABLES)}{REMEDY}."
         )
-    return software
+    return first_software
 
 
 def render_system(*, keep_engine: bool = True) -> sapien.render.RenderSystem:
@@ -127,9 +128,14 @@ def _new_system(device: sapien.Device) -> sapien.render.RenderSystem:
 
 
 def to_unset(*names: str) -> str:
-    """Return advice to unset those of some environment variables that are set, as a beginning."""
+    """Return advice to unset environment variables, to be followed by other advice.
+
+    For example ``unset VK_DRIVER_FILES (now '/x'), or ``; nothing if none of them is set.
+    """
     found = [f"{name} (now {os.environ[name]!r})" for name in names if os.environ.get(name)]
-    return f"unset {' and '.join(found)}, or " if found else ""
+    if not found:
+        return ""
+    return f"unset {' and '.join(found)}, or "
 
 
 @functools.cache
@@ -144,6 +150,7 @@ def _sapien() -> ModuleType:
 
 
 def _device(alias: str) -> sapien.Device | None:
+    """Return the device that SAPIEN finds by a name; None if there is none."""
     try:
         with DRAWING:
             return _sapien().Device(alias)
@@ -153,24 +160,33 @@ def _device(alias: str) -> sapien.Device | None:
 
 
 def _named_device(name: str) -> sapien.Device:
-    device = _device(name)
-    if device is not None and device.can_render():
-        return device
-    known = [found for found in map(_device, _aliases()) if found is not None]
-    names = [describe_device(found).alias for found in known if found.can_render()]
-    if not names:
+    """Return a device that the user has named; see `find_render_device` for the errors."""
+    named = _device(name)
+    if named is not None and named.can_render():
+        return named
+    aliases = [describe_device(device).alias for device in _rendering_devices()]
+    if not aliases:
         raise RenderDeviceError(
             f"The render device {name!r} cannot be used; {to_unset(*DRIVER_VARIABLES)}{REMEDY}."
         )
-    fault = "does not exist" if device is None else "cannot render"
+    fault = "does not exist" if named is None else "cannot render"
+    different = dict.fromkeys(aliases)
     raise RenderDeviceError(
         f"The render device {name!r} {fault}; set {DEVICE_VARIABLE} to one of "
-        f"{', '.join(dict.fromkeys(names))}."
+        f"{', '.join(different)}."
     )
 
 
+def _rendering_devices() -> Iterator[sapien.Device]:
+    """Yield the devices that can render, GPUs first; a GPU can appear under two names."""
+    for alias in _aliases():
+        device = _device(alias)
+        if device is not None and device.can_render():
+            yield device
+
+
 def _aliases() -> Iterator[str]:
-    """Yield possible devices, GPUs first, because SAPIEN has no list of devices."""
+    """Yield names of devices that may exist, GPUs first: SAPIEN has no list of devices."""
     for number in range(_MAX_CUDA_DEVICES):
         if _device(f"cuda:{number}") is None:
             break

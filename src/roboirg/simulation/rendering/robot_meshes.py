@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import sapien
@@ -31,21 +33,49 @@ FINGER = "finger.glb"
 """Never simplified, because the wrist camera sees it from very near."""
 LINK_SHARE = 0.1
 CAMERA_SHARE = 0.05
-"""Shares of triangles to keep; for the camera, of its visible triangles."""
+"""Shares of triangles that light meshes keep; for the camera, of its visible triangles."""
 MIN_TRIANGLES = 500
 """Parts with fewer triangles are not simplified."""
 
-
 Numbers = tuple[float, ...]
-"""Of a pose: position, quaternion. Of a material: emission, base color, specular, roughness,
-metallic, transmission, index of refraction, roughness of transmission. Both can be hashed."""
+"""A pose or a material as numbers, which can be hashed (SAPIEN's objects cannot).
+
+A pose: position, quaternion. A material: emission (4 numbers), base color (4), specular, roughness,
+metallic, transmission, index of refraction, roughness of transmission.
+"""
 
 
-def _numbers_of(material: sapien.render.RenderMaterial) -> Numbers:
+class _InstalledPart(NamedTuple):
+    """A part of an installed mesh.
+
+    Attributes:
+        triangles: those that can be visible.
+        material: as numbers; () where the file has none.
+    """
+
+    triangles: Triangles
+    material: Numbers
+
+
+def _material_numbers(material: sapien.render.RenderMaterial) -> Numbers:
     """Return a material without textures as numbers."""
-    rest = (material.specular, material.roughness, material.metallic, material.transmission)
-    last = (material.ior, material.transmission_roughness)
-    return (*map(float, material.emission), *map(float, material.base_color), *rest, *last)
+    return (
+        *material.emission,
+        *material.base_color,
+        material.specular,
+        material.roughness,
+        material.metallic,
+        material.transmission,
+        material.ior,
+        material.transmission_roughness,
+    )
+
+
+def _make_material(numbers: Numbers) -> sapien.render.RenderMaterial:
+    """Return the material that `_material_numbers` has written down."""
+    emission = numbers[:4]
+    base_color = numbers[4:8]
+    return sapien.render.RenderMaterial(emission, base_color, *numbers[8:])
 
 
 def link_shapes(
@@ -63,11 +93,14 @@ def link_shapes(
         fixed_at: fixed pose of the mesh in the world frame; keeps only what reaches a
             pixel of the front camera there.
     """
-    material_key = None if material is None else _numbers_of(material)
-    pose_key = None
+    material_numbers: Numbers = ()
+    if material is not None:
+        material_numbers = _material_numbers(material)
+    pose_numbers = None
     if fixed_at is not None:
-        pose_key = (*map(float, fixed_at.p), *map(float, fixed_at.q))
-    return [shape.clone() for shape in _shapes(path, material_key, rendering, pose_key)]
+        pose_numbers = (*fixed_at.p.tolist(), *fixed_at.q.tolist())
+    shapes = _shapes(path, material_numbers, rendering, pose_numbers)
+    return [shape.clone() for shape in shapes]
 
 
 @functools.cache
@@ -88,93 +121,108 @@ def apply_shading(body: sapien.render.RenderBodyComponent, rendering: RenderSett
 @functools.cache
 def _shapes(
     path: Path,
-    default_material: Numbers | None,
+    default_material: Numbers,
     rendering: RenderSettings,
     fixed_at: Numbers | None,
 ) -> Sequence[sapien.render.RenderShapeTriangleMesh]:
+    """Return the shapes of `link_shapes`, made once and shared by all worlds of the process."""
     arrays = _mesh_arrays(path, rendering)
-    drawn = arrays if fixed_at is None else _front_mesh_arrays(path, rendering, fixed_at)
+    drawn = arrays
+    if fixed_at is not None:
+        drawn = _front_mesh_arrays(path, rendering, fixed_at)
     shapes = []
     for number, part in enumerate(_parts(drawn)):
         if not len(part.triangles):
             continue
-        own = arrays[f"material{number}"].tolist() or default_material
-        vertices, normals, triangles = part if rendering.slim_shader else duplicate_vertices(part)
-        shapes.append(
-            sapien.render.RenderShapeTriangleMesh(
-                vertices=vertices,
-                triangles=triangles,
-                normals=normals,
-                uvs=np.zeros((len(vertices), 2), np.float32),
-                material=own and sapien.render.RenderMaterial(own[:4], own[4:8], *own[8:]),
-            )
+        numbers = arrays[f"material{number}"].tolist() or default_material
+        material = _make_material(numbers) if numbers else None
+        mesh = part if rendering.slim_shader else duplicate_vertices(part)
+        shape = sapien.render.RenderShapeTriangleMesh(
+            vertices=mesh.vertices,
+            triangles=mesh.triangles,
+            normals=mesh.normals,
+            uvs=np.zeros((len(mesh.vertices), 2), np.float32),
+            material=material,
         )
+        shapes.append(shape)
     return shapes
 
 
 def _parts(arrays: Arrays) -> list[IndexedTriangles]:
-    """Return the triangles of each part of a mesh."""
-    count = sum(name.startswith("triangles") for name in arrays)
-    return [
-        IndexedTriangles._make(arrays[f"{field}{part}"] for field in IndexedTriangles._fields)
-        for part in range(count)
-    ]
+    """Return the triangles of each part of a mesh, which `_numbered` has written."""
+    parts: list[IndexedTriangles] = []
+    while f"triangles{len(parts)}" in arrays:
+        number = len(parts)
+        fields = [arrays[f"{field}{number}"] for field in IndexedTriangles._fields]
+        parts.append(IndexedTriangles._make(fields))
+    return parts
+
+
+def _numbered(part: IndexedTriangles, number: int) -> Arrays:
+    """Return a part's arrays under names with its number, such as ``vertices0``."""
+    return {f"{field}{number}": array for field, array in part._asdict().items()}
 
 
 def _mesh_arrays(path: Path, rendering: RenderSettings) -> Arrays:
-    """Return the fields of `IndexedTriangles` and the material of each part, suffixed by its index.
+    """Return the derived form of an installed mesh, from the cache if it is there.
 
-    The entry ``hull`` is the convex hull of all parts.
+    Each part has arrays with its number, such as ``vertices0``, ``normals0``, ``triangles0`` and
+    ``material0``. The entry ``hull`` has the vertices of the convex hull of all parts.
     """
-    light = _is_light(path, rendering)
-
-    def derive() -> Arrays:
-        arrays: Arrays = {}
-        for part, (flat, material) in enumerate(_read_installed_mesh(path)):
-            share = CAMERA_SHARE if path.suffix == ".stl" else LINK_SHARE
-            lighter = light and len(flat.corners) > MIN_TRIANGLES
-            drawn = Triangles(*simplify(flat.corners, share=share)) if lighter else flat
-            arrays |= _numbered(index_triangles(drawn), part)
-            arrays[f"material{part}"] = np.array(material, np.float32)
-        points = np.concatenate([part.vertices for part in _parts(arrays)])
-        # Importing SciPy takes a quarter of a second, and cached arrays do not need it.
-        from scipy.spatial import ConvexHull
-
-        arrays["hull"] = points[ConvexHull(points).vertices]
-        return arrays
-
+    derive = partial(_derive_arrays, path, is_light=_is_light(path, rendering))
     return cached_arrays(_cache_name(path, rendering), _source_bytes(), derive)
 
 
+def _derive_arrays(path: Path, *, is_light: bool) -> Arrays:
+    """Make the arrays of `_mesh_arrays` from the installed file."""
+    arrays: Arrays = {}
+    for number, part in enumerate(_read_installed_mesh(path)):
+        triangles = part.triangles
+        if is_light and len(triangles.corners) > MIN_TRIANGLES:
+            share = CAMERA_SHARE if path.suffix == ".stl" else LINK_SHARE
+            triangles = simplify(triangles.corners, share=share)
+        arrays |= _numbered(index_triangles(triangles), number)
+        arrays[f"material{number}"] = np.array(part.material, np.float32)
+    # Importing SciPy takes a quarter of a second, and cached arrays do not need it.
+    from scipy.spatial import ConvexHull
+
+    points = np.concatenate([part.vertices for part in _parts(arrays)])
+    arrays["hull"] = points[ConvexHull(points).vertices]
+    return arrays
+
+
 def _front_mesh_arrays(path: Path, rendering: RenderSettings, fixed_at: Numbers) -> Arrays:
-    """Return the fields of `IndexedTriangles` of each part that reach a pixel of the front camera.
+    """Return the arrays of `_mesh_arrays`, with only what reaches a pixel of the front camera.
 
     The mesh is opaque and never moves.
     """
-
-    def derive() -> Arrays:
-        to_camera = to_front_camera(sapien.Pose(fixed_at[:3], fixed_at[3:]))
-        parts = [part.to_triangles() for part in _parts(_mesh_arrays(path, rendering))]
-        corners = np.concatenate([part.corners for part in parts])
-        shown = reach_pixels(corners @ to_camera[:3, :3].T + to_camera[:3, 3])
-        ends = np.cumsum([len(part.corners) for part in parts])[:-1]
-        arrays: Arrays = {}
-        for number, (part, mask) in enumerate(zip(parts, np.split(shown, ends), strict=True)):
-            seen = Triangles(part.corners[mask], part.normals[mask])
-            arrays |= _numbered(index_triangles(seen), number)
-        return arrays
-
+    name = f"{_cache_name(path, rendering)}-front"
     sources = _source_bytes() + source_code("viewpoint") + repr(fixed_at).encode()
-    return cached_arrays(f"{_cache_name(path, rendering)}-front", sources, derive)
+    return cached_arrays(name, sources, partial(_derive_front_arrays, path, rendering, fixed_at))
+
+
+def _derive_front_arrays(path: Path, rendering: RenderSettings, fixed_at: Numbers) -> Arrays:
+    """Make the arrays of `_front_mesh_arrays` from those of the whole mesh."""
+    pose = sapien.Pose(fixed_at[:3], fixed_at[3:])
+    to_camera = to_front_camera(pose)
+    arrays: Arrays = {}
+    for number, part in enumerate(_parts(_mesh_arrays(path, rendering))):
+        whole = part.to_triangles()
+        is_shown = reach_pixels(whole.corners @ to_camera[:3, :3].T + to_camera[:3, 3])
+        shown = Triangles(whole.corners[is_shown], whole.normals[is_shown])
+        arrays |= _numbered(index_triangles(shown), number)
+    return arrays
 
 
 def _is_light(path: Path, rendering: RenderSettings) -> bool:
+    """Return whether a mesh is drawn with fewer triangles than it shows."""
     return rendering.meshes == "light" and path.name != FINGER
 
 
 def _cache_name(path: Path, rendering: RenderSettings) -> str:
-    """Return the name of a mesh's cache entry."""
-    return f"{path.stem}-{'light' if _is_light(path, rendering) else 'faithful'}"
+    """Return the name of a mesh's cache entry, for example ``link0-faithful``."""
+    meshes = "light" if _is_light(path, rendering) else "faithful"
+    return f"{path.stem}-{meshes}"
 
 
 def _source_bytes() -> bytes:
@@ -182,45 +230,38 @@ def _source_bytes() -> bytes:
     return source_code("robot_meshes", "triangles", "camera_mesh") + camera_mesh.packed_mask()
 
 
-def _numbered(part: IndexedTriangles, number: int) -> Arrays:
-    return {f"{field}{number}": array for field, array in part._asdict().items()}
-
-
-def _read_installed_mesh(path: Path) -> list[tuple[Triangles, Numbers]]:
-    """Return the visible parts of an installed mesh with their materials; of STL without."""
+def _read_installed_mesh(path: Path) -> list[_InstalledPart]:
+    """Return the parts of an installed mesh, each with what can be visible of it."""
     if path.suffix == ".stl":
-        return [(Triangles(*camera_mesh.visible_triangles(path)), ())]
-    return [
-        (
-            Triangles(
-                part.vertices[part.triangles], part.get_vertex_normal()[part.triangles[:, 0]]
-            ),
-            _numbers_of(part.material),
-        )
-        for part in sapien.render.RenderShapeTriangleMesh(str(path)).parts
-    ]
+        corners, normals = camera_mesh.visible_triangles(path)
+        return [_InstalledPart(Triangles(corners, normals), ())]
+    parts = []
+    for part in sapien.render.RenderShapeTriangleMesh(str(path)).parts:
+        corners = part.vertices[part.triangles]
+        normals = part.get_vertex_normal()[part.triangles[:, 0]]
+        material = _material_numbers(part.material)
+        parts.append(_InstalledPart(Triangles(corners, normals), material))
+    return parts
 
 
-def simplify(
-    corners: NDArray[np.float32], *, share: float
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def simplify(corners: NDArray[np.float32], *, share: float) -> Triangles:
     """Return nearly the same shape with fewer triangles.
 
     Args:
         corners: corners of the triangles, (n, 3, 3), meters.
         share: share of triangles to keep.
-
-    Returns:
-        Corners (m, 3, 3) and normals (m, 3).
     """
     with extra_needed("Light meshes need fast-simplification", "light"):
         import fast_simplification
     points, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    points, faces = fast_simplification.simplify(
-        points, faces.reshape(-1, 3).astype(np.int32), target_reduction=1.0 - share
-    )
+    faces = faces.reshape(-1, 3).astype(np.int32)
+    points, faces = fast_simplification.simplify(points, faces, target_reduction=1.0 - share)
     kept = points[faces].astype(np.float32)
-    normals = np.cross(kept[:, 1] - kept[:, 0], kept[:, 2] - kept[:, 0])
+
+    first_side = kept[:, 1] - kept[:, 0]
+    second_side = kept[:, 2] - kept[:, 0]
+    normals = np.cross(first_side, second_side)
     sizes = np.linalg.norm(normals, axis=1, keepdims=True)
-    whole = sizes[:, 0] > 0
-    return kept[whole], (normals[whole] / sizes[whole]).astype(np.float32)
+    has_area = sizes[:, 0] > 0
+    unit_normals = normals[has_area] / sizes[has_area]
+    return Triangles(kept[has_area], unit_normals.astype(np.float32))

@@ -16,6 +16,7 @@ import logging
 import shutil
 import tempfile
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import sapien
@@ -26,40 +27,63 @@ from roboirg.util.atomic_write import write_atomically
 from roboirg.util.cache import cache_folder
 
 STOCK_SHADER = "minimal"
-STOCK_COLOR, COLOR = "Color", "ColorRaw"
+STOCK_COLOR = "Color"
+COLOR = "ColorRaw"
 """Names of the RGBA output; the stock shader completes its own in a second pass."""
+_HASH_DIGITS = 16
+"""Hexadecimal digits of the files' hash in the name of their folder."""
 _COMMON = "common"
+"""Folder of the files that SAPIEN's shaders include."""
 _BACKGROUND = ("composite.vert", "composite0.frag")
 """The pass that draws the environment map in the background."""
 _STOCK_SHA256 = "ea4f9d94a72ef2d55096e5348704842f287c45164626a0dfde9d022ad4f23b78"
 
-SHADING, FIRST_CORNER = "shadeFlat", 2
-"""A per-body value of SAPIEN's shader (0: vertex normals, 1: screen-space normals), and the value
-that the patched shader adds."""
+SHADING = "shadeFlat"
+"""A per-body value of SAPIEN's shader; 0: vertex normals, 1: screen-space normals."""
+FIRST_CORNER = 2
+"""The value that the patched shader adds: the normal of a triangle's first vertex."""
+
+
+class _Patch(NamedTuple):
+    """A change of a shader file.
+
+    Attributes:
+        file: name of the file.
+        start: beginning of what is replaced.
+        end: what follows it, and stays.
+        replacement: what takes its place.
+    """
+
+    file: str
+    start: str
+    end: str
+    replacement: str = ""
+
 
 _NEVER_NEEDED = (
-    # file, start, end, replacement
-    ("gbuffer.frag", "layout(set = 3, binding = 7)", "vec4 world2camera", ""),
-    ("gbuffer.frag", "vec3 getBackgroundColor", "layout(location = 0) in vec4", ""),
-    ("gbuffer.frag", "  vec3 wnormal", "  color += sceneBuffer", ""),
-    ("gbuffer.frag", "  if (albedo.a == 0)", "  frm.r", ""),
+    _Patch("gbuffer.frag", "layout(set = 3, binding = 7)", "vec4 world2camera"),
+    _Patch("gbuffer.frag", "vec3 getBackgroundColor", "layout(location = 0) in vec4"),
+    _Patch("gbuffer.frag", "  vec3 wnormal", "  color += sceneBuffer"),
+    _Patch("gbuffer.frag", "  if (albedo.a == 0)", "  frm.r"),
 )
+"""Image-based light, the background, and what is transparent."""
 _INTERFACE = (
-    ("gbuffer.vert", "layout(location = 2) out", "layout(location = 4) out", ""),
-    ("gbuffer.vert", "  outSegmentation =", "  mat4 modelView", ""),
-    ("gbuffer.vert", "  objectCoord =", "  outPosition =", ""),
-    ("gbuffer.frag", "layout(location = 2) in", "layout(location = 4) in", ""),
-    ("gbuffer.frag", "inSegmentation[1]", ")", "int(objectDataBuffer.segmentation[1])"),
+    _Patch("gbuffer.vert", "layout(location = 2) out", "layout(location = 4) out"),
+    _Patch("gbuffer.vert", "  outSegmentation =", "  mat4 modelView"),
+    _Patch("gbuffer.vert", "  objectCoord =", "  outPosition ="),
+    _Patch("gbuffer.frag", "layout(location = 2) in", "layout(location = 4) in"),
+    _Patch("gbuffer.frag", "inSegmentation[1]", ")", "int(objectDataBuffer.segmentation[1])"),
 )
+"""Values that the vertex shader hands on for each vertex, though they are the same for a body."""
 _SHADING = (
-    (
+    _Patch(
         "gbuffer.vert",
         "void main",
         "{",
         "layout(location = 2) out flat vec3 outFlat;\n\nvoid main() ",
     ),
-    ("gbuffer.vert", "  mat3 normalMatrix", "  outPosition", ""),
-    (
+    _Patch("gbuffer.vert", "  mat3 normalMatrix", "  outPosition"),
+    _Patch(
         "gbuffer.vert",
         "  vec3 outTangent",
         " = ",
@@ -73,13 +97,13 @@ _SHADING = (
   mat3 normalMatrix = mat3(transpose(inverse(modelView)));
   vec3 outTangent""",
     ),
-    (
+    _Patch(
         "gbuffer.frag",
         "layout(location = 0) out",
         " vec4",
         "layout(location = 2) in flat vec3 inFlat;\n\nlayout(location = 0) out",
     ),
-    (
+    _Patch(
         "gbuffer.frag",
         f"  if (objectDataBuffer.{SHADING} == 0)",
         " {",
@@ -89,6 +113,7 @@ _SHADING = (
   }} else if (objectDataBuffer.{SHADING} == 0)""",
     ),
 )
+"""The shading by one normal per triangle."""
 
 _log = logging.getLogger(__name__)
 
@@ -102,11 +127,11 @@ def slim_shader() -> str:
             f"The shader in {str(_shader_folder())!r} is not SAPIEN 3.0.3's, which pictures depend "
             "on; install sapien==3.0.3 again."
         )
-    for name, start, end, replacement in (*_NEVER_NEEDED, *_INTERFACE, *_SHADING):
-        key = f"{STOCK_SHADER}/{name}"
-        texts[key] = _replace_span(texts[key], start, end, replacement)
-    for name in _BACKGROUND:
-        del texts[f"{STOCK_SHADER}/{name}"]
+    for patch in (*_NEVER_NEEDED, *_INTERFACE, *_SHADING):
+        name = f"{STOCK_SHADER}/{patch.file}"
+        texts[name] = _apply(patch, texts[name])
+    for file in _BACKGROUND:
+        del texts[f"{STOCK_SHADER}/{file}"]
     return str(_write(texts) / STOCK_SHADER)
 
 
@@ -123,8 +148,9 @@ def placeholder_brdf_table() -> sapien.render.RenderTexture:
 
 def _read_installed_shader() -> dict[str, str]:
     """Return the files of SAPIEN's shader and its includes, by folder and name."""
-    folders = (_shader_folder() / part for part in (_COMMON, STOCK_SHADER))
-    paths = sorted(path for folder in folders for path in folder.iterdir())
+    common = _shader_folder() / _COMMON
+    stock = _shader_folder() / STOCK_SHADER
+    paths = sorted([*common.iterdir(), *stock.iterdir()])
     return {f"{path.parent.name}/{path.name}": path.read_text() for path in paths}
 
 
@@ -139,18 +165,23 @@ def _digest(texts: dict[str, str]) -> str:
     return digest.hexdigest()
 
 
-def _replace_span(text: str, start: str, end: str, replacement: str) -> str:
-    """Replace the text from `start` up to the next `end`."""
-    first = text.index(start)
-    return text[:first] + replacement + text[text.index(end, first + len(start)) :]
+def _apply(patch: _Patch, text: str) -> str:
+    """Return a file's text with a patch applied."""
+    first = text.index(patch.start)
+    last = text.index(patch.end, first + len(patch.start))
+    return text[:first] + patch.replacement + text[last:]
 
 
 def _write(texts: dict[str, str]) -> Path:
-    """Write the files to a folder, verifying existing ones; returns the folder."""
+    """Write the files to a folder of the cache and return it.
+
+    Where there is no cache, they are written to a folder that lives as long as the process.
+    """
     folder = cache_folder()
     if folder is not None:
+        version = _digest(texts)[:_HASH_DIGITS]
         try:
-            return _fill(folder / "shaders" / _digest(texts)[:16], texts)
+            return _fill(folder / "shaders" / version, texts)
         except (OSError, InvalidValueError) as error:
             _log.warning("The cache cannot be used for shaders (%s).", error)
     temporary = Path(tempfile.mkdtemp(prefix="roboirg-shaders-"))
@@ -159,6 +190,7 @@ def _write(texts: dict[str, str]) -> Path:
 
 
 def _fill(folder: Path, texts: dict[str, str]) -> Path:
+    """Write the files that a folder lacks, or has with another content; return the folder."""
     for name, text in texts.items():
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)

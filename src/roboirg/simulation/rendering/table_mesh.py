@@ -25,10 +25,16 @@ from roboirg.simulation.rendering.mesh_cache import Arrays, cached_arrays, sourc
 METALLIC = 1.0
 """The constant value of the table's metallic texture."""
 
-_HEADER, _CHUNK = struct.Struct("<4sII"), struct.Struct("<I4s")
-"""Headers of a binary glTF file (magic, version, size) and of its chunks (size, kind)."""
+_HEADER = struct.Struct("<4sII")
+"""Header of a binary glTF file: magic, version, size."""
+_CHUNK = struct.Struct("<I4s")
+"""Header of one of its chunks: size, kind."""
 _WORD = 4
+"""Alignment of chunks, bytes."""
 _MESH = "mesh"
+"""Name of the array with the installed file without its textures."""
+_TEXTURES_OF_METAL = ("baseColorTexture", "metallicRoughnessTexture")
+"""Textures that glTF keeps among the metallic properties of a material."""
 
 
 class _Texture(NamedTuple):
@@ -70,9 +76,11 @@ def table_shape() -> sapien.render.RenderShapeTriangleMesh:
 
 
 def _make_table_arrays() -> Arrays:
+    """Return the installed file without its textures, and each texture decoded."""
     path = find_model_files() / TABLE_FILE
+    mesh = strip_textures(path.read_bytes())
+    arrays: Arrays = {_MESH: np.frombuffer(mesh, np.uint8)}
     material = sapien.render.RenderShapeTriangleMesh(str(path)).parts[0].material
-    arrays: Arrays = {_MESH: np.frombuffer(strip_textures(path.read_bytes()), np.uint8)}
     for texture in _TEXTURES:
         pixels: NDArray[Any] = getattr(material, texture.field).download()
         arrays[texture.field] = np.ascontiguousarray(pixels[..., texture.channels])
@@ -80,6 +88,7 @@ def _make_table_arrays() -> Arrays:
 
 
 def _load_shape(content: bytes) -> sapien.render.RenderShapeTriangleMesh:
+    """Return the shape in a binary glTF file, given its content; SAPIEN reads only files."""
     with tempfile.TemporaryDirectory(prefix="roboirg-") as folder:
         path = Path(folder) / "table.glb"
         path.write_bytes(content)
@@ -89,37 +98,48 @@ def _load_shape(content: bytes) -> sapien.render.RenderShapeTriangleMesh:
 
 
 def strip_textures(content: bytes) -> bytes:
-    """Return a binary glTF file without its textures."""
+    """Return a binary glTF file without its textures.
+
+    The file is a JSON description, then a buffer of binary data. The description divides the buffer
+    into numbered views, and each image or array (an "accessor") names its view.
+    """
     size, _ = _CHUNK.unpack_from(content, _HEADER.size)
     start = _HEADER.size + _CHUNK.size
     gltf = json.loads(content[start : start + size])
-    data = content[start + size + _CHUNK.size :]
-    images = {image["bufferView"] for image in gltf["images"]}
-    buffer_views = [number for number in range(len(gltf["bufferViews"])) if number not in images]
-    views, offset = [], 0
-    parts = []
-    for number in buffer_views:
-        view = gltf["bufferViews"][number]
-        first, length = view["byteOffset"], view["byteLength"]
-        parts.append(data[first : first + length])
-        views.append({**view, "byteOffset": offset})
-        offset += length
-    for accessor in gltf["accessors"]:
-        accessor["bufferView"] = buffer_views.index(accessor["bufferView"])
+    buffer = content[start + size + _CHUNK.size :]
+
+    kept_buffer = _keep_arrays(gltf, buffer)
     for material in gltf["materials"]:
         material.pop("normalTexture", None)
-        for field in ("baseColorTexture", "metallicRoughnessTexture"):
+        for field in _TEXTURES_OF_METAL:
             material["pbrMetallicRoughness"].pop(field, None)
     for field in ("images", "textures", "samplers"):
         del gltf[field]
-    gltf["bufferViews"], gltf["buffers"] = views, [{"byteLength": offset}]
-    return _write_glb(json.dumps(gltf).encode(), b"".join(parts))
+    gltf["buffers"] = [{"byteLength": len(kept_buffer)}]
+    return _write_glb(json.dumps(gltf).encode(), kept_buffer)
+
+
+def _keep_arrays(gltf: dict[str, Any], buffer: bytes) -> bytes:
+    """Return the buffer without its images, and renumber the views in the description."""
+    image_views = {image["bufferView"] for image in gltf["images"]}
+    kept_buffer = b""
+    kept_views: list[dict[str, Any]] = []
+    new_numbers = {}
+    for number, view in enumerate(gltf["bufferViews"]):
+        if number in image_views:
+            continue
+        new_numbers[number] = len(kept_views)
+        kept_views.append({**view, "byteOffset": len(kept_buffer)})
+        first = view["byteOffset"]
+        kept_buffer += buffer[first : first + view["byteLength"]]
+    for accessor in gltf["accessors"]:
+        accessor["bufferView"] = new_numbers[accessor["bufferView"]]
+    gltf["bufferViews"] = kept_views
+    return kept_buffer
 
 
 def _write_glb(gltf: bytes, data: bytes) -> bytes:
     """Assemble a binary glTF file from its JSON and its word-aligned data."""
-    gltf += b" " * (-len(gltf) % _WORD)
-    chunks = b"".join(
-        _CHUNK.pack(len(chunk), kind) + chunk for kind, chunk in ((b"JSON", gltf), (b"BIN\0", data))
-    )
+    gltf += b" " * (-len(gltf) % _WORD)  # up to the next word
+    chunks = _CHUNK.pack(len(gltf), b"JSON") + gltf + _CHUNK.pack(len(data), b"BIN\0") + data
     return _HEADER.pack(b"glTF", 2, _HEADER.size + len(chunks)) + chunks

@@ -3,14 +3,31 @@
 from __future__ import annotations
 
 import functools
+from typing import NamedTuple
 
 import numpy as np
 import sapien
 import sapien.render
+from numpy.typing import NDArray
 
 Rgba = tuple[float, float, float, float]
 
 SEGMENTS = 48
+"""Corners of the circles."""
+
+
+class _Band(NamedTuple):
+    """A band between two circles around the axis.
+
+    Attributes:
+        circles: radius and height of both, m.
+        outward: the part of the band's normal that points away from the axis.
+        upward: the vertical part.
+    """
+
+    circles: tuple[tuple[float, float], tuple[float, float]]
+    outward: float
+    upward: float
 
 
 @functools.cache
@@ -25,27 +42,48 @@ def tube_mesh(
         half: half the height, m.
         rgba: color, 0 to 1 each.
     """
-    # Four bands between two circles each: outside, top, inside, bottom; edges are sharp.
-    circles = [(outer, -half), (outer, half), (inner, half), (inner, -half)]
-    slopes = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]
-    angles = 2.0 * np.pi * np.arange(SEGMENTS) / SEGMENTS
-    cos, sin = np.cos(angles), np.sin(angles)
-    vertices, normals, triangles = [], [], []
-    start, end = np.arange(SEGMENTS), np.roll(np.arange(SEGMENTS), -1)
-    for band, (away, up) in enumerate(slopes):
-        for radius, height in (circles[band], circles[(band + 1) % 4]):
-            vertices.append(np.stack([radius * cos, radius * sin, np.full(SEGMENTS, height)], 1))
-            normals.append(np.stack([away * cos, away * sin, np.full(SEGMENTS, up)], 1))
-        low = 2 * band * SEGMENTS
-        high = low + SEGMENTS
-        triangles += [
-            np.stack([low + start, low + end, high + start], 1),
-            np.stack([low + end, high + end, high + start], 1),
-        ]
+    # Bands share no vertices, so that the edges between them are sharp.
+    bands = (
+        _Band(((outer, -half), (outer, half)), outward=1.0, upward=0.0),
+        _Band(((outer, half), (inner, half)), outward=0.0, upward=1.0),
+        _Band(((inner, half), (inner, -half)), outward=-1.0, upward=0.0),
+        _Band(((inner, -half), (outer, -half)), outward=0.0, upward=-1.0),
+    )
+    vertices = []
+    normals = []
+    triangles = []
+    for number, band in enumerate(bands):
+        for radius, height in band.circles:
+            vertices.append(_ring(radius, height))
+            normals.append(_ring(band.outward, band.upward))
+        triangles.append(_band_triangles(2 * number * SEGMENTS))
+    positions = np.concatenate(vertices).astype(np.float32)
     return sapien.render.RenderShapeTriangleMesh(
-        vertices=np.concatenate(vertices).astype(np.float32),
+        vertices=positions,
         triangles=np.concatenate(triangles).astype(np.uint32),
         normals=np.concatenate(normals).astype(np.float32),
-        uvs=np.zeros((8 * SEGMENTS, 2), np.float32),
+        uvs=np.zeros((len(positions), 2), np.float32),
         material=sapien.render.RenderMaterial(base_color=list(rgba)),
     )
+
+
+def _ring(radius: float, height: float) -> NDArray[np.float64]:
+    """Return the corners of a circle around the vertical axis, (SEGMENTS, 3)."""
+    angles = 2.0 * np.pi * np.arange(SEGMENTS) / SEGMENTS
+    heights = np.full(SEGMENTS, height)
+    return np.stack([radius * np.cos(angles), radius * np.sin(angles), heights], axis=1)
+
+
+def _band_triangles(first: int) -> NDArray[np.intp]:
+    """Return the triangles of a band, as vertex numbers, (2 * SEGMENTS, 3).
+
+    Args:
+        first: number of the first vertex; those of the second circle follow those of the first.
+    """
+    low = first + np.arange(SEGMENTS)
+    next_low = first + np.roll(np.arange(SEGMENTS), -1)
+    high = low + SEGMENTS
+    next_high = next_low + SEGMENTS
+    left_halves = np.stack([low, next_low, high], axis=1)
+    right_halves = np.stack([next_low, next_high, high], axis=1)
+    return np.concatenate([left_halves, right_halves])

@@ -14,9 +14,12 @@ SIZE = 256
 FIELD_OF_VIEW = math.pi / 2
 FOCAL_LENGTH = SIZE / 2 / math.tan(FIELD_OF_VIEW / 2)
 """Pixels."""
-NEAR, FAR = 0.01, 100.0
+NEAR = 0.01
+FAR = 100.0
 """Near and far plane, m."""
 
+PIXEL_CENTER = 0.5
+"""From a pixel's upper or left edge to its center, pixels."""
 EDGE_TOLERANCE = 1.0 / 32
 """Pixels by which a drawn edge may be displaced: ten times the effect of rounding corners to 1/256
 of a pixel, as renderers with the usual 8 subpixel bits do."""
@@ -63,7 +66,11 @@ def reach_pixels(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
     Returns:
         (n); always true for triangles with a corner in front of the near plane.
     """
-    places = FOCAL_LENGTH * corners[..., :2] / corners[..., 2:] + SIZE / 2
-    first = np.ceil(places.min(axis=1) - EDGE_TOLERANCE - 0.5).clip(min=0)
-    last = np.floor(places.max(axis=1) + EDGE_TOLERANCE - 0.5).clip(max=SIZE - 1)
-    return np.asarray((first <= last).all(axis=1) | (corners[..., 2].min(axis=1) < NEAR))
+    depths = corners[..., 2:]
+    places = FOCAL_LENGTH * corners[..., :2] / depths + SIZE / 2
+    # The first and last pixels of the picture whose centers lie in the box, across and down.
+    first = np.ceil(places.min(axis=1) - EDGE_TOLERANCE - PIXEL_CENTER).clip(min=0)
+    last = np.floor(places.max(axis=1) + EDGE_TOLERANCE - PIXEL_CENTER).clip(max=SIZE - 1)
+    has_pixel = (first <= last).all(axis=1)
+    is_too_near = depths[..., 0].min(axis=1) < NEAR
+    return np.asarray(has_pixel | is_too_near)

@@ -25,13 +25,8 @@ from roboirg.util.processor import processor_features
 PlayDemonstration = Callable[[Recording | None], Recording]
 """Starts the episode and plays its demonstration: replays the given recording, or plans if None."""
 
-_SOURCES = (
-    "simulation",
-    "judging",
-    "tasks",
-    "core",
-)
-"""Parts of this package that determine a demonstration, the hash of the model files included."""
+_SOURCES = ("simulation", "judging", "tasks", "core")
+"""Folders of this package that determine a demonstration, the hash of the model files included."""
 _PACKAGES = ("sapien", "numpy", "scipy", "toppra")
 
 _log = logging.getLogger(__name__)
@@ -60,17 +55,19 @@ def replay_or_plan(
             return replace(play(shipped), source="recorded")
         except MotionPlanningError as error:
             _log.warning("%s The recorded actions are not used; planning it.", error)
-    cache, key = open_cache("actions"), recording_key(episode)
-    content = None if watched else cache.read(key)
-    if content is not None:
-        cached = Recording.from_bytes(content)
-        if _replays_exactly(cached, play):
-            return cached
-        _log.warning(
-            "The cache entry %s (%s) did not replay to the same state; planning it again.",
-            key,
-            episode.key,
-        )
+    cache = open_cache("actions")
+    key = recording_key(episode)
+    if not watched:
+        content = cache.read(key)
+        if content is not None:
+            cached = Recording.from_bytes(content)
+            if _replays_exactly(cached, play):
+                return cached
+            _log.warning(
+                "The cache entry %s (%s) did not replay to the same state; planning it again.",
+                key,
+                episode.key,
+            )
     planned = play(None)
     cache.write(key, planned.to_bytes())
     return planned
@@ -82,6 +79,7 @@ def recording_key(episode: Episode) -> str:
 
 
 def _replays_exactly(recording: Recording, play: PlayDemonstration) -> bool:
+    """Replay a recording; return whether it has ended in the same state."""
     try:
         return play(recording).end == recording.end
     except MotionPlanningError:
@@ -91,19 +89,19 @@ def _replays_exactly(recording: Recording, play: PlayDemonstration) -> bool:
 @functools.cache
 def _platform_fingerprint() -> str:
     """Return everything but the episode: code, libraries, and the hardware that affects bits."""
-    versions = [f"{package} {importlib.metadata.version(package)}" for package in _PACKAGES]
-    python = f"python {platform.python_version()}"
+    parts = [str(ENVIRONMENT_VERSION), _SOURCE_HASH, f"python {platform.python_version()}"]
+    parts += [f"{package} {importlib.metadata.version(package)}" for package in _PACKAGES]
     # The planner's sines and cosines depend on the processor and the C library.
-    machine = (platform.machine(), *platform.libc_ver(), processor_features())
-    return "\n".join([str(ENVIRONMENT_VERSION), _SOURCE_HASH, python, *versions, *machine])
+    parts += [platform.machine(), *platform.libc_ver(), processor_features()]
+    return "\n".join(parts)
 
 
 def _source_hash() -> str:
+    """Return one hash of the names and contents of all files in `_SOURCES`."""
     root = Path(__file__).parents[2]
     digest = hashlib.sha256()
-    for name in _SOURCES:
-        path = root / name
-        for file in sorted(path.rglob("*.py")) if path.is_dir() else [path]:
+    for folder in _SOURCES:
+        for file in sorted((root / folder).rglob("*.py")):
             content = file.read_bytes()
             digest.update(f"{file.relative_to(root)} {len(content)}\n".encode() + content)
     return digest.hexdigest()

@@ -41,21 +41,24 @@ class DemonstrationVideo(FetchedDemonstration):
     ) -> None:
         fields = dict.fromkeys([*sequences, *proprioception])
         super().__init__(tuple(fields), proprioception, partial(_read, sequences))
-        self.actions, self._sequences = actions, sequences
+        self.actions = actions
+        self._sequences = sequences
 
     def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
         self.draw()
         return type(self), (dict(self), {}, self.actions[:0])
 
     def __repr__(self) -> str:
-        fields = [
-            f"{field} ({'' if field in self._arrays else 'not '}drawn)" for field in self._sequences
-        ]
-        fields += (field for field in self._arrays if field not in self._sequences)
+        fields = []
+        for field in self._sequences:
+            state = "drawn" if field in self._arrays else "not drawn"
+            fields.append(f"{field} ({state})")
+        fields += [field for field in self._arrays if field not in self._sequences]
         return f"<Video of {self.length} steps: {', '.join(fields)}>"
 
 
 def _read(sequences: Mapping[str, FrameSequence], fields: Sequence[str]) -> dict[str, NDArray[Any]]:
+    """Return the pictures of some fields, cached or drawn."""
     frames = read_frames([sequences[field] for field in fields])
     return dict(zip(fields, frames, strict=True))
 
@@ -67,13 +70,13 @@ def make_video(
     proprioception: Sequence[dict[str, Any]],
 ) -> DemonstrationVideo:
     """Return the video of a demonstration that has been played."""
-    selection = spec.demonstration_frames
-    every = selection if isinstance(selection, int) else 1
-    sequences = {
-        field: FrameSequence(episode, recording, field, kind, every, spec.rendering)
-        for field, kind in picture_fields(spec).items()
-        if selection != "none"
-    }
+    frames = spec.demonstration_frames
+    every = frames if isinstance(frames, int) else 1
+    sequences: dict[str, FrameSequence] = {}
+    if frames != "none":
+        for field, kind in picture_fields(spec).items():
+            sequence = FrameSequence(episode, recording, field, kind, every, spec.rendering)
+            sequences[field] = sequence
     arrays = stack_proprioception(proprioception, spec)
     actions = recording.video_actions(episode)
     return DemonstrationVideo(arrays, sequences, actions)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import zstandard
@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from roboirg.core.episode import Episode, Stage
 from roboirg.simulation.episode_session import EpisodeSession
-from roboirg.simulation.observation_builder import FieldFormat, read_picture
+from roboirg.simulation.observation_builder import FieldFormat, cameras_of, read_picture
 from roboirg.simulation.recording import Recording
 from roboirg.simulation.rendering.render_device import describe_device, find_render_device
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
 from roboirg.simulation.video.demonstration_cache import recording_key
+from roboirg.simulation.world import World
 from roboirg.util.cache import open_cache
 
 COMPRESSION_LEVEL = 3
@@ -60,6 +61,7 @@ class FrameSequence:
         return np.empty((count, *self.format.shape), self.format.dtype)
 
     def key(self) -> str:
+        """Return the name of the pictures in the cache: a hash of all that determines them."""
         parts = (
             recording_key(self.episode),
             self.recording.end,
@@ -76,55 +78,74 @@ def read_frames(sequences: Sequence[FrameSequence]) -> list[NDArray[Any]]:
     Sequences that are not cached are drawn in one replay.
     """
     cache = open_cache("frames")
-    arrays = [sequence.empty() for sequence in sequences]
-    missing = []
-    for sequence, array in zip(sequences, arrays, strict=True):
-        content = cache.read(sequence.key()) if array.size else None
-        if content is not None:
+    pictures = [_Pictures(sequence, sequence.empty()) for sequence in sequences]
+    missing: list[_Pictures] = []
+    for sequence, array in pictures:
+        if not array.size:
+            continue
+        content = cache.read(sequence.key())
+        if content is None:
+            missing.append(_Pictures(sequence, array))
+        else:
             _decompress(content, array)
-        elif array.size:
-            missing.append((sequence, array))
     if missing:
         _draw(missing)
-    for sequence, array in missing if cache.enabled else ():
-        cache.write(sequence.key(), _compress(array))
-    return arrays
-
-
-def _draw(missing: Sequence[tuple[FrameSequence, NDArray[Any]]]) -> None:
-    """Replay the demonstration and draw the pictures into the arrays.
-
-    The renderer draws a picture while the world goes on, so a picture is fetched only when the
-    next one is due, and the last one at the end.
-    """
-    (first, _), *_ = missing
-    session = EpisodeSession(first.episode, visible=True, rendering=first.rendering)
-    world, cameras = session.world, session.world.cameras
-    drawing = tuple(dict.fromkeys(sequence.field.rpartition("_")[0] for sequence, _ in missing))
-    steps = pictures = 0  # seen, and begun
-
-    def fetch() -> None:
-        """Read the pictures begun last."""
-        with cameras.frozen():
+        if cache.enabled:
             for sequence, array in missing:
-                array[pictures - 1] = read_picture(world, sequence.field)
+                cache.write(sequence.key(), _compress(array))
+    return [array for _, array in pictures]
 
-    def draw_if_due(stage: Stage) -> None:
-        del stage
-        nonlocal steps, pictures
-        if steps % first.every == 0:
-            if pictures:
-                fetch()
-            cameras.draw(drawing)
-            pictures += 1
-        steps += 1
 
-    end = session.play_demonstration(draw_if_due, first.recording).end
-    fetch()
+class _Pictures(NamedTuple):
+    """A sequence and the array for its pictures."""
+
+    sequence: FrameSequence
+    array: NDArray[Any]
+
+
+def _draw(missing: Sequence[_Pictures]) -> None:
+    """Replay a demonstration and draw pictures of all its sequences into their arrays."""
+    first = missing[0].sequence
+    session = EpisodeSession(first.episode, visible=True, rendering=first.rendering)
+    drawing = _Drawing(session.world, missing)
+    end = session.play_demonstration(drawing.after_step, first.recording).end
+    drawing.fetch()
     if end != first.recording.end:
         raise RuntimeError(
             f"The demonstration of {first.episode.key} did not replay to the same state."
         )
+
+
+class _Drawing:
+    """Draws the pictures of a demonstration while it is replayed.
+
+    The renderer draws a picture while the world goes on, so a picture is fetched only when the
+    next one is due, and the last one at the end.
+    """
+
+    def __init__(self, world: World, pictures: Sequence[_Pictures]) -> None:
+        self._world = world
+        self._pictures = pictures
+        self._cameras = cameras_of(sequence.field for sequence, _ in pictures)
+        self._every = pictures[0].sequence.every
+        self._steps = 0
+        self._begun = 0
+
+    def after_step(self, stage: Stage) -> None:
+        """Begin pictures if they are due."""
+        del stage
+        if self._steps % self._every == 0:
+            if self._begun:
+                self.fetch()
+            self._world.cameras.draw(self._cameras)
+            self._begun += 1
+        self._steps += 1
+
+    def fetch(self) -> None:
+        """Read the pictures that were begun last."""
+        with self._world.cameras.frozen():
+            for sequence, array in self._pictures:
+                array[self._begun - 1] = read_picture(self._world, sequence.field)
 
 
 def rendering_key(rendering: RenderSettings) -> str:
@@ -135,17 +156,22 @@ def rendering_key(rendering: RenderSettings) -> str:
 
 
 def _driver_libraries() -> list[str]:
-    """Return the Vulkan driver files of this process; SAPIEN does not report their version."""
+    """Return the Vulkan driver's files in this process, with their sizes and times.
+
+    SAPIEN does not report the driver's version.
+    """
     try:
         mapped = os.fsdecode(Path("/proc/self/maps").read_bytes()).splitlines()
     except OSError:
         return []
-    paths = map(Path, {line.split(maxsplit=5)[5] for line in mapped if "/" in line})
-    return [
-        f"{path} {path.stat().st_size} {path.stat().st_mtime_ns}"
-        for path in sorted(paths)
-        if path.name.startswith(_DRIVER_LIBRARIES) and path.is_file()
-    ]
+    # The path is the sixth column, for example 7f01-7f02 r-xp 00000000 08:01 42 /usr/lib/libGL.so
+    paths = {Path(line.split(maxsplit=5)[5]) for line in mapped if "/" in line}
+    libraries = []
+    for path in sorted(paths):
+        if path.name.startswith(_DRIVER_LIBRARIES) and path.is_file():
+            status = path.stat()
+            libraries.append(f"{path} {status.st_size} {status.st_mtime_ns}")
+    return libraries
 
 
 def _compress(frames: NDArray[Any]) -> bytes:
@@ -159,19 +185,21 @@ def _compress(frames: NDArray[Any]) -> bytes:
 
 
 def _decompress(content: memoryview, frames: NDArray[Any]) -> None:
-    """Decompress the output of `_compress` into an array."""
-    chunks = []
+    """Decompress the output of `_compress` into an array, with all cores."""
+    tasks = []
     offset = 0
-    for start in range(0, len(frames), CHUNK):
-        (length,) = _LENGTH.unpack_from(content, offset)
-        offset += _LENGTH.size
-        chunks.append((content[offset : offset + length], frames[start : start + CHUNK]))
-        offset += length
-
-    def fill(chunk: memoryview, part: NDArray[Any]) -> None:
-        with zstandard.ZstdDecompressor().stream_reader(chunk) as reader:
-            reader.readinto(part.data.cast("B"))
-
     with ThreadPoolExecutor(os.cpu_count()) as threads:
-        for _ in threads.map(fill, *zip(*chunks, strict=True)):
-            pass
+        for start in range(0, len(frames), CHUNK):
+            (length,) = _LENGTH.unpack_from(content, offset)
+            offset += _LENGTH.size
+            chunk = content[offset : offset + length]
+            offset += length
+            tasks.append(threads.submit(_fill, frames[start : start + CHUNK], chunk))
+    for task in tasks:
+        task.result()  # raises what the thread has raised
+
+
+def _fill(frames: NDArray[Any], chunk: memoryview) -> None:
+    """Decompress one chunk into its frames."""
+    with zstandard.ZstdDecompressor().stream_reader(chunk) as reader:
+        reader.readinto(frames.data.cast("B"))

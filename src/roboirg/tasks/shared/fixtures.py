@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,7 +28,6 @@ LINE_TURNS = (None, None, 0.0, math.pi / 2)
 YAW_DIGITS = 1e6
 """Digits of a yaw (rad) behind this one are as good as random."""
 
-
 Bounds = tuple[int, int]
 """Fewest and most, both included."""
 
@@ -39,12 +39,30 @@ def draw_number(rng: np.random.Generator, bounds: Bounds) -> int:
 
 
 def counted_goals(scene: Scene, kind: ObjectKind, most: int) -> tuple[Goal, ...]:
-    """Return a goal for every object of a kind, by color, for once to `most` times."""
-    return tuple(
-        Goal.of(color=str(item.color), repeats=repeats)
-        for item in scene.of_kind(kind)
-        for repeats in range(1, most + 1)
-    )
+    """Return a goal for every object of a kind, by color, for once to `most` times.
+
+    A red cube, at most twice -> *red once* and *red twice*.
+    """
+    goals: list[Goal] = []
+    for item in scene.of_kind(kind):
+        goals += [Goal.of(color=str(item.color), repeats=count) for count in range(1, most + 1)]
+    return tuple(goals)
+
+
+class CubePlan(NamedTuple):
+    """A cube to draw: its name, its color, and the region of its center."""
+
+    name: str
+    color: Color
+    region: Region
+
+
+class ButtonAndCubes(NamedTuple):
+    """A button, cubes, and what keeps later objects away from both."""
+
+    button: SceneObject
+    cubes: tuple[SceneObject, ...]
+    obstacles: tuple[Obstacle, ...]
 
 
 def draw_button(rng: np.random.Generator, region: Region, name: str = "button") -> SceneObject:
@@ -65,6 +83,11 @@ def footprint(item: SceneObject) -> Rectangle:
     return Rectangle(item.position.x, item.position.y, half, half, item.yaw)
 
 
+def disc_area(disc: SceneObject) -> Circle:
+    """Return the circle that a target disc or a site covers."""
+    return Circle(disc.position.x, disc.position.y, disc.half_width)
+
+
 def cube_obstacle(cube: SceneObject) -> Rectangle | Line:
     """Return what keeps later objects away from a cube: its square, or a line instead.
 
@@ -75,7 +98,8 @@ def cube_obstacle(cube: SceneObject) -> Rectangle | Line:
     turn = LINE_TURNS[int(cube.yaw * YAW_DIGITS) % len(LINE_TURNS)]
     if turn is None:
         return footprint(cube)
-    return Line(*cube.position[:2], object_sizes.CUBE_HALF, cube.yaw + turn)
+    x, y, _ = cube.position
+    return Line(x, y, object_sizes.CUBE_HALF, cube.yaw + turn)
 
 
 def draw_cube(
@@ -86,27 +110,34 @@ def draw_cube(
     gap: float,
     obstacles: Sequence[Obstacle],
 ) -> SceneObject:
-    """Draw a cube with any yaw, at least `gap` meters from all obstacles."""
+    """Draw a cube that lies in the region, with any yaw, at least `gap` meters from all obstacles.
+
+    Draws again until there is room; see `placed`.
+    """
 
     def draw() -> SceneObject:
         x, y = region.draw(rng, inset=object_sizes.CUBE_HALF)
         yaw = 2.0 * math.pi * rng.random()
-        return SceneObject(name, "cube", Point(x, y, object_sizes.CUBE_HALF), yaw, color)
+        position = Point(x, y, object_sizes.CUBE_HALF)
+        return SceneObject(name, "cube", position, yaw, color)
 
-    return placed(name, draw, lambda cube: footprint(cube).grown(gap), obstacles)
+    def clearance(cube: SceneObject) -> Rectangle:
+        return footprint(cube).grown(gap)
+
+    return placed(name, draw, clearance, obstacles)
 
 
 def draw_cubes(
     rng: np.random.Generator,
-    cubes: Iterable[tuple[str, Color, Region]],
+    plans: Iterable[CubePlan],
     gap: float,
     obstacles: Sequence[Obstacle],
 ) -> list[SceneObject]:
-    """Draw a cube for each name, color and region, one after the other."""
+    """Draw the planned cubes one after the other, each away from those before it."""
     taken = list(obstacles)
     drawn: list[SceneObject] = []
-    for name, color, region in cubes:
-        cube = draw_cube(rng, name, color, region, gap, taken)
+    for plan in plans:
+        cube = draw_cube(rng, plan.name, plan.color, plan.region, gap, taken)
         drawn.append(cube)
         taken.append(cube_obstacle(cube))
     return drawn
@@ -121,18 +152,22 @@ def draw_colored_cubes(
 ) -> tuple[SceneObject, ...]:
     """Draw `count` cubes of different colors, ``cube_red`` and so on, in random order."""
     colors = shuffled(rng, COLORS)[:count]
-    cubes = ((f"cube_{color}", color, region) for color in colors)
-    return tuple(draw_cubes(rng, cubes, gap, obstacles))
+    plans = [CubePlan(f"cube_{color}", color, region) for color in colors]
+    return tuple(draw_cubes(rng, plans, gap, obstacles))
 
 
 def draw_button_and_cubes(
     rng: np.random.Generator, button_region: Region, count: int, region: Region, gap: float
-) -> tuple[SceneObject, tuple[SceneObject, ...], list[Obstacle]]:
-    """Draw a button and cubes as `draw_colored_cubes` does; return what keeps others away, too."""
+) -> ButtonAndCubes:
+    """Draw a button, then `count` cubes away from it as `draw_colored_cubes` does.
+
+    `region` and `gap` are those of the cubes.
+    """
     button = draw_button(rng, button_region)
     keep_out = button_keep_out(button)
     cubes = draw_colored_cubes(rng, count, region, gap, [keep_out])
-    return button, cubes, [keep_out, *map(cube_obstacle, cubes)]
+    around_cubes = [cube_obstacle(cube) for cube in cubes]
+    return ButtonAndCubes(button, cubes, (keep_out, *around_cubes))
 
 
 def draw_target(
@@ -144,7 +179,10 @@ def draw_target(
     obstacles: Sequence[Obstacle],
     rgb: tuple[float, float, float] | None = None,
 ) -> SceneObject:
-    """Draw a target disc of `radius` meters, at least `gap` meters from all obstacles."""
+    """Draw a target disc of `radius` meters, at least `gap` meters from all obstacles.
+
+    Draws again until there is room; see `placed`.
+    """
 
     def draw() -> SceneObject:
         x, y = region.draw(rng, inset=radius)
@@ -152,7 +190,8 @@ def draw_target(
         return SceneObject(name, "target", place, radius=radius, rgb=rgb)
 
     def clearance(target: SceneObject) -> Circle:
-        return Circle(target.position.x, target.position.y, radius + gap)
+        x, y, _ = target.position
+        return Circle(x, y, radius + gap)
 
     return placed(name, draw, clearance, obstacles)
 
@@ -160,8 +199,9 @@ def draw_target(
 def marker_over(target: SceneObject, name: str) -> SceneObject:
     """Return the disc that lights up over a target: a little wider, and high enough to cover it."""
     x, y, z = target.position
-    radius = object_sizes.MARKER_RADIUS_SHARE * float(target.radius or 0.0)
-    return SceneObject(name, "marker", Point(x, y, z - object_sizes.MARKER_DEPTH), radius=radius)
+    position = Point(x, y, z - object_sizes.MARKER_DEPTH)
+    radius = object_sizes.MARKER_RADIUS_SHARE * target.half_width
+    return SceneObject(name, "marker", position, radius=radius)
 
 
 def draw_bin(
@@ -172,7 +212,8 @@ def draw_bin(
     def draw() -> SceneObject:
         x, y = region.draw(rng)
         yaw = (2.0 * rng.random() - 1.0) * BIN_YAW
-        return SceneObject("bin", "bin", Point(x, y, object_sizes.BIN_HEIGHT / 2), yaw)
+        position = Point(x, y, object_sizes.BIN_HEIGHT / 2)
+        return SceneObject("bin", "bin", position, yaw)
 
     return placed("bin", draw, footprint, obstacles)
 
@@ -189,7 +230,17 @@ def placed(
     clearance: Callable[[SceneObject], Footprint],
     obstacles: Sequence[Obstacle],
 ) -> SceneObject:
-    """Draw candidates for an object until the area that one needs is free of obstacles."""
+    """Draw candidates for an object until the area that one needs is free of obstacles.
+
+    Args:
+        name: of the object, for the error.
+        draw: draws a candidate.
+        clearance: returns the area that a candidate needs.
+        obstacles: what is on the table.
+
+    Raises:
+        SceneRejectedError: no candidate had room.
+    """
     item = place(draw, clearance, obstacles)
     if item is None:
         raise SceneRejectedError(f"no place for {name}")

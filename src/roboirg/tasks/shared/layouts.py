@@ -23,8 +23,17 @@ PATTERNS: dict[int, tuple[tuple[PlanePoint, ...], ...]] = {3: (TRIANGLE, LINE), 
 
 
 def layout_points(rng: np.random.Generator, count: int) -> tuple[PlanePoint, ...]:
-    """Draw a pattern of `count` points, turned about the origin by any angle of the full circle."""
+    """Draw a pattern of `count` points, turned about the origin by any angle of the full circle.
+
+    The order of the points is that of the pattern; it decides which object stands where.
+    """
     pattern = draw(rng, PATTERNS[count])
     angle = 2.0 * math.pi * rng.random()
-    cos, sin = math.cos(angle), math.sin(angle)
-    return tuple((cos * x - sin * y, sin * x + cos * y) for x, y in pattern)
+    cos = math.cos(angle)
+    sin = math.sin(angle)
+    points: list[PlanePoint] = []
+    for x, y in pattern:
+        turned_x = cos * x - sin * y
+        turned_y = sin * x + cos * y
+        points.append((turned_x, turned_y))
+    return tuple(points)

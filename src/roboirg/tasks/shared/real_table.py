@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 
@@ -23,20 +22,19 @@ from roboirg.util.random_draws import shuffled
 BOX_YAW = math.radians(15.0)
 """Largest rotation of a box to either side."""
 
-Side = Literal["left", "right"]
-SIGNS: dict[Side, float] = {"left": 1.0, "right": -1.0}
-"""Sign of y on each side: the robot's left is positive."""
 
+def draw_regions(
+    rng: np.random.Generator, colors: Sequence[Color], left: Region
+) -> dict[Color, Region]:
+    """Draw which of two colors is on the robot's left, and return the region of each.
 
-def on_side(region: Region, side: Side) -> Region:
-    """Return a region of the left side, or its mirror image on the right."""
-    return region._replace(y=SIGNS[side] * region.y)
-
-
-def draw_sides(rng: np.random.Generator, colors: Sequence[Color]) -> dict[Color, Side]:
-    """Draw the sides of two colors, both orders equally likely."""
-    left, right = shuffled(rng, colors)
-    return {left: "left", right: "right"}
+    The region on the right is the mirror image of that on the left.
+    """
+    right = left._replace(y=-left.y)
+    on_left = shuffled(rng, colors)[0]
+    regions = dict.fromkeys(colors, right)
+    regions[on_left] = left
+    return regions
 
 
 def left_to_right(scene: Scene, kind: ObjectKind) -> tuple[Color, ...]:
@@ -49,7 +47,8 @@ def draw_box(rng: np.random.Generator, name: str, color: Color, region: Region) 
     """Draw a box whose center is in the region; the region must keep it clear of other objects."""
     x, y = region.draw(rng)
     yaw = (2.0 * rng.random() - 1.0) * BOX_YAW
-    return SceneObject(name, "box", Point(x, y, object_sizes.BOX_HEIGHT / 2), yaw, color)
+    position = Point(x, y, object_sizes.BOX_HEIGHT / 2)
+    return SceneObject(name, "box", position, yaw, color)
 
 
 def draw_tape(
@@ -60,14 +59,19 @@ def draw_tape(
     gap: float,
     obstacles: Sequence[Footprint],
 ) -> SceneObject:
-    """Draw a roll of tape with any yaw, at least `gap` meters from all obstacles."""
+    """Draw a roll of tape that lies in the region, with any yaw, `gap` meters from all obstacles.
+
+    Draws again until there is room; see `roboirg.tasks.shared.fixtures.placed`.
+    """
 
     def draw() -> SceneObject:
         x, y = region.draw(rng, inset=object_sizes.TAPE_RADIUS)
         yaw = 2.0 * math.pi * rng.random()
-        return SceneObject(name, "tape", Point(x, y, object_sizes.TAPE_HALF), yaw, color)
+        position = Point(x, y, object_sizes.TAPE_HALF)
+        return SceneObject(name, "tape", position, yaw, color)
 
     def clearance(tape: SceneObject) -> Circle:
-        return Circle(tape.position.x, tape.position.y, object_sizes.TAPE_RADIUS + gap)
+        x, y, _ = tape.position
+        return Circle(x, y, object_sizes.TAPE_RADIUS + gap)
 
     return placed(name, draw, clearance, obstacles)

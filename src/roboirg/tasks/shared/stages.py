@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from roboirg.core.conditions import Condition, Fact, Rule
-from roboirg.core.episode import Primitive, Stage
+from roboirg.core.episode import Primitive, SceneObject, Stage
+from roboirg.core.fact_traits import FactKind
 from roboirg.tasks.shared.fixtures import ORDINALS
 
 PRESSED = Fact("pressed", "button")
 RETREAT_STEPS = 20
 """Control steps for which the hand waits away from the objects (RoboMME)."""
+
+
+def facts_of_others(kind: FactKind, objects: Iterable[SceneObject], right: str) -> tuple[Fact, ...]:
+    """Return the facts of a kind about all objects but the right one, as a stage forbids them.
+
+    With ``"picked"``, all cubes and ``"cube_red"``: that a green cube is picked, and a blue one.
+    """
+    return tuple(Fact(kind, item.name) for item in objects if item.name != right)
 
 
 def pick_stage(
@@ -41,6 +52,22 @@ def place_stage(
     )
 
 
+def put_down_stage(
+    put_down: Primitive,
+    subgoal: str,
+    forbids: tuple[Fact | Rule, ...] = (),
+    timer: str | None = None,
+) -> Stage:
+    """Return the stage in which a cube is put down on the table by a movement."""
+    return Stage(
+        expects=Fact("lying", put_down.subject),
+        forbids=forbids,
+        primitive=put_down,
+        subgoal=subgoal,
+        timer=timer,
+    )
+
+
 def placing_stages(
     kind: str, color: str, repeats: int, forbids: tuple[Fact | Rule, ...]
 ) -> tuple[Stage, ...]:
@@ -50,7 +77,8 @@ def placing_stages(
     for ordinal in ORDINALS[:repeats]:
         pick = f"pick up the {color} {kind} {{at}} for the {ordinal} time"
         put = f"place the {color} {kind} onto the target {{at}}"
-        plan += [pick_stage(name, pick, forbids), place_stage(name, "target", put, forbids)]
+        plan.append(pick_stage(name, pick, forbids))
+        plan.append(place_stage(name, "target", put, forbids))
     return tuple(plan)
 
 
@@ -82,6 +110,7 @@ def hold_still(steps: int) -> Stage:
 
 
 def _static(primitive: Primitive) -> Stage:
+    """Return the stage of a movement that ends at rest, and lasts as long as it says."""
     return Stage(
         expects=Fact("still", "robot"),
         forbids=(),

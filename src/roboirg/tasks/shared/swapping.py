@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Sequence
 
@@ -26,6 +25,9 @@ def plan_swaps(
 ) -> tuple[Swap, ...]:
     """Plan that each initiator in turn changes places with the object then nearest to it.
 
+    *Then* is after the swaps before it. The first swap begins at `start`, the second `SWAP_STEPS`
+    later, and so on.
+
     Args:
         objects: all possible partners; those that do not move are pinned meanwhile.
         initiators: names of the objects that start a swap, in order.
@@ -36,13 +38,20 @@ def plan_swaps(
     """
     places: dict[str, Point] = {item.name: item.position for item in objects}
     swaps: list[Swap] = []
-    chosen = itertools.zip_longest(initiators, partners[: len(initiators)])
-    for number, (first, partner) in enumerate(chosen):
-        second = partner or nearest(places, first)
-        pinned = tuple(name for name in places if name not in (first, second))
-        begin = start + number * SWAP_STEPS
-        swaps.append(Swap(first, second, begin, SWAP_STEPS, lane, pinned, stage))
-        places[first], places[second] = places[second], places[first]
+    for number, first in enumerate(initiators):
+        known_partner = partners[number] if number < len(partners) else None
+        second = known_partner or nearest(places, first)
+        swap = Swap(
+            first,
+            second,
+            start=start + number * SWAP_STEPS,
+            steps=SWAP_STEPS,
+            lane=lane,
+            pinned=tuple(name for name in places if name not in (first, second)),
+            stage=stage,
+        )
+        _exchange(places, swap)  # the next one starts from the new places
+        swaps.append(swap)
     return tuple(swaps)
 
 
@@ -50,14 +59,24 @@ def places_at_last(scene: Scene) -> dict[str, Point]:
     """Return where each object of a scene stands after the last swap."""
     places = {item.name: item.position for item in scene.objects}
     for swap in scene.motions_of(Swap):
-        first, second = swap.first, swap.second
-        places[first], places[second] = places[second], places[first]
+        _exchange(places, swap)
     return places
+
+
+def _exchange(places: dict[str, Point], swap: Swap) -> None:
+    """Give the two objects of a swap each other's places."""
+    place = places[swap.first]
+    places[swap.first] = places[swap.second]
+    places[swap.second] = place
 
 
 def last_step(motions: Iterable[Motion]) -> int:
     """Return the step at which the last swap is complete; 0 if there is none."""
-    return max((one.start + one.steps for one in motions if isinstance(one, Swap)), default=0)
+    last = 0
+    for motion in motions:
+        if isinstance(motion, Swap):
+            last = max(last, motion.start + motion.steps)
+    return last
 
 
 def nearest(places: dict[str, Point], name: str) -> str:
@@ -65,6 +84,8 @@ def nearest(places: dict[str, Point], name: str) -> str:
     here = places[name]
 
     def distance(other: str) -> float:
-        return math.hypot(places[other].x - here.x, places[other].y - here.y)
+        there = places[other]
+        return math.hypot(there.x - here.x, there.y - here.y)
 
-    return min((other for other in places if other != name), key=distance)
+    others = [other for other in places if other != name]
+    return min(others, key=distance)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 from collections.abc import Iterable, Sequence
@@ -24,9 +23,10 @@ from roboirg.core.episode import (
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.footprints import Circle, Footprint, Region, place
 from roboirg.core.motions import Away, Point
-from roboirg.core.word_pools import Pools
 from roboirg.tasks.shared.fixtures import button_keep_out, footprint
-from roboirg.tasks.task import Commands, SceneAndGoal, Wording
+from roboirg.tasks.shared.layouts import PlanePoint
+from roboirg.tasks.shared.stages import facts_of_others
+from roboirg.tasks.task import GoalThings, SceneAndGoal
 from roboirg.util.random_draws import shuffled
 
 APPEAR_STEP = 32
@@ -41,13 +41,24 @@ GAP = 0.04
 def sample(
     rng: np.random.Generator, difficulty: Difficulty, buttons: Sequence[SceneObject] = ()
 ) -> SceneAndGoal:
-    """Draw containers that stay in their places, three over a cube; the first are to be lifted."""
+    """Draw containers that stay in their places, three over a cube; the first are to be lifted.
+
+    `buttons` are on the table already, and keep containers away.
+    """
+    regions = [REGION] * CONTAINERS[difficulty]
     obstacles = [button_keep_out(button) for button in buttons]
-    containers = draw_containers_in(rng, [REGION] * CONTAINERS[difficulty], GAP, obstacles)
+    containers = draw_containers_in(rng, regions, GAP, obstacles)
     cubes = hide_cubes(rng, containers)
-    colors = tuple(str(cube.color) for cube in cubes[: PICKS[difficulty]])
-    scene = Scene((*buttons, *containers, *cubes), motions=appearing(containers))
-    return scene, Goal.of(colors=colors)
+    scene = Scene(
+        objects=(*buttons, *containers, *cubes),
+        motions=appearing(containers),
+    )
+    return scene, goal_of(cubes[: PICKS[difficulty]])
+
+
+def goal_of(cubes: Sequence[SceneObject]) -> Goal:
+    """Return the goal of lifting the containers over some cubes, in order."""
+    return Goal.of(colors=tuple(str(cube.color) for cube in cubes))
 
 
 def draw_containers_in(
@@ -61,15 +72,10 @@ def draw_containers_in(
     As in RoboMME, the gap in meters counts twice: around the new container and around each placed
     one.
     """
-    radius = object_sizes.CONTAINER_HALF + gap
     taken = list(obstacles)
     containers: list[SceneObject] = []
     for index, region in enumerate(regions):
-        spot = place(
-            functools.partial(region.draw, rng, inset=object_sizes.CONTAINER_HALF),
-            lambda spot: Circle(*spot, radius),
-            taken,
-        )
+        spot = _free_spot(rng, region, gap, taken)
         if spot is None:
             break
         position = Point(*spot, object_sizes.CONTAINER_HEIGHT)
@@ -80,13 +86,28 @@ def draw_containers_in(
     return containers
 
 
+def _free_spot(
+    rng: np.random.Generator, region: Region, gap: float, obstacles: Sequence[Footprint]
+) -> PlanePoint | None:
+    """Draw where a container can stand in a region; None without a free place."""
+
+    def draw() -> PlanePoint:
+        return region.draw(rng, inset=object_sizes.CONTAINER_HALF)
+
+    def clearance(spot: PlanePoint) -> Circle:
+        return Circle(*spot, object_sizes.CONTAINER_HALF + gap)
+
+    return place(draw, clearance, obstacles)
+
+
 def hide_cubes(
     rng: np.random.Generator, containers: Sequence[SceneObject]
 ) -> tuple[SceneObject, ...]:
     """Draw a red, a green and a blue cube, in random order under the first three containers."""
     if len(containers) < len(COLORS):
         raise SceneRejectedError("fewer than three containers fit")
-    return tuple(map(hidden_cube, shuffled(rng, COLORS), containers))
+    pairs = zip(shuffled(rng, COLORS), containers, strict=False)
+    return tuple(hidden_cube(color, container) for color, container in pairs)
 
 
 def hidden_cube(color: Color, container: SceneObject) -> SceneObject:
@@ -98,25 +119,28 @@ def hidden_cube(color: Color, container: SceneObject) -> SceneObject:
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
     """Return a goal for every hidden cube, and for every two of them in order."""
-    hidden = [str(cube.color) for cube in scene.of_kind("hidden_cube")]
-    single = [(color,) for color in hidden]
-    pairs = list(itertools.permutations(hidden, 2))
-    return tuple(Goal.of(colors=colors) for colors in (*single, *pairs))
+    cubes = scene.of_kind("hidden_cube")
+    choices = [*itertools.permutations(cubes, 1), *itertools.permutations(cubes, 2)]
+    return tuple(goal_of(choice) for choice in choices)
 
 
 def pick_stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
-    """Return the stages: lift the container over each goal cube in turn, put it down in between."""
-    covers = {cube.color: cube.inside for cube in scene.of_kind("hidden_cube")}
-    containers = tuple(item.name for item in scene.of_kind("container"))
+    """Return the stages: lift the container over each goal cube in turn, put it down in between.
+
+    Red, then blue -> lift the container over the red cube, put it down, lift that over the blue
+    one, which stays in the hand.
+    """
+    container_over = {str(cube.color): str(cube.inside) for cube in scene.of_kind("hidden_cube")}
+    containers = scene.of_kind("container")
     plan: list[Stage] = []
     for color in goal.texts("colors"):
-        target = next(str(cover) for hidden, cover in covers.items() if hidden == color)
-        wrong = tuple(Fact("lifted", other) for other in containers if other != target)
         if plan:
-            plan.append(_put_down(plan[-1].primitive.subject, containers))
+            held = plan[-1].primitive.subject
+            plan.append(_put_down(held, containers))
+        target = container_over[color]
         lift = Stage(
             expects=Fact("lifted", target),
-            forbids=wrong,
+            forbids=facts_of_others("lifted", containers, target),
             primitive=Primitive("pick_container", target),
             subgoal=f"pick up the container {{at}} that hides the {color} cube",
             points_at=target,
@@ -125,10 +149,11 @@ def pick_stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     return tuple(plan)
 
 
-def _put_down(held: str, containers: Sequence[str]) -> Stage:
+def _put_down(held: str, containers: Sequence[SceneObject]) -> Stage:
+    """Return the stage in which the container in the hand is put down."""
     return Stage(
         expects=Fact("put_down", held),
-        forbids=tuple(Fact("lifted", other) for other in containers if other != held),
+        forbids=facts_of_others("lifted", containers, held),
         primitive=Primitive("put_down", held),
         subgoal="put down the container",
     )
@@ -139,13 +164,7 @@ def appearing(containers: Sequence[SceneObject]) -> tuple[Away, ...]:
     return tuple(Away(container.name, 0, APPEAR_STEP) for container in containers)
 
 
-def container_commands(wordings: Pools[Wording]) -> Commands:
-    """Return the commands of a task in which the containers stand when the words are said."""
-    return Commands(
-        thing="container",
-        by_color="the container over {cube}",
-        by_place="the container {place}",
-        pointed="container",
-        things_at="the container {place}",
-        wordings=wordings,
-    )
+CONTAINER_THINGS = GoalThings(handled="container", pointed="container")
+"""Of tasks in which the containers stand when the words are said."""
+HIDDEN_CUBE_THINGS = CONTAINER_THINGS._replace(pointed="hidden_cube")
+"""Of tasks in which only the cubes are there when the words are said."""

@@ -6,14 +6,14 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from roboirg.core.episode import COLORS, Difficulty, Goal, Scene, SceneObject
+from roboirg.core.episode import COLORS, Difficulty, Scene, SceneObject
 from roboirg.core.footprints import Footprint, Region
 from roboirg.core.motions import Away, Motion
 from roboirg.tasks.shared.fixtures import Bounds, draw_number
 from roboirg.tasks.shared.swapping import last_step, plan_swaps
-from roboirg.tasks.shared.unmask import appearing, draw_containers_in, hide_cubes
+from roboirg.tasks.shared.unmask import appearing, draw_containers_in, goal_of, hide_cubes
 from roboirg.tasks.task import SceneAndGoal
-from roboirg.util.random_draws import draw
+from roboirg.util.random_draws import draw, shuffled
 
 CONTAINERS: dict[Difficulty, int] = {"easy": 3, "medium": 4, "hard": 4}
 SWAPS: dict[Difficulty, Bounds] = {"easy": (1, 2), "medium": (1, 2), "hard": (2, 3)}
@@ -47,12 +47,15 @@ def sample(
     The cubes are out of the world while the containers move, and return under their own ones. As in
     RoboMME, two swaps may cancel out.
     """
-    order = rng.permutation(len(COLORS))
-    cubes = hide_cubes(rng, [containers[index] for index in order if index < len(containers)])
-    motions = plan_motions(containers, cubes, _initiators(rng, difficulty, containers))
+    covers = shuffled(rng, containers[: len(COLORS)])
+    cubes = hide_cubes(rng, covers)
+    initiators = _draw_initiators(rng, difficulty, containers)
+    scene = Scene(
+        objects=(*buttons, *containers, *cubes),
+        motions=plan_motions(containers, cubes, initiators),
+    )
     picks = draw_number(rng, PICKS[difficulty])
-    colors = tuple(str(cube.color) for cube in cubes[:picks])
-    return Scene((*buttons, *containers, *cubes), motions), Goal.of(colors=colors)
+    return scene, goal_of(cubes[:picks])
 
 
 def plan_motions(
@@ -69,13 +72,18 @@ def plan_motions(
     return (*appearing(containers), *swaps, *away)
 
 
-def _initiators(
+def _draw_initiators(
     rng: np.random.Generator, difficulty: Difficulty, containers: Sequence[SceneObject]
 ) -> tuple[str, ...]:
-    """Draw the containers that start a swap: two with a cube, then any other one."""
-    number = draw_number(rng, SWAPS[difficulty])
+    """Draw the names of the containers that start a swap: two with a cube, then any other one.
+
+    Three are drawn always, and as many of them returned as there are swaps, so that the number of
+    swaps changes no draw.
+    """
+    swap_count = draw_number(rng, SWAPS[difficulty])
     names = [container.name for container in containers]
-    first, second = (names[index] for index in rng.permutation(len(COLORS))[:2])
+    with_cube = names[: len(COLORS)]  # cubes are under the first three
+    first, second, _ = shuffled(rng, with_cube)
     others = [name for name in names if name not in (first, second)]
     third = draw(rng, others)
-    return (first, second, third)[:number]
+    return (first, second, third)[:swap_count]

@@ -8,16 +8,18 @@ one of those discs. Facts: RoboMME.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from roboirg.core import object_sizes
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Primitive, Scene, SceneObject, Stage
-from roboirg.core.footprints import Circle, Region
+from roboirg.core.footprints import Obstacle, Region
 from roboirg.core.motions import Point, Swap
-from roboirg.tasks.shared.fixtures import draw_button_and_cubes, draw_target
+from roboirg.tasks.shared.fixtures import disc_area, draw_button_and_cubes, draw_target
 from roboirg.tasks.shared.stages import (
+    facts_of_others,
     go_home,
     hold_still,
     pick_stage,
@@ -40,39 +42,94 @@ SWAP_LANE = 0.1
 HOLD_STEPS = 60
 
 
-def draw_table(
-    rng: np.random.Generator, cubes: int, discs: int, site_radius: float
-) -> tuple[Scene, SceneObject]:
+class PlaceTable(NamedTuple):
+    """A table before its video.
+
+    Attributes:
+        objects: site, button, cubes and discs.
+        discs: the target discs; the first is ``target_0``.
+        cube: the one that the video shows.
+    """
+
+    objects: tuple[SceneObject, ...]
+    discs: tuple[SceneObject, ...]
+    cube: SceneObject
+
+
+def draw_table(rng: np.random.Generator, cubes: int, discs: int, site_radius: float) -> PlaceTable:
     """Draw site, button, cubes of different colors and target discs, and choose one of the cubes.
 
-    The first disc is ``target_0``.
     The site is the round place for the cube at the end of the video; its radius is in meters.
     """
-    x, y = SITE_REGION.draw(rng, inset=site_radius)
-    # A site is as high as a disc: the release height of the hand follows from it.
-    site = SceneObject("site", "site", Point(x, y, object_sizes.TARGET_HEIGHT), radius=site_radius)
-    button, colored, obstacles = draw_button_and_cubes(rng, BUTTON_REGION, cubes, WORK_REGION, GAP)
+    site = _draw_site(rng, site_radius)
+    placed = draw_button_and_cubes(
+        rng,
+        button_region=BUTTON_REGION,
+        count=cubes,
+        region=WORK_REGION,
+        gap=GAP,
+    )
     # As in RoboMME, cubes may lie on the site; discs may not.
-    obstacles.append(Circle(x, y, site_radius))
-    objects: list[SceneObject] = [site, button, *colored]
-    for number in range(discs):
-        disc = draw_target(rng, f"target_{number}", TARGET_RADIUS, WORK_REGION, GAP, obstacles)
-        objects.append(disc)
-        obstacles.append(Circle(disc.position.x, disc.position.y, TARGET_RADIUS))
-    return Scene(tuple(objects)), draw(rng, colored)
+    targets = _draw_discs(rng, discs, [*placed.obstacles, disc_area(site)])
+    objects = (site, placed.button, *placed.cubes, *targets)
+    return PlaceTable(objects, targets, cube=draw(rng, placed.cubes))
 
 
-def draw_swap(rng: np.random.Generator, discs: Sequence[SceneObject], past: Sequence[Fact]) -> Swap:
-    """Draw two discs that change places when the robot holds still at the end of the video."""
-    first, second, *others = (disc.name for disc in shuffled(rng, discs))
-    return plan_swap(first, second, others, past)
+def _draw_site(rng: np.random.Generator, radius: float) -> SceneObject:
+    """Draw the round place on which the cube lies at the end of the video."""
+    x, y = SITE_REGION.draw(rng, inset=radius)
+    # A site is as high as a disc: the release height of the hand follows from it.
+    position = Point(x, y, object_sizes.TARGET_HEIGHT)
+    return SceneObject("site", "site", position, radius=radius)
+
+
+def _draw_discs(
+    rng: np.random.Generator, count: int, obstacles: Sequence[Obstacle]
+) -> tuple[SceneObject, ...]:
+    """Draw target discs one after the other, each away from those before it."""
+    taken = list(obstacles)
+    discs: list[SceneObject] = []
+    for number in range(count):
+        disc = draw_target(
+            rng,
+            name=f"target_{number}",
+            radius=TARGET_RADIUS,
+            region=WORK_REGION,
+            gap=GAP,
+            obstacles=taken,
+        )
+        discs.append(disc)
+        taken.append(disc_area(disc))
+    return tuple(discs)
+
+
+def draw_scene(
+    rng: np.random.Generator, difficulty: Difficulty, table: PlaceTable, past: tuple[Fact, ...]
+) -> Scene:
+    """Return a table with what its video shows; in hard episodes, draw the two discs that swap.
+
+    `past` are the acts of the video, in order.
+    """
+    if difficulty != "hard":
+        return Scene(table.objects, past=past)
+    first, second, *others = (disc.name for disc in shuffled(rng, table.discs))
+    swap = plan_swap(first, second, others, past)
+    return Scene(table.objects, (swap,), past)
 
 
 def plan_swap(first: str, second: str, others: Sequence[str], past: Sequence[Fact]) -> Swap:
     """Return the swap of two discs at the end of the video, while the others stay."""
     kinds = [stage.primitive.kind for stage in _demonstration_of(past)]
     hold = kinds.index("hold")
-    return Swap(first, second, SWAP_START, SWAP_STEPS, SWAP_LANE, pinned=tuple(others), stage=hold)
+    return Swap(
+        first,
+        second,
+        start=SWAP_START,
+        steps=SWAP_STEPS,
+        lane=SWAP_LANE,
+        pinned=tuple(others),
+        stage=hold,
+    )
 
 
 def visited(scene: Scene) -> tuple[str, ...]:
@@ -86,10 +143,20 @@ def demonstration(scene: Scene) -> tuple[Stage, ...]:
 
 
 def _demonstration_of(past: Sequence[Fact]) -> tuple[Stage, ...]:
-    cube = next(fact.subject for fact in past if fact.kind == "placed")
+    """Return the stages of a video that shows some acts: presses, and placings of one cube.
+
+    *Placed on target_0, pressed* -> pick, place on target_0, press, and then what ends every video:
+    put the cube back, move away, hold still, go home.
+    """
     plan: list[Stage] = []
+    cube = ""
     for fact in past:
-        plan += [press_stage()] if fact.kind == "pressed" else _show_placing(fact)
+        if fact.kind == "pressed":
+            plan.append(press_stage())
+        else:
+            cube = fact.subject
+            put = "drop the cube onto target {at}"
+            plan += [pick_stage(cube), place_stage(cube, str(fact.place), put)]
     put_back = Stage(
         expects=Fact("placed", cube, "site"),
         forbids=(),
@@ -106,20 +173,17 @@ def _demonstration_of(past: Sequence[Fact]) -> tuple[Stage, ...]:
     )
 
 
-def _show_placing(placed: Fact) -> list[Stage]:
-    put = place_stage(placed.subject, str(placed.place), "drop the cube onto target {at}")
-    return [pick_stage(placed.subject), put]
-
-
 def place_stages(scene: Scene, color: str, answer: str) -> tuple[Stage, ...]:
-    """Return the stages: pick the cube of a color, and place it on the right disc only."""
+    """Return the stages: pick the cube of a color, and place it on the right disc only.
+
+    `answer` is the name of that disc.
+    """
     cube = f"cube_{color}"
-    cubes = (item.name for item in scene.of_kind("cube"))
-    discs = (item.name for item in scene.of_kind("target"))
-    wrong_cubes = tuple(Fact("picked", other) for other in cubes if other != cube)
-    wrong_discs = tuple(Fact("placed", cube, other) for other in discs if other != answer)
+    discs = [item.name for item in scene.of_kind("target")]
+    wrong_discs = tuple(Fact("placed", cube, disc) for disc in discs if disc != answer)
+    pick = pick_stage(cube, forbids=facts_of_others("picked", scene.of_kind("cube"), cube))
     put = "place the cube onto the correct target {at}"
-    return pick_stage(cube, forbids=wrong_cubes), place_stage(cube, answer, put, wrong_discs)
+    return pick, place_stage(cube, answer, put, wrong_discs)
 
 
 def colors_of(scene: Scene) -> tuple[str, ...]:

@@ -36,12 +36,14 @@ def write_episodes(episodes: Iterable[Episode], path: Path) -> int:
 
     The file appears whole or not at all.
     """
-    lines = [json.dumps(episode_row(one), separators=(",", ":")) + "\n" for one in episodes]
+    rows = [episode_row(episode) for episode in episodes]
+    lines = [json.dumps(row, separators=(",", ":")) + "\n" for row in rows]
     write_atomically(path, "".join(lines))
     return len(lines)
 
 
 def _object_row(item: SceneObject, episode: Episode) -> dict[str, Json]:
+    """Return an object as JSON values; ``hides`` is the cube that a container stands over."""
     hidden = episode.scene.hidden_in(item.name)
     return {
         "name": item.name,

@@ -12,6 +12,8 @@ from roboirg.tasks.splits.scene_codec import fields_of
 Plain = str | int | float | bool | None | list["Plain"] | dict[str, "Plain"]
 """Data that JSON can hold."""
 
+PLAIN_TYPES = (str, int, bool, type(None))
+"""Types whose values stay as they are."""
 DECIMALS = 9
 
 NOT_COUNTED = frozenset({("Rule", "cause"), ("Rule", "failure")})
@@ -35,19 +37,23 @@ def fingerprint(episodes: Iterable[Episode]) -> str:
 
 
 def plain(value: object) -> Plain:
-    """Convert nested dataclasses and named tuples to data for JSON, with their type names."""
+    """Convert nested dataclasses and named tuples to data for JSON, with their type names.
+
+    ``Fact("pressed", "button")`` -> ``{"type": "Fact", "kind": "pressed", "subject": "button",
+    "place": None}``. Any change of the outcome changes every hash in ``splits.json``.
+    """
     if type(value) is float:
         return round(value, DECIMALS)
-    if value is None or type(value) in {str, int, bool}:
+    if type(value) in PLAIN_TYPES:
         return value  # type: ignore[return-value] # mypy does not narrow by `in`
     kind = type(value).__name__
-    fields = {
-        HASHED_AS.get((kind, name), name): plain(content)
-        for name, content, _ in fields_of(value)
-        if (kind, name) not in NOT_COUNTED
-    }
-    if fields:
-        return {"type": kind, **fields}
+    row: dict[str, Plain] = {}
+    for field in fields_of(value):
+        if (kind, field.name) not in NOT_COUNTED:
+            name = HASHED_AS.get((kind, field.name), field.name)
+            row[name] = plain(field.value)
+    if row:
+        return {"type": kind, **row}
     if isinstance(value, tuple):
         return [plain(item) for item in value]
     raise TypeError(f"{value!r} of {kind} is not plain data")

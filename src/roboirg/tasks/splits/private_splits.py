@@ -45,8 +45,10 @@ def known_salt() -> str | None:
 
 def drawn_split(split: str) -> str:
     """Return the split that is meant: if a salt is known, ``random`` is the private split of it."""
-    known = known_salt()
-    return _split_of(known) if known is not None and split == RANDOM else split
+    salt = known_salt()
+    if salt is None or split != RANDOM:
+        return split
+    return _split_of(salt)
 
 
 def is_private(split: str) -> bool:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 FOLDER = "recordings"
 _MEMBER = re.compile(r"actions_(\d+)\.npy")
+"""The file with the actions of an episode in a recording; group 1 is the episode."""
 
 
 class RecordedActions(NamedTuple):
@@ -46,8 +47,9 @@ def recorded_actions(task: str, split: str, index: int) -> RecordedActions:
     if not is_recorded(task, split, index):
         raise KeyError(f"{task}/{split}/{index}")
     with _file(task, split).open("rb") as opened, np.load(opened) as arrays:
-        actions = arrays[f"actions_{index}"].astype(np.float64)
-        return RecordedActions(actions, arrays[f"stages_{index}"])
+        actions = arrays[f"actions_{index}"]
+        stages = arrays[f"stages_{index}"]
+        return RecordedActions(actions.astype(np.float64), stages)
 
 
 INCOMPLETE = frozenset(
@@ -68,9 +70,17 @@ def _file(task: str, split: str) -> Traversable:
 
 @functools.cache
 def _recorded_indices(task: str, split: str) -> frozenset[int]:
-    """Return the episodes of a split whose recordings are shipped."""
+    """Return the numbers of the episodes of a split whose recordings are shipped.
+
+    They follow from the names of the files in the archive, such as ``actions_7.npy`` for 7.
+    """
     file = _file(task, split)
     if not file.is_file():
         return frozenset()
+    indices: set[int] = set()
     with file.open("rb") as opened, zipfile.ZipFile(opened) as archive:
-        return frozenset(int(found[1]) for found in map(_MEMBER.match, archive.namelist()) if found)
+        for member in archive.namelist():
+            found = _MEMBER.match(member)
+            if found is not None:
+                indices.add(int(found[1]))
+    return frozenset(indices)

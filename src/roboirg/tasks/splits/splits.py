@@ -17,7 +17,7 @@ import functools
 import itertools
 import json
 import operator
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from importlib import resources
 from typing import NamedTuple, SupportsIndex
 
@@ -26,7 +26,7 @@ import numpy as np
 from roboirg.core.conditions import Fact, facts_of
 from roboirg.core.episode import ROBOT, SPLITS, Difficulty, Episode, Goal, Scene, Split, Stage
 from roboirg.core.errors import InvalidValueError, SceneRejectedError, check_names, known_name
-from roboirg.core.fact_traits import FACT_TRAITS, FactTraits
+from roboirg.core.fact_traits import FACT_TRAITS
 from roboirg.tasks import Task, get_task
 from roboirg.tasks.splits.fingerprint import fingerprint
 from roboirg.tasks.splits.private_splits import RANDOM, check_salt, is_private, private_seed
@@ -115,7 +115,8 @@ def assemble_episode(
     recorded: bool = False,
 ) -> Episode:
     """Return the episode of a scene and a goal, with the stages that follow from them."""
-    stages, demonstration = task.stages(scene, goal), task.demonstration(scene)
+    stages = task.stages(scene, goal)
+    demonstration = task.demonstration(scene)
     check_stages(task.name, scene, (*demonstration, *stages))
     return Episode(
         task=task.name,
@@ -134,13 +135,17 @@ def assemble_episode(
 @functools.cache
 def shipped_splits() -> Mapping[str, TaskSplits]:
     """Return the shipped data of the splits, by task."""
-    text = resources.files("roboirg.tasks.splits").joinpath(SPLITS_FILE).read_text(encoding="utf-8")
-    return {task: TaskSplits(**entry) for task, entry in json.loads(text).items()}
+    file = resources.files("roboirg.tasks.splits").joinpath(SPLITS_FILE)
+    entries = json.loads(file.read_text(encoding="utf-8"))
+    return {task: TaskSplits(**entry) for task, entry in entries.items()}
 
 
 def splits_text(splits: Mapping[str, TaskSplits]) -> str:
     """Return the text of ``splits.json``: JSON with a line for each task."""
-    lines = [f"{json.dumps(task)}: {json.dumps(entry._asdict())}" for task, entry in splits.items()]
+    lines: list[str] = []
+    for task, entry in splits.items():
+        numbers = json.dumps(entry._asdict())
+        lines.append(f"{json.dumps(task)}: {numbers}")
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
@@ -156,8 +161,9 @@ def get_episode(task_name: str, split: str, index: SupportsIndex) -> Episode:
         InvalidValueError: the split has no episode of that number.
         SceneRejectedError: no seed of the episode gives a scene.
     """
-    task, split_name = get_task(task_name), check_split(split)
-    return _episode(task.name, split_name, _check_index(split_name, index))
+    task = get_task(task_name)
+    checked_split = check_split(split)
+    return _episode(task.name, checked_split, _check_index(checked_split, index))
 
 
 def split_episodes(tasks: Iterable[str], splits: Iterable[Split]) -> Iterator[Episode]:
@@ -170,17 +176,21 @@ def split_episodes(tasks: Iterable[str], splits: Iterable[Split]) -> Iterator[Ep
 def fingerprint_of(task_name: str, passed_over: Mapping[str, int]) -> str:
     """Return the fingerprint of all episodes of a task, given the numbers of seeds passed over."""
     task = get_task(task_name)
-    return fingerprint(
-        _published(task, split, index)
-        or _sampled(task, split, index, passed_over.get(slot_key(split, index), 0))
-        for split in SPLITS
-        for index in range(SIZES[split])
-    )
+    return fingerprint(_fixed_episodes(task, passed_over))
+
+
+def _fixed_episodes(task: Task, passed_over: Mapping[str, int]) -> Iterator[Episode]:
+    """Yield the episodes of train, val and test, given the numbers of seeds passed over."""
+    for split in SPLITS:
+        for index in range(SIZES[split]):
+            number = passed_over.get(slot_key(split, index), 0)
+            yield _published(task, split, index) or _sampled(task, split, index, number)
 
 
 def _check_index(split: Split, index: SupportsIndex) -> int:
+    """Return a number as that of an episode of a split; True and 1.0 are none."""
     size = split_size(split)
-    number = -1
+    number = -1  # is refused below, as any index that is no whole number
     if not isinstance(index, bool):
         with contextlib.suppress(TypeError):
             number = operator.index(index)
@@ -193,20 +203,26 @@ def _check_index(split: Split, index: SupportsIndex) -> int:
 
 @functools.lru_cache(maxsize=4096)
 def _episode(task_name: str, split: Split, index: int) -> Episode:
+    """Return an episode: RoboMME's if it has published it, else from the first seed that works.
+
+    Which seed that is, is shipped for the fixed splits of our tasks; else it is tried out.
+    """
     task = get_task(task_name)
     published = _published(task, split, index)
     if published is not None:
         return published
     entry = shipped_splits().get(task_name)
     if entry is not None and split in SPLITS:
-        return _sampled(task, split, index, entry.passed_over.get(slot_key(split, index), 0))
+        number = entry.passed_over.get(slot_key(split, index), 0)
+        return _sampled(task, split, index, number)
     for passed_over in range(MAX_REJECTED):
         with contextlib.suppress(SceneRejectedError):
             return _sampled(task, split, index, passed_over)
-    return _sampled(task, split, index, MAX_REJECTED)
+    return _sampled(task, split, index, MAX_REJECTED)  # raises the error of the last seed
 
 
 def _published(task: Task, split: Split, index: int) -> Episode | None:
+    """Return an episode of RoboMME's; None if it has not published it."""
     found = published_episode(task.name, split, index)
     if found is None:
         return None
@@ -215,6 +231,7 @@ def _published(task: Task, split: Split, index: int) -> Episode | None:
 
 
 def _sampled(task: Task, split: Split, index: int, passed_over: int) -> Episode:
+    """Return a sampled episode of a split, given the number of seeds passed over for it."""
     if is_private(split):
         seed = private_seed(task.name, split, index, passed_over)
     else:
@@ -223,27 +240,43 @@ def _sampled(task: Task, split: Split, index: int, passed_over: int) -> Episode:
 
 
 def check_stages(task: str, scene: Scene, stages: Iterable[Stage]) -> None:
-    """Check that each fact that stages expect or forbid is one that can hold in a scene."""
-    kinds = {item.name: item.kind for item in scene.objects} | {ROBOT: ROBOT}
+    """Check that each fact that stages expect or forbid is one that can hold in a scene.
+
+    A task that expects *picked button* has a mistake, which no policy could reveal.
+    """
+    kinds = {item.name: item.kind for item in scene.objects}
+    kinds[ROBOT] = ROBOT
+    facts: list[Fact] = []
     for stage in stages:
         for condition in (stage.expects, *stage.forbids):
-            for fact in facts_of(condition):
-                check_names("kind of fact", [fact.kind], FACT_TRAITS)
-                for problem in _problems(fact, FACT_TRAITS[fact.kind], kinds):
-                    raise InvalidValueError(f"{task}: {fact!r} can never hold: {problem}.")
+            facts += facts_of(condition)
+    for fact in facts:
+        check_names("kind of fact", [fact.kind], FACT_TRAITS)
+        problem = _problem_of(fact, kinds)
+        if problem is not None:
+            raise InvalidValueError(f"{task}: {fact!r} can never hold: {problem}.")
 
 
-def _problems(fact: Fact, traits: FactTraits, kinds: dict[str, str]) -> Iterable[str]:
-    """Yield why a fact can never hold, given the kind of each object."""
-    if fact.place is None and traits.places:
-        yield f"it needs a place, which is a {' or a '.join(traits.places)}"
-    if fact.place is not None and not traits.places:
-        yield f"{fact.kind} has no place"
-    parts = ((fact.subject, traits.subjects), (fact.place, traits.places))
-    for name, fitting in parts:
-        if name is None:
-            continue
-        if name not in kinds:
-            yield f"the scene has no {name!r}; it has {', '.join(kinds)}"
-        elif kinds[name] not in fitting:
-            yield f"{name!r} is a {kinds[name]}, not a {' or a '.join(fitting)}"
+def _problem_of(fact: Fact, kinds: Mapping[str, str]) -> str | None:
+    """Return why a fact can never hold, given the kind of each object; None if it can.
+
+    *placed cube_red* without a place -> *it needs a place, which is a target or a site*.
+    """
+    traits = FACT_TRAITS[fact.kind]
+    problem = _name_problem(fact.subject, traits.subjects, kinds)
+    if fact.place is None:
+        if traits.places:
+            return f"it needs a place, which is a {' or a '.join(traits.places)}"
+        return problem
+    if not traits.places:
+        return f"{fact.kind} has no place"
+    return problem or _name_problem(fact.place, traits.places, kinds)
+
+
+def _name_problem(name: str, fitting: Sequence[str], kinds: Mapping[str, str]) -> str | None:
+    """Return why an object of a name is none of the fitting kinds; None if it is."""
+    if name not in kinds:
+        return f"the scene has no {name!r}; it has {', '.join(kinds)}"
+    if kinds[name] not in fitting:
+        return f"{name!r} is a {kinds[name]}, not a {' or a '.join(fitting)}"
+    return None

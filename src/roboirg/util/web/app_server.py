@@ -68,6 +68,7 @@ class AppServer:
         self._ended.wait()
 
     def _run(self) -> None:
+        """Answer requests; runs in a thread."""
         try:
             self._server.run([self.socket])
         finally:
@@ -107,22 +108,27 @@ class RequestGuard:
         refuse: Callable[[Request], Response | None],
         headers: Mapping[str, str],
     ) -> None:
-        self._app, self._refuse = app, refuse
+        self._app = app
+        self._refuse = refuse
         self._headers = {"X-Content-Type-Options": "nosniff", **headers}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it; either answer gets the headers of this guard."""
+
         async def send_with_headers(message: Message) -> None:
+            """Send a part of the answer; its first part gets the headers that it lacks."""
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
                 for name, value in self._headers.items():
                     headers.setdefault(name, value)
             await send(message)
 
-        request = Request(scope, receive)
-        refusal = self._refuse(request)
+        answer = self._app
+        refusal = self._refuse(Request(scope, receive))
         if refusal is not None:
             refusal.headers.update(_LAST)
-        await (refusal or self._app)(scope, receive, send_with_headers)
+            answer = refusal
+        await answer(scope, receive, send_with_headers)
 
 
 async def read_body(request: Request, limit: int) -> bytes:

@@ -78,22 +78,31 @@ class KeyedPageServer(AppServer):
         return f"roboirg_{self.port}"
 
     def _refuse(self, request: Request) -> Response | None:
-        """Exchange the key for a cookie, or refuse a request without it."""
-        hosts, origins = request.headers.getlist("host"), request.headers.getlist("origin")
-        # A proxy may add HTTPS: the page is then the same host's.
-        plain = [one.replace("https://", "http://", 1) for one in origins]
-        own = is_own_request(hosts, plain, self._names)
-        asked = (request.method, request.url.path) == ("GET", "/")
-        if own and asked and self._knows(request.query_params.get("key", "")):
-            response = RedirectResponse("/", 303)
-            response.set_cookie(self.cookie, self.key, httponly=True, samesite="strict")
-            return response
-        if own and self._knows(request.cookies.get(self.cookie, "")):
-            return None
+        """Return None for a request with the cookie; else an answer that sets it, or refuses.
+
+        The address that is printed has the key. It is exchanged for a cookie and left out of the
+        address, so that it is in no browser history.
+        """
+        if self._is_own(request):
+            is_first = request.method == "GET" and request.url.path == "/"
+            if is_first and self._is_key(request.query_params.get("key", "")):
+                response = RedirectResponse("/", 303)
+                response.set_cookie(self.cookie, self.key, httponly=True, samesite="strict")
+                return response
+            if self._is_key(request.cookies.get(self.cookie, "")):
+                return None
         return PlainTextResponse("Open the address that roboirg has printed, with its key.\n", 403)
 
-    def _knows(self, key: str) -> bool:
-        return hmac.compare_digest(key.encode(), self.key.encode())
+    def _is_own(self, request: Request) -> bool:
+        """Return whether a request comes from no page of another site."""
+        hosts = request.headers.getlist("host")
+        origins = request.headers.getlist("origin")
+        # A proxy may add HTTPS: the page is then the same host's.
+        http_origins = [origin.replace("https://", "http://", 1) for origin in origins]
+        return is_own_request(hosts, http_origins, self._names)
+
+    def _is_key(self, text: str) -> bool:
+        return hmac.compare_digest(text.encode(), self.key.encode())
 
 
 def page_response(render: Callable[[str], str]) -> HTMLResponse:

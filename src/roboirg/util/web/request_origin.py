@@ -35,10 +35,13 @@ def is_own_host(host: str, names: Collection[str]) -> bool:
     """Return whether ``name:port`` of a request names this machine."""
     try:
         parts = urlsplit(f"//{host}")
-        name, _ = parts.hostname or "", parts.port
+        name = parts.hostname or ""
+        _ = parts.port  # raises if it is no number
     except ValueError:
         return False
-    return parts.netloc == host and "@" not in host and (name in names or _is_address(name))
+    if parts.netloc != host or "@" in host:
+        return False
+    return name in names or _is_address(name)
 
 
 def names_of_this_machine() -> frozenset[str]:
@@ -54,6 +57,7 @@ def names_of_this_machine() -> frozenset[str]:
 
 
 def _is_address(name: str) -> bool:
+    """Return whether a name is an IP address."""
     import ipaddress
 
     try:

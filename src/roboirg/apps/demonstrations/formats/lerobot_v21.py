@@ -26,9 +26,9 @@ from roboirg.apps.demonstrations.formats.lerobot_v3 import (
     write_json,
     write_videos,
 )
-from roboirg.apps.demonstrations.frame_columns import FrameColumns
+from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
 from roboirg.apps.demonstrations.parquet_tables import write_frames, write_rows
-from roboirg.apps.demonstrations.trajectory import load_trajectory
+from roboirg.apps.demonstrations.trajectory import Trajectory, load_trajectory
 from roboirg.util.atomic_write import write_atomically
 
 __all__ = ["finish", "make_parts", "write_part"]
@@ -40,14 +40,16 @@ _ARM_JOINTS = 7
 
 def write_part(part: DatasetPart) -> None:
     """Write the episodes of one trajectory."""
-    (episode,), columns = part.episodes, part.columns
+    (episode,) = part.episodes
+    columns = part.columns
     trajectory = load_trajectory(episode.path)
     shared = frame_columns(columns, trajectory)
     for placed in episode.texts:
+        place = _place(placed.episode_index)
         if columns.has_videos:
-            write_videos(part, partial(_VIDEO.format, **_place(placed.episode_index)))
+            write_videos(part, partial(_VIDEO.format, **place))
         own = own_columns(placed, trajectory.facts.frames)
-        path = part.root / _DATA.format(**_place(placed.episode_index))
+        path = part.root / _DATA.format(**place)
         write_frames(path, columns.table_features(), shared, [own], is_described=True)
 
 
@@ -58,51 +60,78 @@ def _place(episode_index: int) -> dict[str, int]:
 def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the metadata; ``info.json``, without which nothing reads the dataset, comes last."""
     columns = parts[0].columns
-    collector = StatsCollector(columns)
-    episodes, stats, facts = [], [], []
+    lines = _EpisodeLines(columns)
     for _, episode, trajectory in read_episodes(parts):
         for placed in episode.texts:
-            name = {"episode_index": placed.episode_index}
-            length = trajectory.facts.frames
-            episodes.append({**name, "tasks": [placed.words.text], "length": length})
-            stats.append({**name, "stats": collector.add(trajectory, placed)})
-            facts.append(episode_row(trajectory, placed))
+            lines.add(trajectory, placed)
     texts = all_texts(parts)
-    tasks_lines = [{"task_index": index, "task": text} for index, text in enumerate(texts)]
-    write_rows(root / EPISODE_TABLE, facts)
-    _write_lines(root / "meta/episodes.jsonl", episodes)
-    _write_lines(root / "meta/episodes_stats.jsonl", stats)
-    _write_lines(root / "meta/tasks.jsonl", tasks_lines)
-    write_json(root / "meta/stats.json", collector.result())
+    task_lines = [{"task_index": index, "task": text} for index, text in enumerate(texts)]
+    write_rows(root / EPISODE_TABLE, lines.facts)
+    _write_lines(root / "meta/episodes.jsonl", lines.episodes)
+    _write_lines(root / "meta/episodes_stats.jsonl", lines.stats)
+    _write_lines(root / "meta/tasks.jsonl", task_lines)
+    write_json(root / "meta/stats.json", lines.collector.result())
     write_json(root / "meta/modality.json", modality(columns))
+    write_json(root / INFO, _info(parts, texts))
+
+
+class _EpisodeLines:
+    """What the files of metadata say of each episode.
+
+    Attributes:
+        collector: of the statistics of all.
+        episodes: lines of ``episodes.jsonl``.
+        stats: lines of ``episodes_stats.jsonl``.
+        facts: rows of the table of facts.
+    """
+
+    def __init__(self, columns: FrameColumns) -> None:
+        self.collector = StatsCollector(columns)
+        self.episodes: list[dict[str, Any]] = []
+        self.stats: list[dict[str, Any]] = []
+        self.facts: list[dict[str, Any]] = []
+
+    def add(self, trajectory: Trajectory, placed: PlacedText) -> None:
+        """Add an episode: a trajectory with one of its instructions."""
+        index = placed.episode_index
+        texts = [placed.words.text]
+        length = trajectory.facts.frames
+        self.episodes.append({"episode_index": index, "tasks": texts, "length": length})
+        stats = self.collector.add(trajectory, placed)
+        self.stats.append({"episode_index": index, "stats": stats})
+        self.facts.append(episode_row(trajectory, placed))
+
+
+def _info(parts: Sequence[DatasetPart], texts: Sequence[str]) -> dict[str, Any]:
+    """Return what ``info.json`` says."""
+    columns = parts[0].columns
     info = common_info(parts, texts)
-    count, videos = info["total_episodes"], len(columns.cameras) * columns.has_videos
-    more = {
-        "codebase_version": "v2.1",
-        "total_videos": count * videos,
-        "total_chunks": (count - 1) // CHUNK_SIZE + 1,
-        "data_path": _DATA,
-        "video_path": _VIDEO if columns.has_videos else None,
-    }
-    write_json(root / INFO, info | more)
+    episodes = info["total_episodes"]
+    info["codebase_version"] = "v2.1"
+    info["total_videos"] = episodes * len(columns.cameras) if columns.has_videos else 0
+    info["total_chunks"] = (episodes - 1) // CHUNK_SIZE + 1
+    info["data_path"] = _DATA
+    info["video_path"] = _VIDEO if columns.has_videos else None
+    return info
 
 
 def modality(columns: FrameColumns) -> dict[str, Any]:
     """Return GR00T's description of the columns: which numbers are what."""
-    arm, gripper = {"start": 0, "end": _ARM_JOINTS}, {"start": _ARM_JOINTS, "end": _ARM_JOINTS + 1}
+    state = {}
+    action = {}
+    for name, start, end in (("arm", 0, _ARM_JOINTS), ("gripper", _ARM_JOINTS, _ARM_JOINTS + 1)):
+        span = {"start": start, "end": end}
+        state[name] = {**span, "original_key": columns.keys["state"]}
+        action[name] = {**span, "original_key": columns.keys["action"], "absolute": True}
     return {
-        "state": {
-            name: {**span, "original_key": columns.keys["state"]}
-            for name, span in (("arm", arm), ("gripper", gripper))
-        },
-        "action": {
-            name: {**span, "original_key": columns.keys["action"], "absolute": True}
-            for name, span in (("arm", arm), ("gripper", gripper))
-        },
+        "state": state,
+        "action": action,
         "video": {camera: {"original_key": columns.keys[camera]} for camera in columns.cameras},
         "annotation": {"human.task_description": {"original_key": "task_index"}},
     }
 
 
 def _write_lines(path: Path, lines: Iterable[object]) -> None:
-    write_atomically(path, "".join(f"{json.dumps(one)}\n" for one in lines))
+    """Write a line of JSON for each object."""
+    texts = [json.dumps(line) + "\n" for line in lines]
+    write_atomically(path, "".join(texts))

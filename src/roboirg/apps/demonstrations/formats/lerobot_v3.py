@@ -60,14 +60,15 @@ def make_parts(
 
 def write_part(part: DatasetPart) -> None:
     """Write the frames and videos of one trajectory."""
-    (episode,), columns = part.episodes, part.columns
+    (episode,) = part.episodes
+    columns = part.columns
     trajectory = load_trajectory(episode.path)
-    chunk, file = part.place
+    place = {"chunk_index": part.place.chunk, "file_index": part.place.file}
     if columns.has_videos:
-        write_videos(part, partial(_VIDEO.format, chunk_index=chunk, file_index=file))
+        write_videos(part, partial(_VIDEO.format, **place))
     shared = frame_columns(columns, trajectory)
     own = [own_columns(placed, trajectory.facts.frames) for placed in episode.texts]
-    path = part.root / _DATA.format(chunk_index=chunk, file_index=file)
+    path = part.root / _DATA.format(**place)
     write_frames(path, columns.table_features(), shared, own)
 
 
@@ -81,42 +82,46 @@ def write_videos(part: DatasetPart, name_of: Callable[..., str]) -> None:
 
 def frame_columns(columns: FrameColumns, trajectory: Trajectory) -> dict[str, Any]:
     """Return the columns of a trajectory's frames that every instruction shares."""
-    found = {name: number_column(one) for name, one in columns.numbers(trajectory).items()}
-    found |= {name: text_column(one) for name, one in columns.texts(trajectory).items()}
+    found = {}
+    for name, numbers in columns.numbers(trajectory).items():
+        found[name] = number_column(numbers)
+    for name, texts in columns.texts(trajectory).items():
+        found[name] = text_column(texts)
     if not columns.has_videos:
-        pictures = columns.pictures(trajectory)
-        found |= {name: picture_column(one) for name, one in pictures.items()}
+        for name, pictures in columns.pictures(trajectory).items():
+            found[name] = picture_column(pictures)
     return found
 
 
 def own_columns(placed: PlacedText, length: int) -> dict[str, Any]:
     """Return the columns that differ between the instructions of a trajectory."""
-    found = FrameColumns.indices(placed, length)
-    return {name: number_column(one) for name, one in found.items()}
+    indices = FrameColumns.indices(placed, length)
+    return {name: number_column(values) for name, values in indices.items()}
 
 
 def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the metadata; ``info.json``, without which nothing reads the dataset, comes last."""
     columns = parts[0].columns
     stats = StatsCollector(columns)
-    episodes, facts = [], []
+    episodes = []
+    facts = []
     for part, episode, trajectory in read_episodes(parts):
         for placed in episode.texts:
             entry = _episode_entry(part, placed, trajectory.facts.frames)
-            episodes.append(entry | _flat(stats.add(trajectory, placed)))
+            entry |= _flat(stats.add(trajectory, placed))
+            episodes.append(entry)
             facts.append(episode_row(trajectory, placed))
     texts = all_texts(parts)
     write_rows(root / "meta/episodes/chunk-000/file-000.parquet", episodes)
     _write_tasks(root / "meta/tasks.parquet", texts)
     write_rows(root / EPISODE_TABLE, facts)
     write_json(root / "meta/stats.json", stats.result())
-    info = common_info(parts, texts) | {
-        "codebase_version": "v3.0",
-        "data_files_size_in_mb": 100,
-        "video_files_size_in_mb": 200,
-        "data_path": _DATA,
-        "video_path": _VIDEO if columns.has_videos else None,
-    }
+    info = common_info(parts, texts)
+    info["codebase_version"] = "v3.0"
+    info["data_files_size_in_mb"] = 100
+    info["video_files_size_in_mb"] = 200
+    info["data_path"] = _DATA
+    info["video_path"] = _VIDEO if columns.has_videos else None
     write_json(root / INFO, info)
 
 
@@ -128,22 +133,37 @@ class StatsCollector:
         self._numbers: defaultdict[str, list[NDArray[Any]]] = defaultdict(list)
         self._counts: dict[str, NDArray[np.int64]] = {}
         # Instructions of a trajectory follow one another and share what is slow to compute.
-        self._last: tuple[Path, dict[str, FeatureStats]] | None = None
+        self._last_path: Path | None = None
+        self._shared_stats: dict[str, FeatureStats] = {}
 
     def add(self, trajectory: Trajectory, placed: PlacedText) -> dict[str, FeatureStats]:
         """Add an episode; returns its own statistics."""
-        columns = self._columns
-        shared = columns.numbers(trajectory)
-        counts = {columns.keys[one]: trajectory.histograms[one] for one in columns.cameras}
-        indices = columns.indices(placed, len(next(iter(shared.values()))))
+        shared = self._columns.numbers(trajectory)
+        indices = self._columns.indices(placed, trajectory.facts.frames)
         for name, values in (shared | indices).items():
             self._numbers[name].append(values)
-        for name, one in counts.items():
-            self._counts[name] = self._counts.get(name, 0) + one
-        if self._last is None or self._last[0] != trajectory.path:
-            stats = columns.stats({name: [one] for name, one in shared.items()}, counts)
-            self._last = trajectory.path, stats
-        return self._last[1] | {name: vector_stats(one) for name, one in indices.items()}
+        for name, counts in self._picture_counts(trajectory).items():
+            self._counts[name] = self._counts.get(name, 0) + counts
+        stats = self._stats_of(trajectory, shared)
+        for name, values in indices.items():
+            stats[name] = vector_stats(values)
+        return stats
+
+    def _picture_counts(self, trajectory: Trajectory) -> dict[str, NDArray[np.int64]]:
+        """Return the counts of pixel values by the columns of pictures."""
+        cameras = self._columns.cameras
+        return {self._columns.keys[camera]: trajectory.histograms[camera] for camera in cameras}
+
+    def _stats_of(
+        self, trajectory: Trajectory, shared: Mapping[str, NDArray[Any]]
+    ) -> dict[str, FeatureStats]:
+        """Return the statistics of what all instructions of a trajectory share."""
+        if self._last_path != trajectory.path:
+            numbers = {name: [values] for name, values in shared.items()}
+            counts = self._picture_counts(trajectory)
+            self._shared_stats = self._columns.stats(numbers, counts)
+            self._last_path = trajectory.path
+        return dict(self._shared_stats)
 
     def result(self) -> dict[str, FeatureStats]:
         """Return the statistics of all episodes."""
@@ -151,6 +171,7 @@ class StatsCollector:
 
 
 def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[str, Any]:
+    """Return the row of an episode: where its frames are, in the table and in the videos."""
     chunk, file = part.place
     entry: dict[str, Any] = {
         "episode_index": placed.episode_index,
@@ -161,20 +182,25 @@ def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[s
         "dataset_from_index": placed.first_index,
         "dataset_to_index": placed.first_index + length,
     }
-    for camera in part.columns.cameras if part.columns.has_videos else ():
-        key = f"videos/{part.columns.keys[camera]}"
-        entry[f"{key}/chunk_index"], entry[f"{key}/file_index"] = chunk, file
-        entry[f"{key}/from_timestamp"] = 0.0
-        entry[f"{key}/to_timestamp"] = length / CONTROL_RATE
-    return entry | {"meta/episodes/chunk_index": 0, "meta/episodes/file_index": 0}
+    if part.columns.has_videos:
+        for camera in part.columns.cameras:
+            key = f"videos/{part.columns.keys[camera]}"
+            entry[f"{key}/chunk_index"] = chunk
+            entry[f"{key}/file_index"] = file
+            entry[f"{key}/from_timestamp"] = 0.0
+            entry[f"{key}/to_timestamp"] = length / CONTROL_RATE
+    entry["meta/episodes/chunk_index"] = 0
+    entry["meta/episodes/file_index"] = 0
+    return entry
 
 
 def _flat(stats: Mapping[str, FeatureStats]) -> dict[str, Any]:
-    return {
-        f"stats/{feature}/{name}": value
-        for feature, one in stats.items()
-        for name, value in one.items()
-    }
+    """Return statistics in one level: that of ``action`` ``{"min": …}`` is ``stats/action/min``."""
+    found = {}
+    for feature, of_feature in stats.items():
+        for name, value in of_feature.items():
+            found[f"stats/{feature}/{name}"] = value
+    return found
 
 
 def _write_tasks(path: Path, texts: Sequence[str]) -> None:

@@ -40,6 +40,8 @@ from roboirg.util.atomic_write import replacing
 SHARED_FOLDER = "trajectories"
 """Folder of the time steps if several settings refer to them."""
 _CLOSED_FINGER = 0.03
+_COMPRESSION = {"compression": "gzip", "compression_opts": 1}
+"""Of pictures and depth."""
 _NO_CHOICE = json.dumps({"choice": "", "point": []})
 
 
@@ -58,16 +60,18 @@ def make_parts(
     plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts]
 ) -> list[DatasetPart]:
     """Return a part for each task."""
-    columns, tasks = FrameColumns(plan), dict[str, list[RecordedEpisode]]()
-    for one in place_texts(recorded):
-        tasks.setdefault(_task(one), []).append(one)
-    return [
-        DatasetPart(number, root, columns, tuple(episodes))
-        for number, episodes in enumerate(tasks.values())
-    ]
+    columns = FrameColumns(plan)
+    by_task: dict[str, list[RecordedEpisode]] = {}
+    for episode in place_texts(recorded):
+        by_task.setdefault(_task(episode), []).append(episode)
+    parts = []
+    for number, episodes in enumerate(by_task.values()):
+        parts.append(DatasetPart(number, root, columns, tuple(episodes)))
+    return parts
 
 
 def _task(episode: RecordedEpisode) -> str:
+    """Return the name of an episode's task."""
     return str(episode.texts[0].words.facts["task"])
 
 
@@ -76,19 +80,30 @@ def write_part(part: DatasetPart) -> None:
     import h5py
 
     name = f"record_dataset_{_task(part.episodes[0])}.h5"
-    words = dict.fromkeys(words_of(one.words) for ep in part.episodes for one in ep.texts)
-    is_shared = len(words) > 1
-    home = part.root / SHARED_FOLDER if is_shared else part.root
-    with replacing(home / name) as path, h5py.File(path, "w") as file:
+    folders = _folders(part)
+    is_shared = len(folders) > 1
+    steps_folder = part.root / SHARED_FOLDER if is_shared else part.root
+    with replacing(steps_folder / name) as path, h5py.File(path, "w") as file:
         for episode in part.episodes:
             _write_episode(file, episode)
-    for folder in words if is_shared else ():
-        with replacing(part.root / folder / name) as path, h5py.File(path, "w") as file:
-            for episode in part.episodes:
-                _link_episode(file, episode, folder, f"../{SHARED_FOLDER}/{name}")
+    if is_shared:
+        for folder in folders:
+            with replacing(part.root / folder / name) as path, h5py.File(path, "w") as file:
+                for episode in part.episodes:
+                    _link_episode(file, episode, folder, f"../{SHARED_FOLDER}/{name}")
+
+
+def _folders(part: DatasetPart) -> list[str]:
+    """Return the folder of each setting and form of the instructions."""
+    folders: dict[str, None] = {}
+    for episode in part.episodes:
+        for placed in episode.texts:
+            folders[words_of(placed.words)] = None
+    return list(folders)
 
 
 def _write_episode(file: Any, episode: RecordedEpisode) -> None:  # noqa: ANN401
+    """Write an episode with its time steps and its first instruction."""
     trajectory = load_trajectory(episode.path)
     group = file.create_group(f"episode_{trajectory.facts.episode}")
     _write_setup(group, trajectory, episode.texts[0])
@@ -119,9 +134,11 @@ def time_steps(trajectory: Trajectory) -> list[int]:
 
 
 def _write_setup(group: Any, trajectory: Trajectory, placed: PlacedText) -> None:  # noqa: ANN401
+    """Write what holds for all time steps of an episode."""
     import h5py
 
-    setup, facts = group.create_group("setup"), trajectory.facts
+    facts = trajectory.facts
+    setup = group.create_group("setup")
     setup["seed"] = np.int64(facts.seed)
     setup["difficulty"] = facts.difficulty
     setup.create_dataset("task_goal", data=[placed.words.text], dtype=h5py.string_dtype())
@@ -137,17 +154,8 @@ def _write_step(
     row: int,
     archive: zipfile.ZipFile,
 ) -> None:
-    seen = group.create_group("obs")
-    for camera in CAMERAS:
-        options = {"compression": "gzip", "compression_opts": 1}
-        seen.create_dataset(f"{camera}_rgb", data=read_picture(archive, camera, row), **options)
-        seen.create_dataset(f"{camera}_depth", data=read_depth(archive, camera, row), **options)
-        extrinsic = trajectory.calibration[f"{camera}_extrinsic"][row]
-        seen[f"{camera}_camera_extrinsic"] = extrinsic
-    seen["joint_state"] = trajectory.joint_positions[row]
-    seen["eef_state"] = trajectory.end_effector[row].astype(np.float32)
-    seen["gripper_state"] = trajectory.gripper[row]
-    seen["is_gripper_close"] = np.bool_((trajectory.gripper[row] < _CLOSED_FINGER).any())
+    """Write a time step from a row of a trajectory, with the pictures of its open file."""
+    _write_observation(group.create_group("obs"), trajectory, row, archive)
     done = group.create_group("action")
     done["joint_action"] = trajectory.actions[row]
     done["eef_action"] = trajectory.pose_actions[row]
@@ -163,19 +171,38 @@ def _write_step(
     info["is_completed"] = np.bool_(False)
 
 
+def _write_observation(
+    seen: Any,  # noqa: ANN401
+    trajectory: Trajectory,
+    row: int,
+    archive: zipfile.ZipFile,
+) -> None:
+    """Write pictures, depth and the robot's state."""
+    for camera in CAMERAS:
+        picture = read_picture(archive, camera, row)
+        depth = read_depth(archive, camera, row)
+        seen.create_dataset(f"{camera}_rgb", data=picture, **_COMPRESSION)
+        seen.create_dataset(f"{camera}_depth", data=depth, **_COMPRESSION)
+        extrinsic = trajectory.calibration[f"{camera}_extrinsic"][row]
+        seen[f"{camera}_camera_extrinsic"] = extrinsic
+    fingers = trajectory.gripper[row]
+    seen["joint_state"] = trajectory.joint_positions[row]
+    seen["eef_state"] = trajectory.end_effector[row].astype(np.float32)
+    seen["gripper_state"] = fingers
+    seen["is_gripper_close"] = np.bool_((fingers < _CLOSED_FINGER).any())
+
+
 def _is_boundary(trajectory: Trajectory, row: int) -> bool:
     """Return whether a row is the first of its subgoal among the time steps."""
-    length = trajectory.facts.video_length
-    before = row - 2 if row - 1 == length else row - 1
-    is_first = before < 0 or row == length + 1
-    return is_first or bool(trajectory.subgoals[row] != trajectory.subgoals[before])
+    first_observation = trajectory.facts.video_length  # which is no time step
+    if row in (0, first_observation + 1):
+        return True
+    return bool(trajectory.subgoals[row] != trajectory.subgoals[row - 1])
 
 
 def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the table of facts."""
-    rows = [
-        episode_row(trajectory, placed)
-        for _, episode, trajectory in read_episodes(parts)
-        for placed in episode.texts
-    ]
+    rows = []
+    for _, episode, trajectory in read_episodes(parts):
+        rows += [episode_row(trajectory, placed) for placed in episode.texts]
     write_rows(root / EPISODE_TABLE, rows)

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from roboirg.core.errors import PolicyConnectionError
 from roboirg.core.policy_ref import PRIVILEGED
-from roboirg.evaluation.records.record import Job
-from roboirg.evaluation.records.record_codec import encode
 from roboirg.policies.vlm.models import ModelOptions, ModelQuery, ModelReply
 from roboirg.policies.vlm.models.openai_compatible import chat_messages
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
+from roboirg.records.record import Job
+from roboirg.records.record_codec import encode
 
 if TYPE_CHECKING:
     Pipe = Connection[Any, Any]
@@ -41,11 +41,13 @@ class PipeModel:
     """
 
     def __init__(self, pipe: Pipe, options: ModelOptions) -> None:
-        self._pipe, self._options = pipe, options
+        self._pipe = pipe
+        self._options = options
 
     def answer(self, query: ModelQuery) -> ModelReply:
         """Return the parent's reply; see `Model`."""
-        self._pipe.send(ModelRequest(chat_messages(query, self._options), query.schema))
+        messages = chat_messages(query, self._options)
+        self._pipe.send(ModelRequest(messages, query.schema))
         try:
             reply: ModelReply = self._pipe.recv()
             return reply
@@ -54,7 +56,10 @@ class PipeModel:
 
 
 class PipedListener(VLMListener):
-    """The VLM listener of this process."""
+    """The VLM listener of this process, which `play` gives its pipe and options.
+
+    A policy is made from its name, so these are the class's.
+    """
 
     pipe: Pipe
     chosen: ListenerOptions
@@ -71,9 +76,10 @@ def play(pipe: Pipe, job: Job, options: ListenerOptions) -> None:
         job: the episode; its policy's spec is `PipedListener`.
         options: of the listener.
     """
-    from roboirg.evaluation.play.rollout import EpisodeRunner
+    from roboirg.runs.play.rollout import EpisodeRunner
 
-    PipedListener.pipe, PipedListener.chosen = pipe, options
+    PipedListener.pipe = pipe
+    PipedListener.chosen = options
     record, _ = EpisodeRunner(Path()).play_once(job)
     pipe.send(encode(record).decode())
 

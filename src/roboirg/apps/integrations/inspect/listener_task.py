@@ -33,10 +33,10 @@ from roboirg.core.environment_options import MAX_STEPS, EnvironmentOptions
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.instruction_options import DEFAULT_DELIVERY, InstructionOptions
-from roboirg.evaluation.records.record import Job
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.policies.vlm.models import ModelOptions, ModelReply
 from roboirg.policies.vlm.vlm_listener import ListenerOptions
+from roboirg.records.record import Job
 from roboirg.tasks import find_tasks
 from roboirg.tasks.splits.splits import split_size
 from roboirg.util.child_process import ChildExit, ChildProcess
@@ -74,18 +74,23 @@ def listener(
         structured: whether to send the JSON schema of the answer.
     """
     count = min(episodes, split_size(split))
-    listener = read_policy(SPEC, "vlm-listener")
-    jobs = [
-        Job(
-            policy=listener.name, ref=listener, task=name, split=split, episode=index,
-            options=InstructionOptions(setting, delivery=delivery),
-            environment=EnvironmentOptions(max_steps),
-        )
-        for name in find_tasks(tasks.split(",") if isinstance(tasks, str) else tasks)
-        for index in range(count)
-    ]  # fmt: skip
+    names = tasks.split(",") if isinstance(tasks, str) else tasks
+    policy = read_policy(SPEC, "vlm-listener")
+    samples = []
+    for name in find_tasks(names):
+        for episode in range(count):
+            job = Job(
+                policy=policy.name,
+                ref=policy,
+                task=name,
+                split=split,
+                episode=episode,
+                options=InstructionOptions(setting, delivery=delivery),
+                environment=EnvironmentOptions(max_steps),
+            )
+            samples.append(_sample(job))
     return Task(
-        dataset=MemoryDataset([_sample(job) for job in jobs], name="roboirg"),
+        dataset=MemoryDataset(samples, name="roboirg"),
         solver=play_with_model(frames=frames, think=think, structured=structured),
         scorer=grounds_reference(),
         version=ENVIRONMENT_VERSION,
@@ -93,7 +98,8 @@ def listener(
 
 
 def _sample(job: Job) -> Sample:
-    from roboirg.evaluation.play.job_instruction import instruct_job
+    """Return an episode as Inspect takes it."""
+    from roboirg.runs.job_instruction import instruct_job
 
     return Sample(
         input=instruct_job(job).text,
@@ -115,13 +121,10 @@ def play_with_model(frames: int = 16, think: bool = False, structured: bool = Tr
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:  # noqa: ARG001
         model = get_model()
-        options = ListenerOptions(
-            model=ModelOptions(
-                model=str(model), base_url=VIA, structured=structured, clip_frames=frames
-            ),
-            frames=frames,
-            reasoning=think,
+        model_options = ModelOptions(
+            model=str(model), base_url=VIA, structured=structured, clip_frames=frames
         )
+        options = ListenerOptions(model=model_options, frames=frames, reasoning=think)
         job = msgspec.convert(state.metadata["job"], Job)
         job = msgspec.structs.replace(job, policy=f"vlm-listener:inspect?model={model}")
         record = await _play(model, job, options, state)
@@ -138,18 +141,21 @@ def play_with_model(frames: int = 16, think: bool = False, structured: bool = Tr
 async def _play(
     model: Model, job: Job, options: ListenerOptions, state: TaskState
 ) -> dict[str, Any]:
-    """Return the record of an episode."""
+    """Play an episode in a process of its own and return its record.
+
+    The process sends requests to the model, each of which is answered, and at last the record.
+    """
     # The kernel ends the child with the thread that started it, so that must be this one.
     child = ChildProcess.spawn(play, job, options)
     try:
         while True:
-            said = await anyio.to_thread.run_sync(child.receive, abandon_on_cancel=True)
-            if isinstance(said, ChildExit):
-                raise RoboIRGError(f"The process of {state.sample_id} was lost: {said}.")
-            if not isinstance(said, ModelRequest):
-                record: dict[str, Any] = json.loads(said)
+            message = await anyio.to_thread.run_sync(child.receive, abandon_on_cancel=True)
+            if isinstance(message, ChildExit):
+                raise RoboIRGError(f"The process of {state.sample_id} was lost: {message}.")
+            if not isinstance(message, ModelRequest):
+                record: dict[str, Any] = json.loads(message)
                 return record
-            reply = await _ask(model, said, options, state)
+            reply = await _ask(model, message, options, state)
             await anyio.to_thread.run_sync(child.send, reply)
     finally:
         child.end()
@@ -158,21 +164,28 @@ async def _play(
 async def _ask(
     model: Model, request: ModelRequest, options: ListenerOptions, state: TaskState
 ) -> ModelReply:
-    """Return the model's reply; Inspect keeps its thoughts apart."""
+    """Return the model's reply; Inspect keeps its thoughts apart.
+
+    The state's messages become those of this request and the reply.
+    """
     config = GenerateConfig()
     if request.schema is not None and options.model.structured:
-        schema = JSONSchema.model_validate(request.schema)
-        config = GenerateConfig(response_schema=ResponseSchema(name="answer", json_schema=schema))
-    messages = [_message(one) for one in request.messages]
+        json_schema = JSONSchema.model_validate(request.schema)
+        answer = ResponseSchema(name="answer", json_schema=json_schema)
+        config = GenerateConfig(response_schema=answer)
+    messages = [_chat_message(message) for message in request.messages]
     output = await model.generate(messages, config=config)
-    state.messages = [*messages, *([output.message] if output.choices else [])]
+    state.messages = messages
+    if output.choices:
+        state.messages = [*messages, output.message]
     usage = output.usage
     if usage is None:
         return ModelReply(output.completion)
     return ModelReply(output.completion, usage.input_tokens, usage.output_tokens)
 
 
-def _message(message: dict[str, Any]) -> ChatMessage:
+def _chat_message(message: dict[str, Any]) -> ChatMessage:
+    """Return a message, given as OpenAI's chat completions take it, as Inspect's."""
     content = message["content"]
     if message["role"] == "system":
         return ChatMessageSystem(content=content)
@@ -182,6 +195,7 @@ def _message(message: dict[str, Any]) -> ChatMessage:
 
 
 def _contents(pieces: list[dict[str, Any]]) -> Iterator[Content]:
+    """Yield the texts and pictures of a message."""
     for piece in pieces:
         if piece["type"] == "text":
             yield ContentText(text=piece["text"])

@@ -73,12 +73,20 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
     @property
     def gym_kwargs(self) -> dict[str, Any]:
         """Keyword arguments of `LeRobotSubEnvironment`."""
-        names = (
-            "setting", "form", "split", "actions", "distractor", "frame", "delivery", "meshes",
-            "size", "video",
-        )  # fmt: skip
-        chosen = {name: getattr(self, name) for name in names}
-        return {**chosen, "cameras": _split(self.cameras), "max_steps": self.episode_length}
+        return {
+            "setting": self.setting,
+            "form": self.form,
+            "split": self.split,
+            "actions": self.actions,
+            "distractor": self.distractor,
+            "frame": self.frame,
+            "delivery": self.delivery,
+            "meshes": self.meshes,
+            "size": self.size,
+            "video": self.video,
+            "cameras": _split(self.cameras),
+            "max_steps": self.episode_length,
+        }
 
     def create_envs(
         self, n_envs: int, use_async_envs: bool = True
@@ -92,25 +100,27 @@ class RoboIRGEnvConfig(EnvConfig):  # type: ignore[misc] # LeRobot has no types
         tasks = _split(self.task)
         if not tasks:
             raise InvalidValueError("--env.task names no task.")
-        return {
-            f"{task}-{self.setting}-{self.split}": {0: self._create(task, n_envs, use_async_envs)}
-            for task in tasks
-        }
+        environments = {}
+        for task in tasks:
+            group = f"{task}-{self.setting}-{self.split}"
+            environments[group] = {0: self._create(task, n_envs, use_async_envs)}
+        return environments
 
     def _create(self, task: str, n_envs: int, use_async: bool) -> VectorEnv[Any, Any, Any]:
         """Return the vector environment of a task; its processes start when it is first used."""
         options = self.gym_kwargs
-        one = LeRobotSubEnvironment(task, **options)  # checks the options; builds no world
+        example = LeRobotSubEnvironment(task, **options)  # checks the options; builds no world
         if not use_async or n_envs == 1:
             return make_batch(task, n_envs, False, options)
         lazy: VectorEnv[Any, Any, Any] = _LazyAsyncVectorEnv(
             sub_environments(task, n_envs, options),
-            one.observation_space,
-            one.action_space,
-            one.metadata,
+            example.observation_space,
+            example.action_space,
+            example.metadata,
         )
         return lazy
 
 
 def _split(names: str) -> tuple[str, ...]:
+    """Return the names in a list with commas."""
     return tuple(name.strip() for name in names.split(",") if name.strip())

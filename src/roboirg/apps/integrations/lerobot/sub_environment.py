@@ -73,24 +73,26 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
         if not options.get("cameras", CAMERAS):
             raise InvalidValueError("cameras is empty; LeRobot needs at least one picture.")
         check_whole("size", size, most=PICTURE_SIZE)
-        self._video, self._size = video, size
-        usual: EnvOptions = {
-            "demonstration_frames": "all" if video else "none",
-            "episode": None,
-        }
-        chosen: EnvOptions = {**usual, **options}
-        self._env = make(task, **chosen)
+        self._has_video = video
+        self._size = size
+        options.setdefault("demonstration_frames", "all" if video else "none")
+        options.setdefault("episode", None)
+        self._env = make(task, **options)
         self.observation_space = self._make_space()
-        low, high = self._env.action_space.low, self._env.action_space.high  # type: ignore[attr-defined]
-        self.action_space = spaces.Box(low.astype(np.float32), high.astype(np.float32))
-        longest = LONGEST_VIDEO if video else 0
-        self._max_episode_steps = options.get("max_steps", MAX_STEPS) + longest
+        box: Any = self._env.action_space
+        self.action_space = spaces.Box(box.low.astype(np.float32), box.high.astype(np.float32))
+        self._max_episode_steps = options.get("max_steps", MAX_STEPS)
+        if video:
+            self._max_episode_steps += LONGEST_VIDEO
         self.task_description = ""
-        self._shown: Mapping[str, NDArray[Any]] = {}
-        self._next_frame = self._length = 0
+        # The video, the number of its frames, and of those that have been shown.
+        self._video: Mapping[str, NDArray[Any]] = {}
+        self._length = 0
+        self._next_frame = 0
+        # Our last observation, its first picture, and the end of the episode once it is over.
         self._seen: dict[str, Any] = {}
         self._picture: Pixels | None = None
-        self._last: StepResult | None = None
+        self._end: StepResult | None = None
 
     @property
     def task(self) -> str:
@@ -100,40 +102,43 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> Moment:
         """Start an episode; repeat the end of the last one if LeRobot does not mean this reset."""
         chosen = dict(options or {})
-        meant = chosen.pop(NEW_ROLLOUT, False) or seed is not None or chosen
-        if self._last is not None and not meant:
-            return self._last[0], self._last[4]
-        self._last = None
+        is_new_rollout = chosen.pop(NEW_ROLLOUT, False)
+        is_meant = is_new_rollout or seed is not None or bool(chosen)
+        if self._end is not None and not is_meant:
+            observation, _, _, _, info = self._end
+            return observation, info
+        self._end = None
         self._seen, info = self._env.reset(seed=seed, options=chosen)
         self.task_description = self._seen["instruction"]
         demonstration = info["demonstration"]
-        self._next_frame = self._length = 0
-        if self._video and demonstration.length:
+        self._next_frame = 0
+        self._length = 0
+        if self._has_video and demonstration.length:
             demonstration.draw()
-            self._shown, self._length = demonstration, demonstration.length
-        return self._observe(self._seen), self._info(success=False)
+            self._video = demonstration
+            self._length = demonstration.length
+        return self._observe(), self._info(success=False)
 
     def step(self, action: Actions) -> StepResult:
         """Execute one action; while the video is streamed, show its next frame instead."""
-        if self._last is not None:
-            return self._last
-        if self._next_frame < self._length:
+        if self._end is not None:
+            return self._end
+        if self._is_video_on:
             self._next_frame += 1
-            return self._observe(self._seen), 0.0, False, False, self._info(success=False)
+            return self._observe(), 0.0, False, False, self._info(success=False)
         try:
-            seen, reward, terminated, truncated, info = self._env.step(action)
+            self._seen, reward, terminated, truncated, info = self._env.step(action)
         except InvalidActionError as error:
             _log.warning("The episode ends without success: %s", error)
-            observation = self._observe(self._seen)
-            self._last = observation, 0.0, True, False, self._info(success=False)
-            return self._last
-        self._seen = seen
-        self.task_description = seen["instruction"]
-        observation, after = self._observe(seen), self._info(success=info["is_success"])
+            self._end = self._observe(), 0.0, True, False, self._info(success=False)
+            return self._end
+        self.task_description = self._seen["instruction"]
+        observation = self._observe()
+        shown_info = self._info(success=info["is_success"])
         if terminated or truncated:
             # Repeated, it must not be rewarded again.
-            self._last = observation, 0.0, terminated, truncated, after
-        return observation, reward, terminated, truncated, after
+            self._end = observation, 0.0, terminated, truncated, shown_info
+        return observation, reward, terminated, truncated, shown_info
 
     def render(self) -> Pixels | None:
         """Return the first camera's picture in the last observation."""
@@ -144,22 +149,30 @@ class LeRobotSubEnvironment(gymnasium.Env[dict[str, Any], Actions]):
         self._env.close()
 
     def _make_space(self) -> spaces.Dict:
+        """Return the space of observations."""
         shape = (self._size, self._size, 3)
         picture: spaces.Space[Any] = spaces.Box(0, 255, shape, np.uint8)
         pictures = dict.fromkeys(self._env.cameras, picture)
         state = spaces.Box(-np.inf, np.inf, (STATE_SIZE,), np.float32)
         return spaces.Dict({"pixels": spaces.Dict(pictures), "agent_pos": state})
 
-    def _observe(self, seen: Mapping[str, Any]) -> dict[str, Any]:
-        """Return an observation in LeRobot's form: of the video while it is played."""
-        if self._next_frame < self._length:
-            seen = {key: array[self._next_frame] for key, array in self._shown.items()}
-        pixels = {
-            camera: scaled_square(seen[f"{camera}_rgb"], self._size) for camera in self._env.cameras
-        }
-        self._picture = next(iter(pixels.values()))
+    @property
+    def _is_video_on(self) -> bool:
+        """Whether frames of the video are left to show."""
+        return self._next_frame < self._length
+
+    def _observe(self) -> dict[str, Any]:
+        """Return what is seen in LeRobot's form: a frame of the video while it is played."""
+        seen = self._seen
+        if self._is_video_on:
+            seen = {field: array[self._next_frame] for field, array in self._video.items()}
+        pixels = {}
+        for camera in self._env.cameras:
+            pixels[camera] = scaled_square(seen[f"{camera}_rgb"], self._size)
+        first_camera = self._env.cameras[0]
+        self._picture = pixels[first_camera]
         state = proprioception(seen["joint_positions"], seen["gripper"])
         return {"pixels": pixels, "agent_pos": state}
 
     def _info(self, *, success: bool) -> dict[str, Any]:
-        return {"is_success": success, "is_video_demo": self._next_frame < self._length}
+        return {"is_success": success, "is_video_demo": self._is_video_on}

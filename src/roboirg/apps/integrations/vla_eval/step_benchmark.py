@@ -17,8 +17,10 @@ from roboirg.core.observations import FRONT, WRIST, proprioception
 from roboirg.tasks import ALL, find_tasks
 
 if TYPE_CHECKING:
+    from roboirg.envs.env_settings import EnvOptions
     from roboirg.envs.environment import RoboIRGEnv
 
+OPEN_GRIPPER = 1.0
 TOLD_TASK = {"name": "RoboIRGBench"}
 """All that a policy learns of the task besides the observations."""
 ICD_VARIABLE = "ROBOIRG_LAVAPIPE_ICD"
@@ -73,15 +75,27 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
     ) -> None:
         super().__init__()
         self.tasks = find_tasks(tasks or [ALL])
-        self.setting, self.split = setting, split
+        self.setting = setting
+        self.split = split
         self.action_space = find_action_space(action_space)
         self.max_steps = max_steps
-        self._words = {"setting": setting, "form": form, "delivery": delivery}
-        self._meshes = meshes
-        self._cameras = (FRONT, WRIST) if send_wrist_image else (FRONT,)
-        self._sends_state, self._sends_video = send_state, send_video_history
+        self._sends_wrist = send_wrist_image
+        self._sends_state = send_state
+        self._sends_video = send_video_history
+        self._env_options: EnvOptions = {
+            "setting": setting,
+            "form": form,
+            "delivery": delivery,
+            "split": split,
+            "actions": self.action_space.name,
+            "cameras": (FRONT, WRIST) if send_wrist_image else (FRONT,),
+            "demonstration_frames": "all" if send_video_history else "none",
+            "max_steps": max_steps,
+            "meshes": meshes,
+        }
         self._env: RoboIRGEnv | None = None
-        self._video: dict[str, Any] = {}
+        # What the next observation has of the video.
+        self._video_fields: dict[str, Any] = {}
 
     @classmethod
     def configure_render(cls, mode: str) -> dict[str, str]:
@@ -102,30 +116,20 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         """
         from roboirg.envs.factory import make
 
-        name, index = task["name"], task["episode_idx"]
+        name = task["name"]
+        options: EnvOptions = {**self._env_options, "episode": task["episode_idx"]}
         task.clear()
         task.update(TOLD_TASK)
         self.cleanup()
-        self._env = make(
-            name,
-            split=self.split,
-            episode=index,
-            actions=self.action_space.name,
-            cameras=self._cameras,
-            demonstration_frames="all" if self._sends_video else "none",
-            max_steps=self.max_steps,
-            meshes=self._meshes,
-            **self._words,  # type: ignore[arg-type] # all are texts
-        )
+        self._env = make(name, **options)
         observation, info = self._env.reset()
         video = info["demonstration"]
         if self._sends_video and video.length:
             video.draw()
-            self._video = {
-                "video_history": list(video["front_rgb"]),
-                **({"wrist_video_history": list(video["wrist_rgb"])} if self._has_wrist else {}),
-                "episode_restart": True,
-            }
+            self._video_fields["video_history"] = list(video["front_rgb"])
+            if self._sends_wrist:
+                self._video_fields["wrist_video_history"] = list(video["wrist_rgb"])
+            self._video_fields["episode_restart"] = True
         self._recorder.record_video(observation["front_rgb"])
         return observation
 
@@ -146,10 +150,10 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         shown: dict[str, Any] = {
             "images": {"agentview": raw_obs["front_rgb"]},
             "task_description": raw_obs["instruction"],
-            **self._video,
+            **self._video_fields,
         }
-        self._video = {}
-        if self._has_wrist:
+        self._video_fields = {}
+        if self._sends_wrist:
             shown["images"]["wrist"] = raw_obs["wrist_rgb"]
         if self._sends_state:
             shown["states"] = proprioception(raw_obs["joint_positions"], raw_obs["gripper"])
@@ -172,7 +176,7 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
 
     def get_observation_spec(self) -> dict[str, DimSpec]:
         fields = {"agentview": IMAGE_RGB, "language": LANGUAGE}
-        if self._has_wrist:
+        if self._sends_wrist:
             fields["wrist"] = IMAGE_RGB
         if self._sends_state:
             fields["state"] = _STATE
@@ -181,9 +185,9 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
     def get_hold_action(self, last_action: dict[str, Any] | None) -> dict[str, Any]:
         """Return the last action again, or at first one that keeps the joints where they are."""
         if last_action is None and self.action_space.name == JOINT_ANGLE.name:
-            seen = self._last_result.obs
-            opened = np.append(seen["joint_positions"], 1.0).astype(np.float32)
-            return {"actions": opened}
+            joints = self._last_result.obs["joint_positions"]
+            at_rest = np.append(joints, OPEN_GRIPPER)
+            return {"actions": at_rest.astype(np.float32)}
         held: dict[str, Any] = repeat_last_hold(last_action, self.action_space.size)
         return held
 
@@ -191,14 +195,12 @@ class RoboIRGBenchmark(StepBenchmark):  # type: ignore[misc] # vla-eval has no t
         """Close the environment."""
         if self._env is not None:
             self._env.close()
-        self._env, self._video = None, {}
-
-    @property
-    def _has_wrist(self) -> bool:
-        return WRIST in self._cameras
+        self._env = None
+        self._video_fields = {}
 
     @property
     def _playing(self) -> RoboIRGEnv:
+        """The environment of the episode that has begun."""
         if self._env is None:
             raise RuntimeError("No episode has begun; call reset() first.")
         return self._env

@@ -1,1 +1,1 @@
-"""For authors of language 4: check scenarios, and have texts rated."""
+"""For authors of scenarios: check them, and have texts rated."""

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from roboirg.apps.language_lab.scenarios.scenario_check import SHOWN
-from roboirg.core.episode import Episode, Goal, describe_goal
+from roboirg.apps.language_lab.scenarios.scenario_check import SHOWN, length_complaint
+from roboirg.core.episode import Episode, Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.word_pools import PoolName, pool_of
 from roboirg.language.generator import request_of, spoken_instruction
-from roboirg.language.goal_fields import goal_fields
+from roboirg.language.goal_fields import goal_fields, unordered
 from roboirg.language.instruction import Instruction
-from roboirg.language.scenarios.literals import say_literal
+from roboirg.language.scenarios.literals import in_words, say_literal
 from roboirg.language.scenarios.scenario import TaskScenarios
 from roboirg.language.scenarios.scenario_file import task_scenarios
 from roboirg.language.scenarios.spoken import say_explicit
-from roboirg.language.token_counts import USUAL_LIMIT, tokens_of, tokens_shown
+from roboirg.language.token_counts import tokens_of
 from roboirg.shortcuts.command_chance import is_right, understood_goals
 from roboirg.tasks import goals_of, with_goal
 
@@ -27,74 +27,94 @@ class ExplicitReport:
     """What was found about the explicit words of a task.
 
     Attributes:
-        goals: number of goals that are stated.
+        stated: the goals that are stated.
         unstated: the goals of which the file, of whole sentences, has none.
         renderings: a few sentences.
         broken: what is wrong, each once.
         longest: the text with most tokens.
+        unused: goals of sentences that no scene can have.
     """
 
-    goals: int = 0
+    stated: set[Goal] = field(default_factory=set)
     unstated: dict[str, None] = field(default_factory=dict)
     renderings: list[str] = field(default_factory=list)
     broken: dict[str, None] = field(default_factory=dict)
     longest: str = ""
+    unused: list[str] = field(default_factory=list)
+
+    def add(self, goal: Goal, text: str) -> None:
+        """Add what is said of a goal."""
+        self.stated.add(goal)
+        self.longest = max(self.longest, text, key=tokens_of)
+        if text not in self.renderings and len(self.renderings) < SHOWN:
+            self.renderings.append(text)
 
 
 def has_explicit_words(words: TaskScenarios, task: str) -> bool:
-    """Return whether a file has explicit words of its own for a task."""
+    """Return whether a file has sentences, commands or stated values of its own for a task."""
     ours = task_scenarios(task)
     if words.literals or ours is None:
         return True
     return (words.commands, words.stated) != (ours.commands, ours.stated)
 
 
-def check_explicit(words: TaskScenarios, scenes: Iterable[Episode]) -> ExplicitReport:
+def check_explicit(words: TaskScenarios, scenes: Sequence[Episode]) -> ExplicitReport:
     """Check what is said of each goal that scenes allow, in the words of each pool."""
-    report = ExplicitReport()
-    said: set[Goal] = set()
+    report = ExplicitReport(unused=_unused_goals(words, scenes))
     for episode in _goals_once(scenes):
-        goal = describe_goal(episode.goal.as_mapping())
-        if words.literals and episode.goal not in words.literals:
-            report.unstated[goal] = None
-            continue
-        try:
-            instruction = _explicit(episode, words)
-        except InvalidValueError as error:
-            report.broken[str(error).rstrip(".")] = None
-            continue
-        text = instruction.text
-        meant = understood_goals(instruction, episode)
-        if not meant or not all(is_right(other, episode) for other in meant):
-            report.broken[f"says {text!r} of the goal {goal}, and of others or none"] = None
-        said.add(episode.goal)
-        report.longest = max(report.longest, text, key=tokens_of)
-        if text not in report.renderings and len(report.renderings) < SHOWN:
-            report.renderings.append(text)
-    report.goals = len(said)
-    longest = report.longest
-    if tokens_of(longest) > USUAL_LIMIT:
-        tokens = tokens_shown(longest)
-        report.broken[f"needs {tokens} tokens; only {USUAL_LIMIT} are heard: {longest}"] = None
-    if not said:
+        if words.literals and unordered(episode.goal) not in words.literals:
+            report.unstated[in_words(episode.goal)] = None
+        else:
+            _check_goal(report, words, episode)
+    too_long = length_complaint(report.longest)
+    if too_long:
+        report.broken[f"{too_long}: {report.longest}"] = None
+    if not report.stated:
         report.broken["states no goal of the published scenes"] = None
     return report
 
 
+def _unused_goals(words: TaskScenarios, scenes: Sequence[Episode]) -> list[str]:
+    """Return the goals of whole sentences, in words, that no scene can have."""
+    possible: set[Goal] = set()
+    for scene in scenes:
+        possible.update(map(unordered, goals_of(scene)))
+    return [in_words(goal) for goal in words.literals if goal not in possible]
+
+
+def _check_goal(report: ExplicitReport, words: TaskScenarios, episode: Episode) -> None:
+    """Check that what is said of an episode's goal means this goal, and add it to the report."""
+    try:
+        instruction = _instruction_of(words, episode)
+    except InvalidValueError as error:  # a command lacks a field
+        report.broken[str(error).rstrip(".")] = None
+        return
+    text = instruction.text
+    meant = understood_goals(instruction, episode)
+    if not meant or not all(is_right(goal, episode) for goal in meant):
+        goal = in_words(episode.goal)
+        report.broken[f"says {text!r} of the goal {goal}, and of others or none"] = None
+    report.add(episode.goal, text)
+
+
+def _instruction_of(words: TaskScenarios, episode: Episode) -> Instruction:
+    """Return the explicit instruction of an episode: a whole sentence if there are any."""
+    request = request_of(episode, InstructionOptions())
+    say = say_literal if words.literals else say_explicit
+    return spoken_instruction(request, say(request, words))
+
+
 def _goals_once(scenes: Iterable[Episode]) -> Iterable[Episode]:
-    """Return an episode for each goal and pool, of goals with as many fields as an episode's."""
+    """Return an episode for each goal and pool of the scenes.
+
+    A goal counts only where it has as many fields as the episode's own, as goals of its difficulty
+    have.
+    """
     found: dict[tuple[Goal, PoolName], Episode] = {}
-    for episode in scenes:
-        fields, pool = len(goal_fields(episode.goal)), pool_of(episode.split)
-        for goal in goals_of(episode):
-            if len(goal_fields(goal)) == fields and (goal, pool) not in found:
-                found[goal, pool] = with_goal(episode, goal)
+    for scene in scenes:
+        pool = pool_of(scene.split)
+        number = len(goal_fields(scene.goal))
+        for goal in goals_of(scene):
+            if len(goal_fields(goal)) == number and (goal, pool) not in found:
+                found[goal, pool] = with_goal(scene, goal)
     return found.values()
-
-
-def _explicit(episode: Episode, words: TaskScenarios) -> Instruction:
-    """Return what is said of an episode; raises if a command lacks a field."""
-    request = request_of(episode, InstructionOptions(language=4))
-    if words.literals:
-        return spoken_instruction(request, say_literal(request, words.literals))
-    return spoken_instruction(request, say_explicit(request, words))

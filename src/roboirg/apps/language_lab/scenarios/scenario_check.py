@@ -6,19 +6,28 @@ import functools
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import cast
 
-from roboirg.apps.language_lab.scenarios.sentence_rules import blanked, broken_sentences
+from roboirg.apps.language_lab.scenarios.leaks import find_leaks
+from roboirg.apps.language_lab.scenarios.sentence_rules import (
+    blanked,
+    broken_sentences,
+    sentences_of,
+)
 from roboirg.apps.language_lab.scenarios.text_rules import broken_text
-from roboirg.apps.language_lab.validation.episode_checks import leaking, places_of
-from roboirg.core.episode import SPLITS, Episode, describe_goal
+from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.goal_slots import MOMENTS
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
+from roboirg.core.word_pools import POOLS
 from roboirg.language.generator import request_of, spoken_instruction
-from roboirg.language.instruction import FORMS, Instruction, Mention
+from roboirg.language.instruction import FORMS, Instruction, Meaning, Mention
 from roboirg.language.meaning import field_values, meant_goals
 from roboirg.language.request import InstructionRequest
-from roboirg.language.scenarios.choice import Chosen, choose
+from roboirg.language.scenarios.choice import Chosen, choose, misfit
+from roboirg.language.scenarios.literals import in_words
 from roboirg.language.scenarios.markup import slots_in
 from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.scenario_file import written_words
@@ -27,11 +36,14 @@ from roboirg.language.settings import all_settings
 from roboirg.language.token_counts import USUAL_LIMIT, tokens_of, tokens_shown
 from roboirg.shortcuts.command_chance import goals_of_command, is_right
 from roboirg.tasks import get_task, goals_of, with_goal
-from roboirg.tasks.splits.splits import get_episode
+from roboirg.tasks.splits.splits import get_episode, split_episodes
 
 RANDOM_SCENES = 200
+"""Scenes of a task beyond the published ones."""
 SHOWN = 3
-_RANKED = ("former", "latter", "first", "second", "third", "last", "choice", "other")
+"""Texts of a scenario that its report shows."""
+_RANKED = ("former", "latter", "first", "second", "third", "other")
+"""Classes of words that choose one of a list."""
 
 
 @dataclass(slots=True)
@@ -74,15 +86,153 @@ class ScenarioReport:
 @functools.cache
 def scenes_of(task: str, random: int = RANDOM_SCENES) -> tuple[Episode, ...]:
     """Return all published episodes of a task, and random ones."""
-    return tuple(get_episode(*place) for place in places_of([task], SPLITS, random))
+    sampled = [get_episode(task, "random", index) for index in range(random)]
+    return (*split_episodes([task], SPLITS), *sampled)
 
 
 def check_scenarios(
     words: TaskScenarios, name: str | None, scenes: Sequence[Episode]
 ) -> list[ScenarioReport]:
     """Check the scenarios of a task, or only those of one frame, in scenes."""
-    chosen = [one for one in words.scenarios if name in (None, one.fields.frame)]
-    return [_checked(one, words, scenes) for one in chosen]
+    reports: list[ScenarioReport] = []
+    for scenario in words.scenarios:
+        if name in (None, scenario.fields.frame):
+            reports.append(check_scenario(scenario, words, scenes))
+    return reports
+
+
+def check_scenario(
+    scenario: Scenario, words: TaskScenarios, scenes: Sequence[Episode]
+) -> ScenarioReport:
+    """Return what is wrong with a scenario as it is written, and in what it says of scenes.
+
+    Beyond its sentences and texts: it must fit some scene, and its command alone must leave the
+    goal open in at least one of them.
+    """
+    report = ScenarioReport(scenario)
+    first = scenes[0]
+    for complaint in broken_sentences(scenario, get_task(first.task).things.pointed):
+        report.add(complaint, "")
+    for complaint in _in_both_pools(scenario, words):
+        report.add(complaint, "")
+    checker = _SceneChecker(report, words)
+    for scene in scenes:
+        checker.check(scene)
+    too_long = length_complaint(report.longest)
+    if too_long:
+        report.add(too_long, report.longest)
+
+    if not report.scenes:
+        request = request_of(first, checker.usual)
+        why = misfit(request, scenario.fields.setting, [scenario])
+        report.add(f"fits none of the scenes; in {first.key} {why}", "")
+    elif not report.open:
+        report.add("its command alone gives the goal in every scene", "")
+    return report
+
+
+def length_complaint(text: str) -> str:
+    """Return that a text has more tokens than policies read; empty if it has not."""
+    if tokens_of(text) <= USUAL_LIMIT:
+        return ""
+    return f"needs {tokens_shown(text)} tokens; only {USUAL_LIMIT} are heard"
+
+
+class _SceneChecker:
+    """Checks what a scenario says of scenes.
+
+    Args:
+        report: of the scenario, to which all that is found is added.
+        words: of the task.
+
+    Attributes:
+        usual: the options with which the scenario is said; contextual says all sentences of direct.
+    """
+
+    def __init__(self, report: ScenarioReport, words: TaskScenarios) -> None:
+        self._report = report
+        self._words = words
+        fields = report.scenario.fields
+        setting = "contextual" if fields.setting == "direct" else fields.setting
+        self.usual = InstructionOptions(setting, wordings=fields.pool)
+
+    def check(self, episode: Episode) -> None:
+        """Check what the scenario says of an episode, in every form and frame."""
+        try:
+            instruction = self._check_texts(episode, self.usual)
+            if self.usual.setting == "spatial":
+                self._check_texts(episode, replace(self.usual, frame="camera"))
+        except InvalidValueError as error:
+            complaint = f"cannot be said: {str(error).rstrip('.')}"
+            self._report.add(complaint, _with_goal(episode))
+            return
+        if instruction:
+            self._add_fit(episode, implicit=instruction[0])
+
+    def _add_fit(self, episode: Episode, implicit: Instruction) -> None:
+        """Add a scene that the scenario fits, and what it says there in the implicit form.
+
+        It must not say the same of another goal of the scene.
+        """
+        report = self._report
+        number = report.scenes
+        if len(report.renderings) < SHOWN and number % 3 == 0:  # not all from similar scenes
+            report.renderings.append(implicit.text)
+        report.fitting.append(episode.key)
+        if not all(is_right(goal, episode) for goal in goals_of_command(implicit, episode)):
+            report.open += 1
+
+        # The words of another goal of the scene must differ; which one it is changes by scene.
+        others = [goal for goal in goals_of(episode) if goal != episode.goal]
+        if others:
+            other = with_goal(episode, others[number % len(others)])
+            if self._text(other) == implicit.text:
+                report.add("says the same of another goal", implicit.text)
+
+    def _text(self, episode: Episode) -> str | None:
+        """Return what the scenario says of an episode; None if it does not fit."""
+        request = request_of(episode, self.usual)
+        chosen = self._chosen(request)
+        if chosen is None:
+            return None
+        return self._instruction_of(request, chosen).text
+
+    def _check_texts(self, episode: Episode, usual: InstructionOptions) -> list[Instruction]:
+        """Check and return what the scenario says in every form, the implicit one first.
+
+        With all remarks of contextual, if its setting has any. Nothing if it does not fit.
+        """
+        chosen = self._chosen(request_of(episode, usual))
+        if chosen is None:
+            return []
+        variants = [replace(usual, form=form) for form in FORMS]
+        if usual.setting == "contextual":
+            variants += [replace(variant, distractor="competing") for variant in variants]
+        return [self._check_text(request_of(episode, options), chosen) for options in variants]
+
+    def _check_text(self, request: InstructionRequest, chosen: Chosen) -> Instruction:
+        """Check and return what the scenario says for a request."""
+        report = self._report
+        instruction = self._instruction_of(request, chosen)
+        if request.resolved:
+            report.resolved.add(instruction.text)
+        for rule in _broken(request, chosen, instruction):
+            report.add(rule, instruction.text)
+        report.longest = max(report.longest, instruction.text, key=tokens_of)
+        if request.options.distractor == "competing" and not report.competing:
+            report.competing = instruction.text
+        return instruction
+
+    def _chosen(self, request: InstructionRequest) -> Chosen | None:
+        """Return how the scenario says an episode; None if it does not fit."""
+        if _is_refused(request):
+            return None
+        scenario = self._report.scenario
+        return choose(request, scenario.fields.setting, [scenario])
+
+    def _instruction_of(self, request: InstructionRequest, chosen: Chosen) -> Instruction:
+        """Return the instruction of the scenario."""
+        return spoken_instruction(request, say_chosen(request, self._words, chosen))
 
 
 @functools.cache
@@ -95,34 +245,44 @@ def our_scenarios() -> tuple[Scenario, ...]:
 
 
 def unserved_settings(
-    reports: Sequence[ScenarioReport], scenes: Sequence[Episode]
+    reports: Sequence[ScenarioReport], scenes: Sequence[Episode], path: Path
 ) -> Iterator[str]:
-    """Yield each setting of a user's file that has no scenario for some scenes."""
-    fitting: dict[str, set[str]] = {}
+    """Yield a complaint for each setting of a user's file that has no scenario for some scenes.
+
+    Scenes that the setting refuses anyway need none.
+    """
+    for setting, keys in _served_scenes(reports).items():
+        options = InstructionOptions(setting)
+        others = [episode for episode in scenes if episode.key not in keys]
+        lacking = [other for other in others if not _is_refused(request_of(other, options))]
+        if lacking:
+            example = lacking[0]
+            yield (
+                f"{setting} has no scenario that fits {counted(len(lacking), 'scene')}, such as "
+                f"{_with_goal(example)}, so a run refuses them; see why with `roboirg show "
+                f"{example.task} {example.index} --split {example.split} --words --wordings "
+                f"{path}`, and write one more"
+            )
+
+
+def _is_refused(request: InstructionRequest) -> bool:
+    """Return whether a setting cannot express an episode, whatever its scenarios."""
+    return all_settings()[request.options.setting].refusal(request) is not None
+
+
+def _served_scenes(reports: Sequence[ScenarioReport]) -> dict[str, set[str]]:
+    """Return the keys of the scenes that a user's scenarios fit, by setting."""
+    served: dict[str, set[str]] = {}
     for report in reports:
         fields = report.scenario.fields
         if fields.pool is None:  # those of ours are never alone
-            fitting.setdefault(fields.setting, set()).update(report.fitting)
-    for name, keys in fitting.items():
-        options = InstructionOptions(name, language=4)
-        refusal = all_settings()[name].refusal
-        lacking = [
-            episode
-            for episode in scenes
-            if episode.key not in keys and refusal(request_of(episode, options)) is None
-        ]
-        if lacking:
-            scene = lacking[0]
-            yield (
-                f"{name} has no scenario that fits {counted(len(lacking), 'scene')}, such as "
-                f"{_with_goal(scene)}; look at it with `roboirg show {scene.task} {scene.index} "
-                f"--split {scene.split}`"
-            )
+            served.setdefault(fields.setting, set()).update(report.fitting)
+    return served
 
 
 def _with_goal(episode: Episode) -> str:
     """Return the key of an episode with its goal: ``PickXtimes/train/3 (red, twice)``."""
-    return f"{episode.key} ({describe_goal(episode.goal.as_mapping())})"
+    return f"{episode.key} ({in_words(episode.goal)})"
 
 
 def _in_both_pools(scenario: Scenario, words: TaskScenarios) -> Iterator[str]:
@@ -130,148 +290,132 @@ def _in_both_pools(scenario: Scenario, words: TaskScenarios) -> Iterator[str]:
 
     A scenario of a user, which serves both pools, has no other one.
     """
-    theirs: set[str] = set()
-    for other in (*words.scenarios, *our_scenarios()):
-        pools = {other.fields.pool, scenario.fields.pool}
-        if pools == {"train", "test"}:
-            theirs.update(blanked(other))
+    if scenario.fields.pool is None:
+        return
+    (other_pool,) = set(POOLS) - {scenario.fields.pool}
+    theirs = sentences_of((*words.scenarios, *our_scenarios()), other_pool)
     for shared in sorted(theirs.intersection(blanked(scenario))):
         yield f"the other pool has {shared!r}, too"
 
 
-def _checked(
-    scenario: Scenario, words: TaskScenarios, episodes: Sequence[Episode]
-) -> ScenarioReport:
-    report = ScenarioReport(scenario)
-    pointed = get_task(episodes[0].task).commands.pointed
-    for complaint in (*broken_sentences(scenario, pointed), *_in_both_pools(scenario, words)):
-        report.add(complaint, "")
-    for episode in episodes:
-        _check_episode(report, words, episode)
-    longest = report.longest
-    if tokens_of(longest) > USUAL_LIMIT:
-        report.add(f"needs {tokens_shown(longest)} tokens; only {USUAL_LIMIT} are heard", longest)
-    if not report.scenes:
-        report.add("fits none of the scenes", "")
-    elif not report.open:
-        report.add("its command alone gives the goal in every scene", "")
-    return report
+def _broken(request: InstructionRequest, chosen: Chosen, instruction: Instruction) -> Iterator[str]:
+    """Yield the rules that a text breaks.
 
-
-def _check_episode(report: ScenarioReport, words: TaskScenarios, episode: Episode) -> None:
-    """Check what a scenario says of an episode, in every form and frame."""
-    fields = report.scenario.fields
-    name = "contextual" if fields.setting == "direct" else fields.setting
-    usual = InstructionOptions(name, language=4, wordings=fields.pool)
-    try:
-        told = _check_texts(report, words, episode, usual)
-        if fields.setting == "spatial":
-            _check_texts(report, words, episode, replace(usual, frame="camera"))
-    except (InvalidValueError, LookupError) as error:
-        report.add(f"cannot be said: {error}", _with_goal(episode))
-        return
-    if not told:
-        return
-    implicit, number = told[0], report.scenes
-    if len(report.renderings) < SHOWN and number % 3 == 0:
-        report.renderings.append(implicit.text)
-    report.fitting.append(episode.key)
-    report.open += not all(is_right(goal, episode) for goal in goals_of_command(implicit, episode))
-    others = [goal for goal in goals_of(episode) if goal != episode.goal]
-    for goal in others[number % max(1, len(others)) :][:1]:
-        request = request_of(with_goal(episode, goal), usual)
-        chosen = _chosen(request, report.scenario)
-        if chosen and _said(request, words, chosen).text == implicit.text:
-            report.add("says the same of another goal", implicit.text)
-
-
-def _check_texts(
-    report: ScenarioReport, words: TaskScenarios, episode: Episode, usual: InstructionOptions
-) -> list[Instruction]:
-    """Check and return what a scenario says in every form; nothing if it does not fit."""
-    chosen = _chosen(request_of(episode, usual), report.scenario)
-    if chosen is None:
-        return []
-    variants = [replace(usual, form=form) for form in FORMS]
-    if usual.setting == "contextual":
-        variants += [replace(variant, distractor="competing") for variant in variants]
-    told: list[Instruction] = []
-    for options in variants:
-        request = request_of(episode, options)
-        said = _said(request, words, chosen)
-        if request.resolved:
-            report.resolved.add(said.text)
-        for rule in _broken(request, chosen, said):
-            report.add(rule, said.text)
-        report.longest = max(report.longest, said.text, key=tokens_of)
-        if options.distractor == "competing":
-            report.competing = report.competing or said.text
-        told.append(said)
-    return told
-
-
-def _chosen(request: InstructionRequest, scenario: Scenario) -> Chosen | None:
-    """Return how a scenario says an episode; None if it does not fit."""
-    if all_settings()[request.options.setting].refusal(request) is not None:
-        return None
-    return choose(request, scenario.fields.setting, [scenario])
-
-
-def _said(request: InstructionRequest, words: TaskScenarios, chosen: Chosen) -> Instruction:
-    return spoken_instruction(request, say_chosen(request, words, chosen))
-
-
-def _broken(request: InstructionRequest, chosen: Chosen, told: Instruction) -> Iterator[str]:
-    """Yield the rules that a text breaks; a resolved one has to be right as a text only."""
-    yield from broken_text(told, chosen, request)
+    A resolved one, whose command names everything, only has to be right as a text.
+    """
+    yield from broken_text(instruction, chosen, request)
     if request.resolved:
         return
-    episode, meaning = request.episode, told.meaning
-    if meaning is None:
-        yield "declares no meaning"
-        return
+    yield from _wrong_meaning(request, cast("Meaning", instruction.meaning))
+    leaked = find_leaks(instruction, request.episode.goal)
+    if leaked:
+        yield f"the command gives away {', '.join(sorted(leaked))}"
+    yield from _broken_pointers(instruction, chosen.scenario)
+
+
+def _wrong_meaning(request: InstructionRequest, meaning: Meaning) -> Iterator[str]:
+    """Yield that words do not mean the goal, and for which fields they stand for other values.
+
+    They may mean several goals if each of them is right in the episode.
+    """
+    episode = request.episode
     goals = meant_goals(meaning, episode)
-    if not goals or not all(is_right(goal, episode) for goal in goals):
-        yield "means another goal, or several"
-        for value in request.goal_values:
-            found = field_values(meaning, value.field, episode)
-            if found != {value.value}:
-                words = " or ".join(sorted(map(str, found))) or "nothing"
-                yield f"say.{value.field}: means {words}, but the goal is {value.value}"
-    for _, words in leaking(told, episode):
-        yield f"the command gives away {words}"
-    yield from _broken_pointers(told, chosen.scenario)
+    if goals and all(is_right(goal, episode) for goal in goals):
+        return
+    yield "means no goal, another one, or several"
+    for value in request.goal_values:
+        found = field_values(meaning, value.field, episode)
+        if found != {value.value}:
+            words = " or ".join(sorted(map(str, found))) or "nothing that was introduced"
+            yield f"say.{value.field} must stand for the goal's value; it stands for {words}"
 
 
-def _broken_pointers(told: Instruction, scenario: Scenario) -> Iterator[str]:
-    """Yield the pointers that have no antecedent of their value, or several."""
-    listed = bool(scenario.fields.list)
-    # Of two, one is named again: it is the one that is meant next.
-    again = "taken" in slots_in(scenario.text("introduction"))
-    before: list[Mention] = []
-    ranked = again
-    for mention in told.mentions:
+def _broken_pointers(instruction: Instruction, scenario: Scenario) -> Iterator[str]:
+    """Yield what is wrong with words that point back, such as *it*.
+
+    Each needs one mention of its value before it, its antecedent: *red* before *it*. Remarks that
+    distract count as none.
+    """
+    # "Red or blue? Red is gone." names one of two again, and so says which one is meant.
+    is_named_again = "taken" in slots_in(scenario.text("introduction"))
+    has_list = bool(scenario.fields.list)
+    has_chosen = is_named_again  # whether one of the list has been chosen so far
+    antecedents: list[Mention] = []
+    for mention in instruction.mentions:
         if mention.role == "antecedent":
-            if told.utterances[mention.utterance].stage != "distractor":
-                before.append(mention)
+            if instruction.utterances[mention.utterance].stage != "distractor":
+                antecedents.append(mention)
             continue
-        words, parts = f"{told.span(mention)!r}", str(mention.value).split(" and ")
-        of_kind = [one for one in before if isinstance(one.value, int) != parts[0].isalpha()]
-        own = [one for one in of_kind if str(one.value) in parts]
-        if mention.expression in ("there", "that") and own:
-            # "That cube" was named by its color, "the one there" by its place.
-            named = told.span(own[0]) == own[0].value
-            of_kind = [one for one in of_kind if (told.span(one) == one.value) == named]
-        values = [str(one.value) for one in of_kind]
-        # Of several, and of a pair, one may be named again to say that it is gone.
-        once = len(parts) == 1 and mention.expression != "other" and not again
-        for part in parts:
-            number = values.count(part)
-            if not number:
-                yield f"{words} points at what the introduction does not name"
-            elif once and number > 1:
-                yield f"{words} has {number} antecedents {part}"
+        values = [str(other.value) for other in _of_its_kind(mention, antecedents, instruction)]
+        words = repr(instruction.span(mention))
+        yield from _wrong_antecedents(mention, words, values, is_named_again=is_named_again)
         if mention.expression in _RANKED:
-            ranked = True
-        elif len(parts) == 1 and len(set(values)) > 1 and not (listed and ranked):
-            yield f"{words} can mean {' or '.join(dict.fromkeys(values))}"
+            has_chosen = True
+        elif not (has_list and has_chosen):
+            yield from _ambiguous(mention, words, values)
+
+
+def _ambiguous(pointer: Mention, words: str, values: Sequence[str]) -> Iterator[str]:
+    """Yield that a pointer at a single value can mean several that were named before."""
+    named = list(dict.fromkeys(values))
+    if len(_parts_of(pointer)) == 1 and len(named) > 1:
+        yield f"{words} can mean {' or '.join(named)}"
+
+
+def _parts_of(mention: Mention) -> list[str]:
+    """Return the values of a mention: of ``red and blue`` both."""
+    return str(mention.value).split(" and ")
+
+
+def _wrong_antecedents(
+    pointer: Mention, words: str, values: Sequence[str], *, is_named_again: bool
+) -> Iterator[str]:
+    """Yield the values of a pointer that were not named before, or more than once.
+
+    Args:
+        pointer: words that point back.
+        words: the same, for the complaint.
+        values: of the mentions before it, of its kind.
+        is_named_again: whether one of two was named again to say that it is gone.
+    """
+    parts = _parts_of(pointer)
+    must_be_once = len(parts) == 1 and pointer.expression != "other" and not is_named_again
+    for part in parts:
+        number = values.count(part)
+        if number == 0:
+            yield f"{words} points at what the introduction does not name"
+        elif number > 1 and must_be_once:
+            yield f"{words} has {number} antecedents {part}"
+
+
+def _of_its_kind(
+    pointer: Mention, before: Sequence[Mention], instruction: Instruction
+) -> Sequence[Mention]:
+    """Return the mentions before a pointer that are of its kind: numbers, moments or colors.
+
+    For *that cube*, only those that name a color; for *the one there*, only those that name a
+    place.
+    """
+    parts = _parts_of(pointer)
+    kind = _kind_of(parts[0])
+    of_kind = [mention for mention in before if _kind_of(str(mention.value)) == kind]
+    of_value = [mention for mention in of_kind if str(mention.value) in parts]
+    if pointer.expression not in ("there", "that") or not of_value:
+        return of_kind
+    # "That cube" was named by its color, "the one there" by its place.
+    is_named = _is_named(of_value[0], instruction)
+    return [mention for mention in of_kind if _is_named(mention, instruction) == is_named]
+
+
+def _is_named(mention: Mention, instruction: Instruction) -> bool:
+    """Return whether a mention says its value; else it describes it."""
+    return instruction.span(mention) == mention.value
+
+
+def _kind_of(value: str) -> str:
+    """Return ``moment``, ``number`` or ``color``."""
+    if value in MOMENTS:
+        return "moment"
+    if value.isdecimal():
+        return "number"
+    return "color"

@@ -9,41 +9,56 @@ from roboirg.apps.language_lab.scenarios.scenario_check import ScenarioReport
 from roboirg.core.plain_text import counted
 from roboirg.language.token_counts import USUAL_LIMIT, tokens_shown
 
+_MOST_GOALS = 10
+"""Goals without a sentence that are listed."""
+
 
 def explicit_lines(report: ExplicitReport, task: str) -> Iterator[str]:
     """Yield what an author wants to know of the explicit words of a task."""
     yield f"explicit ({task})"
-    yield from (f"  {text}" for text in report.renderings)
+    for text in report.renderings:
+        yield f"  {text}"
     tokens = tokens_shown(report.longest)
-    yield f"  {tokens} of {USUAL_LIMIT} tokens; states {counted(report.goals, 'goal')}."
+    yield f"  {tokens} of {USUAL_LIMIT} tokens; states {counted(len(report.stated), 'goal')}."
+    for goal in report.unused:
+        yield f"  No scene has the goal of a sentence: {goal}"
     if report.unstated:
+        goals = "; ".join(list(report.unstated)[:_MOST_GOALS])
         yield (
-            f"  No sentence of {counted(len(report.unstated), 'goal')}, such as "
-            f"{next(iter(report.unstated))}; episodes with them cannot be played in explicit."
+            f"  No sentence of {counted(len(report.unstated), 'goal')}, such as: {goals}. Episodes "
+            "with them cannot be played in explicit."
         )
-    yield from (f"  BROKEN {rule}" for rule in report.broken)
+    for rule in report.broken:
+        yield f"  BROKEN {rule}"
     yield ""
 
 
 def report_lines(report: ScenarioReport, task: str) -> Iterator[str]:
     """Yield what an author wants to know of a scenario in a task: texts, length, broken rules."""
-    fields, fits = report.scenario.fields, report.scenes
+    fields = report.scenario.fields
     yield f"{fields.frame} ({task}, {fields.setting}, {fields.pool or 'both pools'})"
-    yield from (f"  {text}" for text in report.renderings)
+    for text in report.renderings:
+        yield f"  {text}"
     if report.competing:
         yield f"  With a competing remark: {report.competing}"
     tokens = tokens_shown(report.longest)
-    yield f"  {tokens} of {USUAL_LIMIT} tokens; fits {counted(fits, 'scene')}."
-    if report.open < fits:
+    yield f"  {tokens} of {USUAL_LIMIT} tokens; fits {counted(report.scenes, 'scene')}."
+    if report.open < report.scenes:
         yield (
-            f"  In {counted(fits - report.open, 'scene')} the command alone gives the goal, "
-            "because the scene leaves only one; this is counted, not broken."
+            f"  In {counted(report.scenes - report.open, 'scene')} the command alone gives the "
+            "goal, because the scene leaves only one; this is counted, not broken."
         )
-    for rule, number in report.broken.items():
-        example = report.examples[rule]
-        often = f" (in {counted(number, 'scene')})" if example else ""
-        yield f"  BROKEN {rule}{often}"
-        if example and example not in report.renderings:
-            mark = "resolved: " if example in report.resolved else ""
-            yield f"    {mark}{example}"
+    for rule in report.broken:
+        yield from _rule_lines(report, rule)
     yield ""
+
+
+def _rule_lines(report: ScenarioReport, rule: str) -> Iterator[str]:
+    """Yield a broken rule, with a text that breaks it and how often, if texts do."""
+    example = report.examples[rule]
+    if not example:
+        yield f"  BROKEN {rule}"
+        return
+    yield f"  BROKEN {rule} (in {counted(report.broken[rule], 'scene')})"
+    mark = "resolved: " if example in report.resolved else ""
+    yield f"    {mark}{example}"

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from roboirg.core.episode import ALL_COLORS
+from roboirg.core.word_pools import PoolName
 from roboirg.language.number_words import CARDINALS, ORDINALS
-from roboirg.language.scenarios.markup import Agreement, Pointer, Slot, Text, pointers_in
+from roboirg.language.scenarios.markup import (
+    Agreement,
+    Pointer,
+    Slot,
+    Text,
+    pointers_in,
+    slots_said,
+)
 from roboirg.language.scenarios.scenario import PEOPLE, Scenario
 
 _SLOT = r"\{[^}]*\}"
+"""A slot as `literal` writes it: ``{repeats:times}``."""
 NEVER: Mapping[str, str] = {
     r"you(?:'ve| have)? (?:just )?saw|you(?:'ve| have) (?:just )?seen|as you saw": (
         "what was seen is not checked"
@@ -74,16 +83,19 @@ _POINTED_AT = {
     "remarks.not_former": "list.0", "remarks.not_latter": "list.1",
 }  # fmt: skip
 """What a remark of direct-rival points at first."""
+_MEANT_LAST = ("placement", "relation")
+"""Slots at which *that one* points: what was named last."""
 _DESCRIBED = ("place", "clue", "rest")
 """Slots that can stand for a container itself."""
 
 
 def broken_sentences(scenario: Scenario, pointed: str) -> Iterator[str]:
-    """Yield what is wrong with the sentences of a scenario of a task.
+    """Yield what is wrong with a scenario's sentences: *lead: has the words 'red'; …*.
 
-    `pointed` is the kind of object that a place distinguishes in the task.
+    `pointed` is the kind of object at which the task's words point, ``cube`` or ``container``.
     """
     noun = pointed.removeprefix("hidden_")
+    # These depend on the task: what a place is said of, and whether the cube can be seen.
     never = {**NEVER, _PLACED.format(noun): f"a place follows {noun!r} or 'one'"}
     if pointed == "container":
         never[COVERED] = "the cube is under a container"
@@ -106,52 +118,114 @@ def _names_container(text: Text) -> bool:
 
 
 def _wrong(name: str, text: Text, never: Mapping[str, str]) -> Iterator[str]:
-    field, words = name.partition(".")[0], literal(text)
+    """Yield what is wrong with a sentence: its words, the values it names, where it points.
+
+    Args:
+        name: of its field, such as ``say.color``.
+        text: the sentence.
+        never: patterns of words that may not be said, and why.
+    """
+    field = name.partition(".")[0]
+    words = literal(text)
     for pattern, reason in never.items():
         found = re.search(rf"\b(?:{pattern})\b", words, re.IGNORECASE)
         if found:
             yield f"has the words {found[0]!r}; {reason}"
     if field in ("lead", "remarks") and not words.endswith(" "):
         yield f"must end with a space: {words!r}"
+    yield from _values_named(field, text)
+    if field == "competing":
+        yield from _rival_named_last(text)
     pointers = list(pointers_in(text))
-    if field in (*_SILENT, *_COMMAND):
-        outside = literal(tuple(part for part in text if not isinstance(part, Pointer)))
-        values = set(_VALUE.findall(outside.lower()))
-        if field in _COMMAND and pointers:  # "twice as often as that" is a relation of the table
-            values -= {"twice", "two"}
+    if field == "distractors" and pointers:
+        yield "points back; a distractor leads away"
+    if name in _POINTED_AT:
+        first = pointers[0].of if pointers else "nothing"
+        if first != _POINTED_AT[name]:
+            yield f"must first point at {_POINTED_AT[name]}, not at {first}"
+
+
+def _rival_named_last(text: Text) -> Iterator[str]:
+    """Yield where a competing remark ends with another value, which *that one* would then mean.
+
+    If *before* is meant, *not after but before* is right, and *before and not after* is wrong.
+    """
+    names: list[str] = []  # in the order of speaking
+    for part in text:
+        if isinstance(part, Pointer):
+            names.append(part.of)
+        elif isinstance(part, Slot):
+            names.append(part.name)
+    for slot in _MEANT_LAST:
+        rival = f"rival {slot}"
+        if slot in names and rival in names and names.index(slot) < names.index(rival):
+            yield f"names {{{rival}}} last, which 'that one' would mean; say it before <... {slot}>"
+
+
+def _values_named(field: str, text: Text) -> Iterator[str]:
+    """Yield what is wrong with the values that a sentence names where it may point back only.
+
+    In a lead, neither *red* may be said nor ``{color}``; in ``say``, counts may.
+    """
+    if field in _SILENT or field in _COMMAND:
+        values = _values_in_words(field, text)
         if values:
             yield f"names {', '.join(sorted(values))}, which could be a value"
     if field not in ("introduction", "competing", "resolved"):
-        said = {part.name for part in text if isinstance(part, Slot)} - _FREE_SLOTS
+        slots = {slot.name for slot in slots_said(text)} - _FREE_SLOTS
         if field == "say":
-            said -= _COUNTS
-        if said:
-            yield f"says {{{', '.join(sorted(said))}}}; a value may only be pointed at there"
-    if field == "distractors" and pointers:
-        yield "points back; a distractor leads away"
-    wanted, first = _POINTED_AT.get(name), pointers[0].of if pointers else "nothing"
-    if wanted and first != wanted:
-        yield f"must first point at {wanted}, not at {first}"
+            slots -= _COUNTS
+        if slots:
+            yield f"says {{{', '.join(sorted(slots))}}}; a value may only be pointed at there"
+
+
+def _values_in_words(field: str, text: Text) -> set[str]:
+    """Return words that could be a value, *two* or *left*, outside of a sentence's pointers."""
+    outside = tuple(part for part in text if not isinstance(part, Pointer))
+    values = set(_VALUE.findall(literal(outside).lower()))
+    if field in _COMMAND and any(pointers_in(text)):
+        values -= {"twice", "two"}  # "twice as often as that" is a relation of the table
+    return values
 
 
 def blanked(scenario: Scenario) -> Iterator[str]:
-    """Yield the frame, and the sentences with their slots blanked, but those of the command."""
+    """Yield the frame of a scenario, and its sentences in small letters with ``_`` for slots.
+
+    Those of the command are left out, and so are fragments of two words or fewer.
+    """
     yield f"frame {scenario.fields.frame}"
     for name, texts in scenario.texts.items():
-        if not name.startswith(("say", "resolved")):
-            found = [re.sub(_SLOT, "_", literal(text)).lower().strip() for text in texts]
+        if name.startswith(("say", "resolved")):
+            continue
+        for text in texts:
+            words = re.sub(_SLOT, "_", literal(text)).lower().strip()
             # "So ..." is no sentence.
-            yield from (words for words in found if len(words.split()) > 2)  # noqa: PLR2004
+            if len(words.split()) > 2:  # noqa: PLR2004
+                yield words
+
+
+def sentences_of(scenarios: Iterable[Scenario], pool: PoolName) -> set[str]:
+    """Return the frames of a pool and its sentences with their slots blanked."""
+    found: set[str] = set()
+    for scenario in scenarios:
+        if scenario.fields.pool == pool:
+            found.update(blanked(scenario))
+    return found
 
 
 def literal(text: Text) -> str:
-    """Return the words with the slots and their forms: ``Put it on {repeats:times}.``."""
+    """Return the words of a sentence as they are written, without the classes of pointers.
+
+    ``Lift <it color: it> {repeats:times}.`` becomes ``Lift it {repeats:times}.``; ``lap`` and
+    ``laps`` of an agreement both stand there.
+    """
     words = []
     for part in text:
         if isinstance(part, Pointer):
             words.append(literal(part.parts))
         elif isinstance(part, Agreement):
-            words.append(" ".join(filter(None, (part.one, part.many))))
+            both = [form for form in (part.one, part.many) if form]
+            words.append(" ".join(both))
         elif isinstance(part, Slot):
             words.append(f"{{{part.name}:{part.form}}}")
         else:

@@ -26,6 +26,7 @@ _SINGULAR = (
     "is|was|has|isn't|wasn't|hasn't|doesn't|does|goes|gets|needs|takes|wants|says|comes|looks|likes"
 )
 """Verbs of a single thing or person."""
+_SIDE = "(?:the|your) (?:far )?(?:left|right)"
 _TIME = r"\b(?:now|start\w*|began|begin\w*|was|were|at first)\b"
 
 GRAMMAR: Patterns = {
@@ -56,7 +57,7 @@ GRAMMAR: Patterns = {
         "heard as where it goes; the verb is 'pick up' or 'move'"
     ),
     r"\b(?:one|cube|container) over there\b": "people say 'there' alone",
-    r"\b(?i:on) the target (?:on|right then|then|that time)\b": (
+    rf"\b(?i:on) the target (?:on(?! {_SIDE})|right then|then|that time)\b": (
         "what points back must not follow 'on the target'"
     ),
 }
@@ -68,8 +69,10 @@ MENTIONED: Patterns = {
     r"(?s)^(?!.*(?:cube|container|one) <None).*the one <there": "name the thing, 'the cube there'",
 }
 """Of the words with their mentions marked, ``<that 3:that many times>``, class and value first."""
-MOVED: Patterns = {rf"(?s)^(?!.*{_TIME}).*<there": "things change places; say when they are there"}
-"""The same where things change places."""
+MOVED: Patterns = {
+    rf"(?s)^(?!.*{_TIME}).*<there (?!before|after)": "things change places; say when they are there"
+}
+"""The same where things change places; what is put on the target of a moment moves with it."""
 OF_LISTS: Mapping[int, Patterns] = {
     1: {r"<(?:former|latter|first|second|third|other) \w+:[^>]*>": "the list has one value"},
     3: {r"<(?:former|latter|other) \w+:[^>]*>": "the list has three values"},
@@ -77,29 +80,36 @@ OF_LISTS: Mapping[int, Patterns] = {
 """The same by the length of the list; the others are right for two."""
 
 
-def broken_text(told: Instruction, chosen: Chosen, request: InstructionRequest) -> Iterator[str]:
-    """Yield the rules that a text breaks as a text, in any form."""
-    plain, marked = "\n".join(told.turns), _marked(told)
+def broken_text(
+    instruction: Instruction, chosen: Chosen, request: InstructionRequest
+) -> Iterator[str]:
+    """Yield the rules that a text breaks as a text, in any form: *says 'a apple'; 'an' is right*.
+
+    Which rules there are depends on the length of the list that it names, and on whether things
+    change places in the scene.
+    """
+    yield from _found(GRAMMAR, "\n".join(instruction.turns))
     patterns = dict(MENTIONED)
-    patterns |= OF_LISTS.get(len(chosen.introduced.values.get("list", ())), {})
+    length = len(chosen.introduced.values.get("list", ()))
+    patterns |= OF_LISTS.get(length, {})
     if request.episode.scene.motions_of(Swap):
         patterns |= MOVED
-    yield from _found(GRAMMAR, plain)
-    yield from _found(patterns, marked)
+    yield from _found(patterns, _marked(instruction))
 
 
 def _found(patterns: Patterns, text: str) -> Iterator[str]:
+    """Yield a complaint for each pattern of wrong words that a text has, with the reason."""
     for pattern, reason in patterns.items():
         found = re.search(pattern, text)
         if found:
             yield f"says {found[0]!r}; {reason}"
 
 
-def _marked(told: Instruction) -> str:
+def _marked(instruction: Instruction) -> str:
     """Return the utterances with their mentions marked: ``Lift <it red:it>.``."""
-    turns = list(told.turns)
-    for mention in reversed(told.mentions):
-        turn, words = turns[mention.utterance], told.span(mention)
-        marked = f"<{mention.expression} {mention.value}:{words}>"
+    turns = list(instruction.turns)
+    for mention in reversed(instruction.mentions):  # the last first, so that places before it stay
+        turn = turns[mention.utterance]
+        marked = f"<{mention.expression} {mention.value}:{instruction.span(mention)}>"
         turns[mention.utterance] = turn[: mention.start] + marked + turn[mention.end :]
     return "\n".join(turns)

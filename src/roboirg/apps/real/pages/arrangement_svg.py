@@ -12,7 +12,8 @@ from roboirg.apps.real.study.arrangement_shapes import (
 )
 from roboirg.core.episode import Scene
 
-NEAREST, FARTHEST = 0.35, 0.85
+NEAREST = 0.35
+FARTHEST = 0.85
 """Extent of the picture along x, m."""
 HALF_WIDTH = 0.3
 """Half the extent of the picture along y, m."""
@@ -21,29 +22,34 @@ SCALE = 1000.0
 FONT_SIZE = 26.0
 ROBOT_ROW = 60.0
 """Height below the table for the robot."""
+MARGIN = 12
+"""From the words in the corners to the edge."""
 INK = "#222222"
-_ELEMENTS = {"square": "rect", "ring": "circle", "disc": "circle"}
+HOLE_FILL = "#ffffffc0"
 INTRODUCTION = "The table from above, the robot at the bottom."
 
 
 def draw_svg(scene: Scene) -> str:
     """Return the picture; its title describes it in words."""
-    width, height = 2 * HALF_WIDTH * SCALE, (FARTHEST - NEAREST) * SCALE + ROBOT_ROW
-    shapes, description = scene_shapes(scene), "; ".join(describe_positions(scene))
-    middle, bottom = width / 2, height - 12
-    parts = [
+    width = 2 * HALF_WIDTH * SCALE
+    table = (FARTHEST - NEAREST) * SCALE
+    height = table + ROBOT_ROW
+    shapes = scene_shapes(scene)
+    description = "; ".join(describe_positions(scene))
+    lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}"',
         'role="img">',
         f"<title>{INTRODUCTION} {escape(description)}.</title>",
-        f'<rect width="{width:g}" height="{height - ROBOT_ROW:g}" fill="#f4f1ea" stroke="{INK}"/>',
-        *(_draw(shape) for shape in shapes),
-        *(_label(shape) for shape in shapes),
-        _text("left", 12, bottom, "start"),
-        _text("▲ robot", middle, bottom, "middle"),
-        _text("right", width - 12, bottom, "end"),
-        "</svg>",
+        f'<rect width="{width:g}" height="{table:g}" fill="#f4f1ea" stroke="{INK}"/>',
     ]
-    return "\n".join(parts)
+    lines += [_draw(shape) for shape in shapes]
+    lines += [_label(shape) for shape in shapes]
+    bottom = height - MARGIN
+    lines.append(_text("left", MARGIN, bottom, "start"))
+    lines.append(_text("▲ robot", width / 2, bottom, "middle"))
+    lines.append(_text("right", width - MARGIN, bottom, "end"))
+    lines.append("</svg>")
+    return "\n".join(lines)
 
 
 def _to_svg(x: float, y: float) -> tuple[float, float]:
@@ -52,22 +58,30 @@ def _to_svg(x: float, y: float) -> tuple[float, float]:
 
 
 def _draw(shape: Shape) -> str:
+    """Return a shape at its place, with its hole above it."""
     x, y = _to_svg(shape.x, shape.y)
-    drawn = ""
-    for half, fill in ((shape.half, shape.fill), (shape.hole, "#ffffffc0")):
-        side = half * SCALE
-        size = f'r="{side:.1f}"'
-        if shape.form == "square":
-            size = f'x="{-side:.1f}" y="{-side:.1f}" width="{2 * side:.1f}" height="{2 * side:.1f}"'
-        drawn += f'<{_ELEMENTS[shape.form]} {size} fill="{fill}"/>'
+    outer = _outline(shape, shape.half, shape.fill)
+    hole = _outline(shape, shape.hole, HOLE_FILL)
     # Counter-clockwise seen from above, and so is the picture.
     turn = f"translate({x:.1f} {y:.1f}) rotate({-math.degrees(shape.yaw):.1f})"
-    return f'<g transform="{turn}" stroke="{INK}">{drawn}</g>'
+    return f'<g transform="{turn}" stroke="{INK}">{outer}{hole}</g>'
+
+
+def _outline(shape: Shape, half: float, fill: str) -> str:
+    """Return a square or circle around the origin; `half` is half its size, m."""
+    length = half * SCALE
+    if shape.form == "square":
+        size = f'width="{2 * length:.1f}" height="{2 * length:.1f}"'
+        return f'<rect x="{-length:.1f}" y="{-length:.1f}" {size} fill="{fill}"/>'
+    return f'<circle r="{length:.1f}" fill="{fill}"/>'
 
 
 def _label(shape: Shape) -> str:
+    """Return the name of an object, below the shape however it is turned."""
     x, y = _to_svg(shape.x, shape.y)
-    reach = shape.half * (math.sqrt(2.0) if shape.form == "square" else 1.0) * SCALE
+    reach = shape.half * SCALE
+    if shape.form == "square":
+        reach *= math.sqrt(2.0)
     return _text(shape.label, x, y + reach + FONT_SIZE, "middle")
 
 

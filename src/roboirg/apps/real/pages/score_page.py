@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections import Counter
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from roboirg.apps.real.pages.arrangement_svg import draw_svg
@@ -11,14 +11,15 @@ from roboirg.apps.real.study.arrangement_shapes import describe_positions
 from roboirg.apps.real.study.failure_choices import failure_choices
 from roboirg.apps.real.study.study_plan import PlannedTrial
 from roboirg.apps.real.study.trial_log import SUCCESS, VOID_CHOICE, TrialLog, trial_metadata
-from roboirg.evaluation.records.record import Record
+from roboirg.records.record import Record
 from roboirg.util.web.page_templates import template_environment
 
 if TYPE_CHECKING:
     import jinja2
 
 TEMPLATE = "score.html.j2"
-SUCCESS_KEY, VOID_KEY = "s", "v"
+SUCCESS_KEY = "s"
+VOID_KEY = "v"
 
 
 class VerdictButton(NamedTuple):
@@ -48,59 +49,55 @@ def render_trial(trial_log: TrialLog, trial: PlannedTrial, *, nonce: str, messag
         nonce: allows the page's own style and script.
         message: result of the last click.
     """
-    names = [one.name for one in trial_log.plan.trials]
+    names = [planned.name for planned in trial_log.plan.trials]
     index = names.index(trial.name)
     record = trial_log.newest(trial.name)
-    states = Counter(trial_log.state(name) for name in names)
     metadata = trial_metadata(record) if record else {}
+    unscored = [name for name in names if trial_log.state(name) == "open"]
+    state = trial_log.state(trial.name)
     return _template().render(
         trial=trial.name,
         block=trial.block,
         position=index + 1,
         total=len(names),
-        scored=states["scored"] + states["void"],
-        previous=names[index - 1] if index else "",
-        following=names[index + 1] if index + 1 < len(names) else "",
+        scored=len(names) - len(unscored),
+        previous=_name_at(names, index - 1),
+        following=_name_at(names, index + 1),
         turns=trial.turns,
         meaning=trial.meaning,
         positions=describe_positions(trial.episode.scene),
         drawing=draw_svg(trial.episode.scene),
-        buttons=verdict_buttons(trial, record, trial_log.state(trial.name)),
-        state=trial_log.state(trial.name),
+        buttons=verdict_buttons(trial, record, state),
+        state=state,
         note=metadata.get("note", ""),
-        video=(record.video or "") if record else "",
+        video=record.video if record and record.video else "",
         revision=trial_log.revision(trial.name),
         nonce=nonce,
         message=message,
     )
 
 
+def _name_at(names: Sequence[str], index: int) -> str:
+    """Return the name of a trial; empty before the first and after the last."""
+    return names[index] if 0 <= index < len(names) else ""
+
+
 def verdict_buttons(
     trial: PlannedTrial, record: Record | None, state: str
 ) -> tuple[VerdictButton, ...]:
     """Return a button for every verdict of a trial, with its key."""
-    choices = failure_choices(trial.episode)
     chosen = _present_choice(trial, record, state)
-    failures = (
-        VerdictButton(
-            one.key,
-            str(number),
-            f"the robot {one.words}",
-            one.attribution().kind,
-            one.key == chosen,
-        )
-        for number, one in enumerate(choices, 1)
-    )
-    return (
-        VerdictButton(
-            SUCCESS, SUCCESS_KEY, "the robot did what was meant", SUCCESS, chosen == SUCCESS
-        ),
-        *failures,
-        VerdictButton(
-            VOID_CHOICE, VOID_KEY, "void: says nothing about the policy; play the trial again",
-            VOID_CHOICE, chosen == VOID_CHOICE,
-        ),
-    )  # fmt: skip
+    done = "the robot did what was meant"
+    buttons = [VerdictButton(SUCCESS, SUCCESS_KEY, done, SUCCESS, chosen == SUCCESS)]
+    for number, failure in enumerate(failure_choices(trial.episode), 1):
+        label = f"the robot {failure.words}"
+        group = failure.attribution().kind
+        is_chosen = failure.key == chosen
+        buttons.append(VerdictButton(failure.key, str(number), label, group, is_chosen))
+    void = "void: says nothing about the policy; play the trial again"
+    is_void = chosen == VOID_CHOICE
+    buttons.append(VerdictButton(VOID_CHOICE, VOID_KEY, void, VOID_CHOICE, is_void))
+    return tuple(buttons)
 
 
 def _present_choice(trial: PlannedTrial, record: Record | None, state: str) -> str:
@@ -109,12 +106,12 @@ def _present_choice(trial: PlannedTrial, record: Record | None, state: str) -> s
         return ""
     if state == "void":
         return VOID_CHOICE
-    found = record.attribution
-    if found is None:
+    attribution = record.attribution
+    if attribution is None:
         return SUCCESS
-    for one in failure_choices(trial.episode):
-        if (one.failure, one.subject) == (found.failure, found.subject):
-            return one.key
+    for choice in failure_choices(trial.episode):
+        if choice.failure == attribution.failure and choice.subject == attribution.subject:
+            return choice.key
     return ""
 
 

@@ -42,7 +42,9 @@ class ScoreServer(KeyedPageServer):
 
     def __init__(self, plan: StudyPlan, folder: Path, operator: str, port: int = 0) -> None:
         check_page_support("The page")
-        self.plan, self.folder, self.operator = plan, folder, operator
+        self.plan = plan
+        self.folder = folder
+        self.operator = operator
         self._writing = threading.Lock()
         routes = [
             Route("/", self._page),
@@ -70,22 +72,27 @@ class ScoreServer(KeyedPageServer):
                     f"{trial.name} has changed since this page was loaded; nothing was stored. "
                     "Check it again."
                 )
-            video, warning = self._find_video(form.get("video", "").strip())
-            note = " ".join(form.get("note", "").split())
+            name = form.get("video", "").strip()
+            video = self._find_video(name)
             record = trial_log.score(
-                trial, form.get("choice", ""), operator=self.operator, note=note, video=video
+                trial,
+                form.get("choice", ""),
+                operator=self.operator,
+                note=" ".join(form.get("note", "").split()),
+                video=video,
             )
-        return f"Stored for {trial.name}: {record.cause or 'success'}{warning}"
+        message = f"Stored for {trial.name}: {record.cause or 'success'}"
+        if name and not video:  # the verdict counts anyway
+            message += f" (without a video: the study's folder has no file {name!r})"
+        return message
 
-    def _find_video(self, name: str) -> tuple[str, str]:
-        """Return a video's path, or a warning if it does not exist; the verdict counts anyway."""
-        if not name:
-            return "", ""
+    def _find_video(self, name: str) -> str:
+        """Return the path of a video in the folder; empty if it does not exist there."""
         path = PurePosixPath(name)
-        inside = not path.is_absolute() and ".." not in path.parts
-        if inside and (self.folder / path).is_file():
-            return path.as_posix(), ""
-        return "", f" (without a video: the study's folder has no file {name!r})"
+        is_inside = not path.is_absolute() and ".." not in path.parts
+        if is_inside and (self.folder / path).is_file():
+            return path.as_posix()
+        return ""
 
     def _page(self, request: Request) -> Response:
         trial_log = self.read_trial_log()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from html import escape
 
@@ -36,24 +36,33 @@ svg { float: left; height: 60mm; margin-right: 6mm; }
 
 def sheet_text(plan: StudyPlan) -> str:
     """Return the page: each block and the demonstrations begin on paper of their own."""
-    numbers = itertools.count(1)
-    blocks = [
-        (f"Block {block}: {task}", _block([*trials], numbers))
-        for (block, task), trials in itertools.groupby(
-            plan.trials, key=lambda trial: (trial.block, trial.job.task)
-        )
-    ]
+    page = _HEAD
+    number = 1
+    for block, trials in _by_block(plan).items():
+        title = f"Block {block}: {trials[0].job.task}"
+        page += _section(plan, title, _block(trials, number))
+        number += len(trials)
     if plan.demonstrations:
-        blocks.append(("Demonstrations", map(_demonstration, plan.demonstrations)))
-    sections = (
-        f"<section><h1>{title} <small>plan {plan.fingerprint}</small></h1>\n"
-        f"{''.join(content)}</section>\n"
-        for title, content in blocks
-    )
-    return _HEAD + "".join(sections)
+        demonstrations = [_demonstration(planned) for planned in plan.demonstrations]
+        page += _section(plan, "Demonstrations", demonstrations)
+    return page
 
 
-def _block(trials: list[PlannedTrial], numbers: Iterator[int]) -> Iterator[str]:
+def _by_block(plan: StudyPlan) -> dict[int, list[PlannedTrial]]:
+    """Return the trials of each block, all of one task, in order."""
+    blocks: dict[int, list[PlannedTrial]] = {}
+    for trial in plan.trials:
+        blocks.setdefault(trial.block, []).append(trial)
+    return blocks
+
+
+def _section(plan: StudyPlan, title: str, content: Iterable[str]) -> str:
+    """Return what is on paper of its own."""
+    head = f"<h1>{title} <small>plan {plan.fingerprint}</small></h1>"
+    return f"<section>{head}\n{''.join(content)}</section>\n"
+
+
+def _block(trials: list[PlannedTrial], first_number: int) -> Iterator[str]:
     """Yield what is to be arranged and meant in all trials of a block, and each trial."""
     first = trials[0]
     yield (
@@ -64,30 +73,40 @@ def _block(trials: list[PlannedTrial], numbers: Iterator[int]) -> Iterator[str]:
         "<p>Arrange the table again before each trial. Say the whole instruction as printed, then "
         "start.</p>\n"
     )
-    for trial in trials:
-        boxes = " ".join(f"{BOX}&nbsp;{escape(word)} &nbsp;" for word in _verdicts(trial))
+    for number, trial in enumerate(trials, first_number):
+        boxes = [f"{BOX}&nbsp;{escape(word)} &nbsp;" for word in _verdicts(trial)]
         yield (
-            f"<article><h2>{next(numbers)}. {trial.name}</h2>\n"
-            f"{_listed(trial.turns)}<p>{boxes}</p>\n"
+            f"<article><h2>{number}. {trial.name}</h2>\n"
+            f"{_listed(trial.turns)}<p>{' '.join(boxes)}</p>\n"
             "<p>note ______________________________ video ____________</p></article>\n"
         )
 
 
 def _verdicts(trial: PlannedTrial) -> list[str]:
-    """Return the labels to tick; a failure that occurs several times names its object."""
+    """Return the labels to tick; a failure that occurs several times names its object.
+
+    Example: ``wrong_place:box_green`` becomes ``wrong place: box green``.
+    """
     choices = failure_choices(trial.episode)
-    names = [one.failure for one in choices]
-    labels = [one.failure if names.count(one.failure) == 1 else one.key for one in choices]
-    return ["success", *(word.replace("_", " ").replace(":", ": ") for word in labels), "void"]
+    counts = Counter(choice.failure for choice in choices)
+    labels = ["success"]
+    for choice in choices:
+        label = choice.failure if counts[choice.failure] == 1 else choice.key
+        labels.append(label.replace("_", " ").replace(":", ": "))
+    labels.append("void")
+    return labels
 
 
-def _demonstration(one: PlannedDemonstration) -> str:
+def _demonstration(planned: PlannedDemonstration) -> str:
+    """Return what is to be arranged and said for a demonstration, and two boxes."""
+    scene = planned.episode.scene
     return (
-        f"<article><h2>{one.name}</h2>\n{draw_svg(one.episode.scene)}\n"
-        f"{_listed(one.turns)}{_listed(describe_positions(one.episode.scene))}"
+        f"<article><h2>{planned.name}</h2>\n{draw_svg(scene)}\n"
+        f"{_listed(planned.turns)}{_listed(describe_positions(scene))}"
         f"<p>{BOX}&nbsp;recorded &nbsp; {BOX}&nbsp;discarded</p></article>\n"
     )
 
 
 def _listed(lines: Iterable[str]) -> str:
-    return f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in lines)}</ul>\n"
+    items = [f"<li>{escape(line)}</li>" for line in lines]
+    return f"<ul>{''.join(items)}</ul>\n"

@@ -15,6 +15,9 @@ FILLS = {"green": "#3a9d5d", "purple": "#8a5fb5", "yellow": "#f2c230", "gray": "
 TARGET_FILL = "#d9482b"
 
 
+Form = Literal["square", "ring", "disc"]
+
+
 class Shape(NamedTuple):
     """The shape of one object.
 
@@ -29,7 +32,7 @@ class Shape(NamedTuple):
         label: name of the object, so that color is not the only clue.
     """
 
-    form: Literal["square", "ring", "disc"]
+    form: Form
     x: float
     y: float
     yaw: float
@@ -46,21 +49,36 @@ def scene_shapes(scene: Scene) -> tuple[Shape, ...]:
 
 def describe_positions(scene: Scene) -> tuple[str, ...]:
     """Return the name and position of each object in words, to measure with a tape."""
-    return tuple(
-        f"{one.label}: {100 * one.x:.0f} cm forward, {100 * abs(one.y):.0f} cm "
-        f"{'left' if one.y >= 0 else 'right'}"
-        for one in scene_shapes(scene)
-    )
+    return tuple(_position_in_words(shape) for shape in scene_shapes(scene))
+
+
+def _position_in_words(shape: Shape) -> str:
+    """Return for example ``green box: 45 cm forward, 10 cm left``."""
+    side = "left" if shape.y >= 0 else "right"
+    forward = f"{100 * shape.x:.0f} cm forward"
+    return f"{shape.label}: {forward}, {100 * abs(shape.y):.0f} cm {side}"
 
 
 def _shape(item: SceneObject) -> Shape:
-    x, y = item.position.x - ROBOT_BASE[0], item.position.y - ROBOT_BASE[1]
+    """Return the shape of an object; what is neither box nor tape is a target on the table."""
+    form, half, hole = _outline(item)
+    is_target = form == "disc"
+    return Shape(
+        form=form,
+        x=item.position.x - ROBOT_BASE[0],
+        y=item.position.y - ROBOT_BASE[1],
+        yaw=item.yaw,
+        half=half,
+        hole=hole,
+        fill=TARGET_FILL if is_target else FILLS[str(item.color)],
+        label=item.name if is_target else f"{item.color} {item.kind}",
+    )
+
+
+def _outline(item: SceneObject) -> tuple[Form, float, float]:
+    """Return form, half and hole of an object's shape."""
     if item.kind == "box":
-        half, hole = object_sizes.BOX_HALF, object_sizes.BOX_HALF - object_sizes.BOX_WALL
-        fill = FILLS[str(item.color)]
-        return Shape("square", x, y, item.yaw, half, hole, fill, f"{item.color} box")
+        return "square", object_sizes.BOX_HALF, object_sizes.BOX_HALF - object_sizes.BOX_WALL
     if item.kind == "tape":
-        fill, label = FILLS[str(item.color)], f"{item.color} tape"
-        radius, hole = object_sizes.TAPE_RADIUS, object_sizes.TAPE_HOLE_RADIUS
-        return Shape("ring", x, y, item.yaw, radius, hole, fill, label)
-    return Shape("disc", x, y, item.yaw, float(item.radius or 0.0), 0.0, TARGET_FILL, item.name)
+        return "ring", object_sizes.TAPE_RADIUS, object_sizes.TAPE_HOLE_RADIUS
+    return "disc", float(item.radius or 0.0), 0.0

@@ -6,7 +6,6 @@ The choice depends on the tasks and the split only, not on a seed.
 from __future__ import annotations
 
 from collections import defaultdict
-from itertools import product
 from typing import NamedTuple, cast
 
 from roboirg.core.episode import Color, Episode, ObjectKind
@@ -49,14 +48,15 @@ def target_kind(task: str) -> ObjectKind:
         raise InvalidValueError(
             f"{found.name} is not a task for a real robot; those are in the suite {REAL_SUITE!r}."
         )
-    return found.commands.thing
+    return found.things.handled
 
 
 def read_arrangement(episode: Episode) -> Arrangement:
     """Return the factors of an episode of a real robot's task."""
     goal = episode.goal.as_mapping()
     left, _ = left_to_right(episode.scene, target_kind(episode.task))
-    return _arrangement(cast("Color", goal["color"]), left, goal.get("repeats"))
+    repeats = goal.get("repeats")
+    return Arrangement(cast("Color", goal["color"]), left, cast("int | None", repeats))
 
 
 def counterbalanced_order(task: str) -> tuple[Arrangement, ...]:
@@ -68,17 +68,22 @@ def counterbalanced_order(task: str) -> tuple[Arrangement, ...]:
     only two of the three can be even.)
     """
     episode = get_episode(task, "train", 0)
-    colors = left_to_right(episode.scene, target_kind(task))
-    first, second = sorted(colors)
-    goals = goals_of(episode)
-    numbers = sorted({goal.as_mapping().get("repeats") for goal in goals}, key=str)
+    first, second = sorted(left_to_right(episode.scene, target_kind(task)))
+    numbers = _numbers(episode)
     ordered: list[Arrangement] = []
     # A number has an opposite only where there are two.
-    for number, left in product(range(len(numbers)), (first, second)):
-        opposite = numbers[len(numbers) - 1 - number]
-        ordered.append(_arrangement(first, left, numbers[number]))
-        ordered.append(_arrangement(second, second if left == first else first, opposite))
+    for number, opposite in zip(numbers, reversed(numbers), strict=True):
+        ordered.append(Arrangement(first, first, number))
+        ordered.append(Arrangement(second, second, opposite))
+        ordered.append(Arrangement(first, second, number))
+        ordered.append(Arrangement(second, first, opposite))
     return tuple(ordered)
+
+
+def _numbers(episode: Episode) -> list[int | None]:
+    """Return the numbers of times that goals of a scene have; only None without a number."""
+    numbers = {goal.as_mapping().get("repeats") for goal in goals_of(episode)}
+    return cast("list[int | None]", sorted(numbers, key=str))
 
 
 def counterbalanced_episodes(task: str, split: str, count: int) -> tuple[int, ...]:
@@ -96,23 +101,21 @@ def counterbalanced_episodes(task: str, split: str, count: int) -> tuple[int, ..
     available = _by_arrangement(task, split)
     chosen: list[int] = []
     for number in range(count):
-        arrangement, repetition = order[number % len(order)], number // len(order)
-        if repetition >= len(available[arrangement]):
+        repetition, place = divmod(number, len(order))
+        episodes = available[order[place]]
+        if repetition >= len(episodes):
             raise InvalidValueError(
                 f"{count} balanced arrangements of {task} are too many for the split {split!r}; at "
                 f"most {len(chosen)}."
             )
-        chosen.append(available[arrangement][repetition])
+        chosen.append(episodes[repetition])
     return tuple(chosen)
-
-
-def _arrangement(color: Color, left: Color, repeats: object) -> Arrangement:
-    return Arrangement(color, left, repeats if isinstance(repeats, int) else None)
 
 
 def _by_arrangement(task: str, split: str) -> dict[Arrangement, list[int]]:
     """Return the indices of a split's episodes with each arrangement, in order."""
     found: dict[Arrangement, list[int]] = defaultdict(list)
     for index in range(SIZES[check_fixed_split(split)]):
-        found[read_arrangement(get_episode(task, split, index))].append(index)
+        arrangement = read_arrangement(get_episode(task, split, index))
+        found[arrangement].append(index)
     return found

@@ -7,8 +7,8 @@ from typing import NamedTuple
 from roboirg.core.conditions import Rule, facts_of
 from roboirg.core.episode import Episode
 from roboirg.core.failures import FailureName
-from roboirg.evaluation.records.record import Attribution
 from roboirg.judging.failure_attribution import FailureAttribution
+from roboirg.records.record import Attribution
 
 OTHER_WORDS: tuple[tuple[FailureName, str], ...] = (
     ("missed_grasp", "reached the right object but did not lift it"),
@@ -41,22 +41,33 @@ class FailureChoice(NamedTuple):
         Args:
             note: the operator's own words.
         """
-        words = f"the robot {self.words}" + (f" ({note})" if note else "")
-        found = FailureAttribution.of(self.failure, self.subject, 0, words)._asdict()
-        return Attribution(**{**found, "step": None})
+        words = f"the robot {self.words}"
+        if note:
+            words += f" ({note})"
+        fields = FailureAttribution.of(self.failure, self.subject, 0, words)._asdict()
+        fields["step"] = None
+        return Attribution(**fields)
 
 
 def failure_choices(episode: Episode) -> tuple[FailureChoice, ...]:
     """Return the failures of a trial: grounding failures by the task's rules, then the others."""
-    rules = dict.fromkeys(
-        rule for stage in episode.stages for rule in stage.forbids if isinstance(rule, Rule)
-    )
-    grounding = []
-    for rule in rules:
+    choices = []
+    for rule in _rules_of(episode):
         if rule.failure is not None:
             # As in simulation: the subject is the object that was handled, and the words its place.
             fact = facts_of(rule)[0]
             key = f"{rule.failure}:{fact.place or fact.subject}"
-            grounding.append(FailureChoice(key, rule.failure, fact.subject, rule.cause))
-    execution = [FailureChoice(name, name, None, words) for name, words in OTHER_WORDS]
-    return (*grounding, *execution)
+            choices.append(FailureChoice(key, rule.failure, fact.subject, rule.cause))
+    for name, words in OTHER_WORDS:
+        choices.append(FailureChoice(name, name, None, words))
+    return tuple(choices)
+
+
+def _rules_of(episode: Episode) -> list[Rule]:
+    """Return the rules that stages forbid to break, each once."""
+    found: dict[Rule, None] = {}
+    for stage in episode.stages:
+        for condition in stage.forbids:
+            if isinstance(condition, Rule):
+                found[condition] = None
+    return list(found)

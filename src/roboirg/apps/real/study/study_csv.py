@@ -7,7 +7,8 @@ from roboirg.apps.real.study.counterbalancing import read_arrangement
 from roboirg.apps.real.study.study_plan import PlannedDemonstration, PlannedTrial, StudyPlan
 from roboirg.util.csv_text import csv_text
 
-TRIALS_FILE, DEMONSTRATIONS_FILE = "trials.csv", "demonstrations.csv"
+TRIALS_FILE = "trials.csv"
+DEMONSTRATIONS_FILE = "demonstrations.csv"
 
 
 def trials_csv(plan: StudyPlan) -> str:
@@ -33,17 +34,18 @@ def demonstrations_csv(plan: StudyPlan) -> str:
     return csv_text(
         {
             "position": number,
-            "demonstration": one.name,
-            "task": one.task,
-            "split": one.episode.split,
-            "episode": one.number,
-            **_common_columns(one),
+            "demonstration": demonstration.name,
+            "task": demonstration.task,
+            "split": demonstration.episode.split,
+            "episode": demonstration.number,
+            **_common_columns(demonstration),
         }
-        for number, one in enumerate(plan.demonstrations, 1)
+        for number, demonstration in enumerate(plan.demonstrations, 1)
     )
 
 
 def _common_columns(planned: PlannedTrial | PlannedDemonstration) -> dict[str, object]:
+    """Return the columns that say what is arranged and spoken."""
     arrangement = read_arrangement(planned.episode)
     return {
         "target_color": arrangement.color,

@@ -7,11 +7,12 @@ are between neighbors. The seed decides the orders and nothing else.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import msgspec
 import numpy as np
@@ -20,14 +21,14 @@ from roboirg.apps.real.study.counterbalancing import counterbalanced_episodes, t
 from roboirg.core.episode import Episode
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError, check_names
 from roboirg.core.field_types import MOST_WHOLE, check_policy_name, check_whole
-from roboirg.core.instruction_options import InstructionOptions, identifying
-from roboirg.core.policy_ref import unknown_policy
-from roboirg.evaluation.plan.option_parsing import name_and_spec
-from roboirg.evaluation.plan.plan import Plan
-from roboirg.evaluation.play.job_instruction import instruct_job
-from roboirg.evaluation.records.record import Job
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.policy_ref import PolicyRef, unknown_policy
 from roboirg.language import instruct
 from roboirg.language.settings import plain_settings, settings_of
+from roboirg.records.record import Job
+from roboirg.runs.job_instruction import instruct_job
+from roboirg.runs.plan.option_parsing import name_and_spec
+from roboirg.runs.plan.plan import Plan
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.atomic_write import write_atomically
@@ -125,29 +126,35 @@ class StudyPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     @property
     def twin_plans(self) -> dict[str, Plan]:
         """For each task the plan with which ``roboirg run`` plays its trials in simulation."""
-        policies = {one.job.policy: one.job.ref for one in self.trials if one.job.ref is not None}
         jobs: dict[str, list[Job]] = {}
         for trial in self.trials:
             jobs.setdefault(trial.job.task, []).append(trial.job)
-        return {
-            task: Plan(
-                policies=tuple(policies[name] for name in sorted(policies)),
+        policies = self._policy_refs()
+        plans = {}
+        for task, of_task in jobs.items():
+            settings = {job.setting for job in of_task}
+            episodes = {job.episode for job in of_task}
+            plans[task] = Plan(
+                policies=policies,
                 tasks=(task,),
-                settings=tuple(sorted({job.setting for job in own})),
+                settings=tuple(sorted(settings)),
                 split=TRIAL_SPLIT,
-                episodes=tuple(sorted({job.episode for job in own})),
+                episodes=tuple(sorted(episodes)),
             )
-            for task, own in jobs.items()
-        }
+        return plans
+
+    def _policy_refs(self) -> tuple[PolicyRef, ...]:
+        """Return how the policies are made, in the order of their names."""
+        refs = {}
+        for trial in self.trials:
+            if trial.job.ref is not None:
+                refs[trial.job.policy] = trial.job.ref
+        return tuple(refs[name] for name in sorted(refs))
 
     @property
     def fingerprint(self) -> str:
         """Digest that identifies the plan."""
-        written = msgspec.to_builtins(self)
-        for one, trial in zip(written["trials"], self.trials, strict=True):
-            one["job"]["options"] = identifying(trial.job.options)
-            del one["job"]["ref"]["makeup"]  # which plans did not have
-        return short_hash(msgspec.json.encode(written))
+        return short_hash(msgspec.json.encode(self))
 
     def trial(self, name: str) -> PlannedTrial:
         """Return the trial of that name.
@@ -158,7 +165,8 @@ class StudyPlan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         for trial in self.trials:
             if trial.name == name:
                 return trial
-        raise UnknownNameError("trial", name, [trial.name for trial in self.trials[:3]] + ["…"])
+        examples = [trial.name for trial in self.trials[:3]]
+        raise UnknownNameError("trial", name, [*examples, "…"])
 
 
 def make_study(
@@ -180,32 +188,23 @@ def make_study(
         demonstrations: per task.
         seed: of the orders.
     """
-    named = [name_and_spec(policy) for policy in policies]
-    names = [name for name, _ in named]
-    settings = _shared_settings(tasks) if settings is None else settings
-    _check(names, tasks, settings, trials, demonstrations, seed)
+    policies_named = [name_and_spec(policy) for policy in policies]
+    names = tuple(name for name, _ in policies_named)
+    if settings is None:
+        settings = _shared_settings(tasks)
+    _check_each_once(names, tasks, settings)
+    check_whole("trials", trials)
+    check_whole("demonstrations", demonstrations, least=0)
+    check_whole("seed", seed, least=0, most=MOST_WHOLE)
+    _check_known(names, tasks, settings)
+
     rng = np.random.default_rng(seed)
-    chosen = {task: counterbalanced_episodes(task, TRIAL_SPLIT, trials) for task in tasks}
-    conditions = list(product(settings, range(len(named))))
-    planned: list[PlannedTrial] = []
-    for block, (task, episode) in enumerate(_blocks(chosen, rng), 1):
-        for setting, policy in shuffled(rng, conditions):
-            name, spec = named[policy]
-            job = Job(
-                policy=name,
-                # Unread, as it may be a label of what other software runs.
-                ref=replace(unknown_policy(name), spec=spec),
-                task=task,
-                split=TRIAL_SPLIT,
-                episode=episode,
-                options=InstructionOptions(setting),
-            )
-            trial_name = f"{task}-{episode:02d}-{setting}-{LETTERS[policy]}"
-            planned.append(PlannedTrial(name=trial_name, block=block, job=job))
+    refs = [replace(unknown_policy(name), spec=spec) for name, spec in policies_named]
+    blocks = _blocks(tasks, trials, rng)  # drawn in turns with the orders of their trials
     return StudyPlan(
         seed=seed,
-        policies=tuple(names),
-        trials=tuple(planned),
+        policies=names,
+        trials=_trials(blocks, settings, refs, rng),
         demonstrations=_demonstrations(tasks, demonstrations, rng),
     )
 
@@ -244,60 +243,96 @@ def read_study(folder: Path) -> StudyPlan:
         ) from error
 
 
-def _blocks(
-    chosen: Mapping[str, Sequence[int]], rng: np.random.Generator
-) -> Iterator[tuple[str, int]]:
-    """Yield the task and episode of each block: tasks alternate, their episodes in random order."""
-    tasks = list(chosen)
-    drawn = {task: rng.permutation(chosen[task]) for task in tasks}
-    for position in range(len(drawn[tasks[0]])):
-        for task in shuffled(rng, tasks):
-            yield task, int(drawn[task][position])
+class _Block(NamedTuple):
+    """An arrangement: a task, and the number of one of its episodes."""
+
+    task: str
+    episode: int
+
+
+def _blocks(tasks: Sequence[str], trials: int, rng: np.random.Generator) -> Iterator[_Block]:
+    """Yield the blocks: tasks alternate, their episodes in random order."""
+    episodes = {}
+    for task in tasks:
+        chosen = counterbalanced_episodes(task, TRIAL_SPLIT, trials)
+        episodes[task] = rng.permutation(chosen)
+    for position in range(trials):
+        for task in shuffled(rng, list(tasks)):
+            yield _Block(task, int(episodes[task][position]))
+
+
+def _trials(
+    blocks: Iterable[_Block],
+    settings: Sequence[str],
+    refs: Sequence[PolicyRef],
+    rng: np.random.Generator,
+) -> tuple[PlannedTrial, ...]:
+    """Return a trial of each policy in each setting for every block, in a random order there.
+
+    The policies are unread, as they may be labels of what other software runs.
+    """
+    conditions = list(product(settings, range(len(refs))))
+    planned = []
+    for number, block in enumerate(blocks, 1):
+        for setting, policy in shuffled(rng, conditions):
+            job = Job(
+                policy=refs[policy].name,
+                ref=refs[policy],
+                task=block.task,
+                split=TRIAL_SPLIT,
+                episode=block.episode,
+                options=InstructionOptions(setting),
+            )
+            name = f"{block.task}-{block.episode:02d}-{setting}-{LETTERS[policy]}"
+            planned.append(PlannedTrial(name=name, block=number, job=job))
+    return tuple(planned)
 
 
 def _demonstrations(
     tasks: Sequence[str], count: int, rng: np.random.Generator
 ) -> tuple[PlannedDemonstration, ...]:
     """Return the demonstrations: tasks alternate, their episodes in random order."""
-    drawn = {
-        task: rng.permutation(counterbalanced_episodes(task, DEMONSTRATION_SPLIT, count))
-        for task in tasks
-    }
-    numbered = [(task, int(drawn[task][index])) for index in range(count) for task in tasks]
-    return tuple(
-        PlannedDemonstration(name=f"demo-{task}-{number:02d}", task=task, number=number)
-        for task, number in numbered
-    )
+    episodes = {}
+    for task in tasks:
+        chosen = counterbalanced_episodes(task, DEMONSTRATION_SPLIT, count)
+        episodes[task] = rng.permutation(chosen)
+    planned = []
+    for position in range(count):
+        for task in tasks:
+            number = int(episodes[task][position])
+            name = f"demo-{task}-{number:02d}"
+            planned.append(PlannedDemonstration(name=name, task=task, number=number))
+    return tuple(planned)
 
 
 def _shared_settings(tasks: Sequence[str]) -> tuple[str, ...]:
     """Return the settings that all tasks have, in the registry's order."""
-    available = [settings_of(get_task(task)) for task in tasks]
-    return tuple(name for name in plain_settings() if all(name in names for names in available))
+    shared = list(plain_settings())
+    for task in tasks:
+        available = settings_of(get_task(task))
+        shared = [setting for setting in shared if setting in available]
+    return tuple(shared)
 
 
-def _check(
-    policies: Sequence[str],
-    tasks: Sequence[str],
-    settings: Sequence[str],
-    trials: int,
-    demonstrations: int,
-    seed: int,
+def _check_each_once(
+    policies: Sequence[str], tasks: Sequence[str], settings: Sequence[str]
 ) -> None:
+    """Check that there are names of each kind, each once, and a letter for each policy."""
     for kind, names in (("policy", policies), ("task", tasks), ("setting", settings)):
         if not names:
             raise InvalidValueError(f"No {kind} was given.")
-        repeated = [name for name in names if list(names).count(name) > 1]
-        if repeated:
-            raise InvalidValueError(f"The {kind} {repeated[0]!r} is given twice.")
+        counts = Counter(names)
+        for name in names:
+            if counts[name] > 1:
+                raise InvalidValueError(f"The {kind} {name!r} is given twice.")
     if len(policies) > len(LETTERS):
         raise InvalidValueError(f"{len(policies)} policies are too many; at most {len(LETTERS)}.")
-    check_whole("trials", trials)
-    check_whole("demonstrations", demonstrations, least=0)
-    check_whole("seed", seed, least=0, most=MOST_WHOLE)
+
+
+def _check_known(policies: Sequence[str], tasks: Sequence[str], settings: Sequence[str]) -> None:
+    """Check that names may be those of policies, and that tasks are real and have the settings."""
     for policy in policies:
         check_policy_name(policy)
     for task in tasks:
         target_kind(task)
-        available = settings_of(get_task(task))
-        check_names(f"setting of {task}", settings, available)
+        check_names(f"setting of {task}", settings, settings_of(get_task(task)))

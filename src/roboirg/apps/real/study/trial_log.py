@@ -12,15 +12,15 @@ from typing import Any, Literal
 import msgspec
 from pydantic import JsonValue
 
-from roboirg.apps.real.study.failure_choices import failure_choices
+from roboirg.apps.real.study.failure_choices import FailureChoice, failure_choices
 from roboirg.apps.real.study.study_plan import PlannedTrial, StudyPlan
 from roboirg.core.errors import InvalidValueError
-from roboirg.evaluation.episode_errors import format_cause
-from roboirg.evaluation.play.episode_record import begin_record
-from roboirg.evaluation.play.job_instruction import PreparedJob
-from roboirg.evaluation.records.record import Record
-from roboirg.evaluation.records.store import RecordStore, iterate_records
 from roboirg.policies.contract.policy_calls import REAL_TRIAL
+from roboirg.records.record import Record
+from roboirg.records.store import RecordStore, iterate_records
+from roboirg.runs.episode_errors import format_cause
+from roboirg.runs.job_instruction import PreparedJob
+from roboirg.runs.play.episode_record import begin_record
 
 VOID = format_cause("infrastructure", "the operator declared the trial void")
 
@@ -30,7 +30,10 @@ State = Literal["open", "scored", "void"]
 ROBOT = "a robot"
 """Name in the records of the robot that played a trial."""
 
-SUCCESS, VOID_CHOICE = "success", "void"
+SUCCESS = "success"
+"""The choice of a trial in which the robot did what was meant."""
+VOID_CHOICE = "void"
+"""The choice of a trial that says nothing about the policy."""
 
 
 @dataclass
@@ -79,7 +82,10 @@ class TrialLog:
 
     def next_to_score(self) -> PlannedTrial | None:
         """Return the first trial without a verdict."""
-        return next((one for one in self.plan.trials if self.state(one.name) == "open"), None)
+        for trial in self.plan.trials:
+            if self.state(trial.name) == "open":
+                return trial
+        return None
 
     def score(
         self, trial: PlannedTrial, choice: str, *, operator: str, note: str = "", video: str = ""
@@ -97,37 +103,57 @@ class TrialLog:
             InvalidValueError: the trial has no such failure.
             StoreError: the record cannot be written.
         """
-        metadata: dict[str, JsonValue] = {
-            "operator": operator, "note": note, "trial": trial.name, "plan": self.plan.fingerprint,
-        }  # fmt: skip
-        base = self.newest(trial.name) or begin_record(PreparedJob(trial.job))
-        changes: dict[str, Any] = {
-            "outcome": "success", "error": None, "cause": None, "attribution": None,
-            "video": video or base.video,
-        }  # fmt: skip
-        if choice == VOID_CHOICE:
-            cause = f"{VOID}; {note}" if note else VOID
-            changes |= {"outcome": "error", "error": "infrastructure", "cause": cause}
-        elif choice != SUCCESS:
-            choices = {one.key: one for one in failure_choices(trial.episode)}
-            if choice not in choices:
-                raise InvalidValueError(
-                    f"A trial of {trial.job.task} cannot fail by {choice!r}; its failures are "
-                    f"{', '.join(choices)}."
-                )
-            found = choices[choice].attribution(note)
-            changes |= {"outcome": "failure", "cause": found.sentence, "attribution": found}
-        complete = msgspec.structs.replace(
-            base,
-            **changes,
-            policy_metadata={**base.policy_metadata, REAL_TRIAL: metadata},
+        before = self.newest(trial.name) or begin_record(PreparedJob(trial.job))
+        metadata = dict(before.policy_metadata)
+        metadata[REAL_TRIAL] = {
+            "operator": operator,
+            "note": note,
+            "trial": trial.name,
+            "plan": self.plan.fingerprint,
+        }
+        record = msgspec.structs.replace(
+            before,
+            **_verdict(trial, choice, note),
+            video=video or before.video,
+            policy_metadata=metadata,
             robot=ROBOT,
             plan=self.plan.fingerprint,
         )
         with RecordStore(self.folder) as store:
-            store.append(complete)
-        self._history.setdefault(trial.name, []).append(complete)
-        return complete
+            store.append(record)
+        self._history.setdefault(trial.name, []).append(record)
+        return record
+
+
+def _verdict(trial: PlannedTrial, choice: str, note: str) -> dict[str, Any]:
+    """Return the fields of a record that a choice decides."""
+    fields: dict[str, Any] = {"outcome": "success", "error": None, "cause": None}
+    fields["attribution"] = None
+    if choice == VOID_CHOICE:
+        fields["outcome"] = "error"
+        fields["error"] = "infrastructure"
+        fields["cause"] = f"{VOID}; {note}" if note else VOID
+    elif choice != SUCCESS:
+        attribution = _failure(trial, choice).attribution(note)
+        fields["outcome"] = "failure"
+        fields["cause"] = attribution.sentence
+        fields["attribution"] = attribution
+    return fields
+
+
+def _failure(trial: PlannedTrial, key: str) -> FailureChoice:
+    """Return the failure of a key.
+
+    Raises:
+        InvalidValueError: the trial has no such failure.
+    """
+    choices = {failure.key: failure for failure in failure_choices(trial.episode)}
+    if key not in choices:
+        raise InvalidValueError(
+            f"A trial of {trial.job.task} cannot fail by {key!r}; its failures are "
+            f"{', '.join(choices)}."
+        )
+    return choices[key]
 
 
 def trial_metadata(record: Record) -> dict[str, JsonValue]:

@@ -6,7 +6,7 @@ and all are executed. The protocol has no parts: the video is one message.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -19,7 +19,7 @@ from roboirg.policies.remote.protocols import Protocol
 from roboirg.policies.remote.remote_policy import RemotePolicy
 from roboirg.policies.remote.service import Message, Service
 
-FIELDS: Mapping[str, str] = {
+FIELDS = {
     "front_rgb_list": "front_rgb",
     "wrist_rgb_list": "wrist_rgb",
     "joint_state_list": "joint_positions",
@@ -27,15 +27,11 @@ FIELDS: Mapping[str, str] = {
     "gripper_state_list": "gripper",
 }
 """The challenge's names of lists, and our fields."""
-DEPTH_FIELDS: Mapping[str, str] = {f"{camera}_depth_list": f"{camera}_depth" for camera in CAMERAS}
+DEPTH_FIELDS = {f"{camera}_depth_list": f"{camera}_depth" for camera in CAMERAS}
 """With ``depth``: int16 (H, W, 1), mm."""
-EXTRINSIC_FIELDS: Mapping[str, str] = {
-    f"{camera}_camera_extrinsic_list": f"{camera}_extrinsic" for camera in CAMERAS
-}
+EXTRINSIC_FIELDS = {f"{camera}_camera_extrinsic_list": f"{camera}_extrinsic" for camera in CAMERAS}
 """With ``calibration``: float32 (3, 4), from the world's frame to the camera's."""
-INTRINSIC_FIELDS: Mapping[str, str] = {
-    f"{camera}_camera_intrinsic": f"{camera}_intrinsic" for camera in CAMERAS
-}
+INTRINSIC_FIELDS = {f"{camera}_camera_intrinsic": f"{camera}_intrinsic" for camera in CAMERAS}
 """With ``calibration``: one float32 (3, 3) for the whole message, not a list."""
 
 
@@ -62,12 +58,13 @@ class ChallengePolicy(RemotePolicy):
 
     def __init__(self, url: str, seed: int = 0) -> None:
         super().__init__(url, seed)
-        self.depth, self.calibration = self.options.depth, self.options.calibration
-        self._fields = {
-            **FIELDS,
-            **(DEPTH_FIELDS if self.depth else {}),
-            **(EXTRINSIC_FIELDS if self.calibration else {}),
-        }
+        self.depth = self.options.depth
+        self.calibration = self.options.calibration
+        self._fields = dict(FIELDS)
+        if self.depth:
+            self._fields.update(DEPTH_FIELDS)
+        if self.calibration:
+            self._fields.update(EXTRINSIC_FIELDS)
         self._demonstration: Demonstration | None = None
 
     def begin_episode(self, demonstration: Demonstration) -> None:
@@ -76,17 +73,27 @@ class ChallengePolicy(RemotePolicy):
         self.request_confirmed({"reset": True}, "reset_finished")
 
     def request_actions(self, observation: Observation) -> Actions:
-        """Send everything seen since the last call; return all actions of the reply."""
-        intrinsic = INTRINSIC_FIELDS if self.calibration else {}
-        demonstration, self._demonstration = self._demonstration, None
-        first = demonstration is not None
-        seen = (observation,) if first else observation["history"] or (observation,)
-        message = {
+        """Send everything seen since the last call; return all actions of the reply.
+
+        The first call of an episode sends the demonstration and the observation, later ones the
+        history.
+        """
+        demonstration = self._demonstration
+        self._demonstration = None
+        is_first_step = demonstration is not None
+        seen: Sequence[Observation] = (observation,)
+        if not is_first_step and observation["history"]:
+            seen = observation["history"]
+
+        message: dict[str, Any] = {
             "task_goal": [self.instruction],
-            "is_first_step": first,
-            **{name: _column(field, demonstration, seen) for name, field in self._fields.items()},
-            **{name: observation[field] for name, field in intrinsic.items()},  # type: ignore[literal-required]
+            "is_first_step": is_first_step,
         }
+        for name, field in self._fields.items():
+            message[name] = _column(field, demonstration, seen)
+        if self.calibration:
+            for name, field in INTRINSIC_FIELDS.items():
+                message[name] = observation[field]  # type: ignore[literal-required]
         return self.read_actions(self.request(message))
 
 
@@ -96,22 +103,27 @@ class ChallengeService(Service):
     _steps = 0
 
     def handle(self, message: Message) -> dict[str, Any]:
-        """Return the reply to a reset or a request for actions."""
+        """Return the reply to a reset or a request for actions.
+
+        The first request of an episode has the demonstration before its newest observation; later
+        ones have what was seen since the last request.
+        """
         if message.get("reset"):
             self.forget()
             return {"reset_finished": True}
         observations = _read_observations(message)
-        now = observations[-1]
+        newest = observations[-1]
+        instruction = newest["instruction"]
         if message.get("is_first_step") or self.policy is None:
             self.forget()
-            self.begin(now["instruction"], _stack(observations))
+            self.begin(instruction, _stack(observations))
             self._steps = 0
-            now["history"] = ()
+            newest["history"] = ()
         else:
             self._steps += len(observations)
-            self.hear(now["instruction"], self._steps)
-            now["history"] = tuple(cast("Observation", dict(seen)) for seen in observations)
-        actions, _ = self.act(now)
+            self.hear(instruction, self._steps)
+            newest["history"] = tuple(cast("Observation", dict(seen)) for seen in observations)
+        actions, _ = self.act(newest)
         return {"actions": actions}
 
 
@@ -128,32 +140,51 @@ def _column(
 def _read_observations(message: Message) -> list[Observation]:
     """Return the observations in a request, oldest first.
 
-    Depth and matrices are read if the client sends them.
+    A list of the request has a field of all observations: ``front_rgb_list`` the front pictures.
     """
     goals = message.get("task_goal")
     if not isinstance(goals, list) or not goals or not isinstance(goals[0], str):
         raise ValueError("'task_goal' must be a list of texts.")
-    optional = {**DEPTH_FIELDS, **EXTRINSIC_FIELDS}
-    names = {**FIELDS, **{name: optional[name] for name in optional if name in message}}
-    columns = {field: message.get(name) for name, field in names.items()}
-    lengths = {len(column) if isinstance(column, list) else 0 for column in columns.values()}
-    if len(lengths) > 1 or 0 in lengths:
-        raise ValueError(f"{', '.join(names)} must be lists of the same length, at least 1.")
-    same = {field: message[name] for name, field in INTRINSIC_FIELDS.items() if name in message}
-    found: list[Any] = [
-        {**dict(zip(columns, values, strict=True)), **same, "instruction": goals[0]}
-        for values in zip(*(column or () for column in columns.values()), strict=True)
-    ]
-    return found
+    # What a request has once is the same in all observations.
+    in_all: dict[str, Any] = {"instruction": goals[0]}
+    for name, field in INTRINSIC_FIELDS.items():
+        if name in message:
+            in_all[field] = message[name]
+
+    columns = _read_columns(message)
+    count = len(columns["front_rgb"])
+    observations: list[Any] = []
+    for index in range(count):
+        observation = {field: column[index] for field, column in columns.items()}
+        observations.append(observation | in_all)
+    return observations
+
+
+def _read_columns(message: Message) -> dict[str, list[Any]]:
+    """Return the lists in a request by our names of the fields, all of the same length.
+
+    ``front_rgb_list`` becomes ``front_rgb``. Depth and matrices are optional.
+    """
+    fields = dict(FIELDS)
+    for name, field in (DEPTH_FIELDS | EXTRINSIC_FIELDS).items():
+        if name in message:
+            fields[name] = field
+    columns = {field: message.get(name) for name, field in fields.items()}
+    lengths = {len(column) for column in columns.values() if isinstance(column, list)}
+    are_lists = all(isinstance(column, list) for column in columns.values())
+    if not are_lists or len(lengths) > 1 or 0 in lengths:
+        raise ValueError(f"{', '.join(fields)} must be lists of the same length, at least 1.")
+    return cast("dict[str, list[Any]]", columns)
 
 
 def _stack(observations: list[Observation]) -> dict[str, Any]:
-    """Return all observations but the last as a demonstration."""
-    return {
-        field: np.stack([one[field] for one in observations])[:-1]  # type: ignore[literal-required]
-        for field in observations[0]
-        if field != "instruction"
-    }
+    """Return all observations but the last as a demonstration: by field, an array of all."""
+    demonstration: dict[str, Any] = {}
+    for field in observations[0]:
+        if field != "instruction":
+            values = [observation[field] for observation in observations]  # type: ignore[literal-required]
+            demonstration[field] = np.stack(values)[:-1]
+    return demonstration
 
 
 PROTOCOL = Protocol(

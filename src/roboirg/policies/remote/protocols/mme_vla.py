@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Sequence
-from typing import Any, ClassVar, Literal
+from collections.abc import Iterator, Sequence
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +62,13 @@ class MmeVlaOptions(RemoteOptions):
     part: int = Field(EXECUTED, ge=1, exclude=NOT_COMPARED)
 
 
+class _Frame(NamedTuple):
+    """What the server remembers of a moment: the front picture and eight numbers (`_state`)."""
+
+    picture: NDArray[np.uint8]
+    state: NDArray[np.float32]
+
+
 class MmeVlaPolicy(RemotePolicy):
     """Client of a server of the MME-VLA repository."""
 
@@ -71,8 +78,11 @@ class MmeVlaPolicy(RemotePolicy):
 
     def __init__(self, url: str, seed: int = 0) -> None:
         super().__init__(url, seed)
-        self.demonstration_frames = "all" if self.options.history else "none"
-        self.observe_every = 1 if self.options.history else None
+        self.demonstration_frames = "none"
+        self.observe_every: int | None = None
+        if self.options.history:
+            self.demonstration_frames = "all"
+            self.observe_every = 1
         self.history_cameras = ("front",)
         self._demonstration: Demonstration | None = None
         self._subgoal: str | None = None
@@ -111,31 +121,27 @@ class MmeVlaPolicy(RemotePolicy):
         return self.read_actions(self.request(message))[: self.options.execute]
 
     def _send_frames(self, observation: Observation) -> None:
-        """Add frames to the server's memory, in parts.
+        """Add the new frames to the server's memory, in messages of at most `part` frames.
 
-        These are, at first, the T frames of the video and the first frame of the policy's turn,
-        number T; later, those after each action since the last call.
+        In the first call these are the T frames of the video and the first one of the policy's
+        turn, which has the number T (``exec_start_idx``); later, one after each action since then.
         """
-        demonstration, self._demonstration = self._demonstration, None
-        states: Any = ()
-        video: Any = ()
-        if demonstration is not None:
-            states = proprioception(demonstration["joint_positions"], demonstration["gripper"])
-            # Pictures are drawn when they are read, so none are asked for where there are none.
-            video = demonstration["front_rgb"] if len(states) else ()
-        seen = observation["history"] or (observation,)
-        now = ((one["front_rgb"], _state(one)) for one in seen)
-        frames, start = itertools.chain(zip(video, states, strict=True), now), len(states)
-        while part := tuple(itertools.islice(frames, self.options.part)):
-            images, rows = map(np.stack, zip(*part, strict=True))
+        demonstration = self._demonstration
+        self._demonstration = None
+        frames = _new_frames(demonstration, observation)
+        start = 0 if demonstration is None else len(demonstration["joint_positions"])
+        part = list(itertools.islice(frames, self.options.part))
+        while part:
+            pictures = np.stack([frame.picture for frame in part])
             message = {
                 "add_buffer": True,
-                "images": images[:, None],
-                "state": rows,
+                "images": pictures[:, None],
+                "state": np.stack([frame.state for frame in part]),
                 "exec_start_idx": start,
             }
             self.request_confirmed(message, "add_buffer_finished")
-            start = 0  # the server keeps the first that is not 0
+            start = 0  # only the first message needs it: the server keeps the first that is not 0
+            part = list(itertools.islice(frames, self.options.part))
 
 
 class MmeVlaService(Service):
@@ -143,48 +149,78 @@ class MmeVlaService(Service):
 
     # The original client sends a video in one message, with the pictures of the front camera.
     max_request_bytes: ClassVar[int] = 284 * MIB
-    _turn_start = _count = 0
     _frames: tuple[dict[str, NDArray[Any]], ...] = ()
+    """Added since the last request for actions."""
+    _count = 0
+    """Frames added since the reset."""
+    _turn_start = 0
+    """Number of the first frame of the policy's turn; 0 as long as no message has one."""
 
     def handle(self, message: Message) -> dict[str, Any]:
-        """Return the reply to a message."""
+        """Return the reply to a reset, to frames for the memory, or to a request for actions."""
         begin = time.perf_counter()
-        done = next((key for key in ("reset", "add_buffer") if message.get(key)), None)
-        if done is None:
+        if message.get("reset"):
+            self.forget()
+            self._frames = ()
+            self._count = 0
+            self._turn_start = 0
+            done = "reset"
+        elif message.get("add_buffer"):
+            self._add_frames(message)
+            done = "add_buffer"
+        else:
             actions, milliseconds = self._infer(message)
             return {"actions": actions, "infer_time_ms": milliseconds}
-        if done == "reset":
-            self.forget()
-            self._frames, self._count, self._turn_start = (), 0, 0
-        else:
-            self._add_frames(message)
         return {f"{done}_finished": True, f"{done}_time_ms": 1000 * (time.perf_counter() - begin)}
 
     def _add_frames(self, message: Message) -> None:
-        images = read_array(message, "images", "u1", ("T", 1, "H", "W", 3))
-        states = read_array(message, "state", "fiu", ("T", 8))
+        """Keep the frames in a message, and the number of the first one of the policy's turn."""
+        images = read_array(message, "images", "uint8", ("T", 1, "H", "W", 3))
+        states = read_array(message, "state", "real numbers", ("T", 8))
         self._count += len(images)
-        self._turn_start = self._turn_start or int(message.get("exec_start_idx", 0))
+        if self._turn_start == 0:
+            self._turn_start = int(message.get("exec_start_idx", 0))
         self._frames += tuple(
             {"front_rgb": image[0], **split_state(state)}
             for image, state in zip(images, states, strict=True)
         )
 
     def _infer(self, message: Message) -> tuple[NDArray[np.float64], float]:
+        """Return the policy's actions and their milliseconds; the first request begins its episode.
+
+        Of the kept frames, those before the policy's turn are then its demonstration; what comes
+        between two requests is its history.
+        """
         observation = read_request(message)
         instruction = observation["instruction"]
         if self.policy is None:
             video = self._frames[: self._turn_start]
             self.begin(instruction, _demonstration(video, observation))
             self._frames = ()
-        self.hear(instruction, max(self._count - self._turn_start - 1, 0))
+        # The first frame of the turn was seen before any step.
+        steps = self._count - self._turn_start - 1
+        self.hear(instruction, max(steps, 0))
+
         history = tuple({**frame, "instruction": instruction} for frame in self._frames)
-        self._frames = ()
         observation["history"] = history  # type: ignore[typeddict-item]
+        self._frames = ()
         subgoal = message.get("grounded_subgoal") or message.get("simple_subgoal")
         if isinstance(self.policy, SubgoalFollower) and subgoal is not None:
             self.policy.follow(str(subgoal))
         return self.act(observation)
+
+
+def _new_frames(demonstration: Demonstration | None, observation: Observation) -> Iterator[_Frame]:
+    """Yield the frames of the video, if there is one to send, then those of the policy's turn.
+
+    The video's length is that of its joints: to read its pictures would draw them.
+    """
+    if demonstration is not None and len(demonstration["joint_positions"]):
+        states = proprioception(demonstration["joint_positions"], demonstration["gripper"])
+        for picture, state in zip(demonstration["front_rgb"], states, strict=True):
+            yield _Frame(picture, state)
+    for seen in observation["history"] or (observation,):
+        yield _Frame(seen["front_rgb"], _state(seen))
 
 
 def _state(observation: Observation) -> NDArray[np.float32]:
@@ -195,10 +231,14 @@ def _demonstration(
     frames: Sequence[dict[str, NDArray[Any]]], observation: Observation
 ) -> Demonstration:
     """Return the frames before the policy's turn; the protocol has no wrist pictures of them."""
-    fields = ("front_rgb", "joint_positions", "gripper")
-    if not frames:
-        return {field: np.asarray(observation[field])[None][:0] for field in fields}  # type: ignore[literal-required]
-    return {field: np.stack([frame[field] for frame in frames]) for field in fields}
+    demonstration: dict[str, NDArray[Any]] = {}
+    for field in ("front_rgb", "joint_positions", "gripper"):
+        if frames:
+            demonstration[field] = np.stack([frame[field] for frame in frames])
+        else:  # an array of length 0, whose other sizes are those of a frame
+            now: NDArray[Any] = np.asarray(observation[field])
+            demonstration[field] = now[None][:0]
+    return demonstration
 
 
 PROTOCOL = Protocol(

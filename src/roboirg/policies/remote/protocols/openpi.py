@@ -54,22 +54,25 @@ class OpenpiPolicy(RemotePolicy):
 
     def __init__(self, url: str, seed: int = 0) -> None:
         super().__init__(url, seed)
-        keys = {"front": self.options.front, "wrist": self.options.wrist}
-        self._pictures = {key: f"{camera}_rgb" for camera, key in keys.items() if key}
-        self.cameras = tuple(camera for camera, key in keys.items() if key)
+        self._keys: dict[str, str] = {}
+        """The keys of the pictures, by the camera."""
+        if self.options.front:
+            self._keys["front"] = self.options.front
+        if self.options.wrist:
+            self._keys["wrist"] = self.options.wrist
+        self.cameras = tuple(self._keys)
 
     def begin_episode(self, demonstration: Demonstration) -> None:
         """Do nothing: the protocol has neither a reset nor a memory."""
 
     def request_actions(self, observation: Observation) -> Actions:
         """Send the observation; return the rows of the reply to execute."""
-        message = {
-            **{key: observation[field] for key, field in self._pictures.items()},  # type: ignore[literal-required]
-            self.options.state: proprioception(
-                observation["joint_positions"], observation["gripper"]
-            ),
-            self.options.prompt: self.instruction,
-        }
+        message: dict[str, Any] = {}
+        for camera, key in self._keys.items():
+            message[key] = observation[f"{camera}_rgb"]  # type: ignore[literal-required]
+        state = proprioception(observation["joint_positions"], observation["gripper"])
+        message[self.options.state] = state
+        message[self.options.prompt] = self.instruction
         return self.read_actions(self.request(message))[: self.options.execute]
 
 
@@ -85,6 +88,7 @@ class OpenpiService(Service):
     def handle(self, message: Message) -> dict[str, Any]:
         """Return the reply to a request for actions."""
         observation = read_request(message)
+        # The protocol has no beginning of an episode: another prompt is taken for one.
         if self.policy is None or observation["instruction"] != self.said:
             close_policy(self.policy)
             self.begin(observation["instruction"], _empty_video(observation["front_rgb"].shape))

@@ -21,6 +21,8 @@ from roboirg.policies.remote.protocols import Protocol
 from roboirg.policies.remote.remote_policy import RemotePolicy
 
 PROTOCOL_VERSION = 1
+_MOST_SHOWN = 80
+"""Characters of a server's value in an error message."""
 TASK = {"name": "RoboIRGBench"}
 """Sent at the beginning of an episode. The harness sends the task here, which would give away more
 than the instruction."""
@@ -69,9 +71,10 @@ class VlaEvalPolicy(RemotePolicy):
         hello = self._send("hello", ours, awaited="hello")
         if hello.get("protocol_version") != PROTOCOL_VERSION:
             raise PolicyReplyError(
-                f"{self.connection} speaks version {str(hello.get('protocol_version'))[:80]} of "
+                f"{self.connection} speaks version {_clipped(hello.get('protocol_version'))} of "
                 f"vla-eval's protocol; this client speaks version {PROTOCOL_VERSION}."
             )
+        # Such as "openvla, vla-eval 0.8".
         version = f"{hello.get('model_server')}, vla-eval {hello.get('harness_version')}"
         return {"version": version, **hello}
 
@@ -79,8 +82,8 @@ class VlaEvalPolicy(RemotePolicy):
         """Begin an episode; the demonstration goes with the first observation."""
         self._check_params()
         self._subgoal = None
-        shows = self.options.video and self._wants("send_video_history")
-        self._demonstration = demonstration if shows else None
+        sends_video = self.options.video and self._wants("send_video_history")
+        self._demonstration = demonstration if sends_video else None
         self._send("episode_start", {"task": TASK})
         self._in_episode = True
 
@@ -97,51 +100,66 @@ class VlaEvalPolicy(RemotePolicy):
         self._subgoal = subgoal
 
     def request_actions(self, observation: Observation) -> Actions:
-        """Send an observation; return the action of the reply, one row."""
+        """Send an observation; return the action of the reply, one row.
+
+        What else is sent depends on the options, and on what the server says that it wants.
+        """
+        sends_wrist = self.options.wrist and self._wants("send_wrist_image")
         images = {"agentview": observation["front_rgb"]}
-        wrist = self.options.wrist and self._wants("send_wrist_image")
-        if wrist:
+        if sends_wrist:
             images["wrist"] = observation["wrist_rgb"]
-        shown: dict[str, Any] = {"images": images, "task_description": self.instruction}
+        payload: dict[str, Any] = {"images": images, "task_description": self.instruction}
         if self.options.state and self._wants("send_state"):
-            shown["states"] = proprioception(observation["joint_positions"], observation["gripper"])
-        demonstration, self._demonstration = self._demonstration, None
-        if demonstration is not None and len(demonstration["joint_positions"]):
-            shown["video_history"] = list(demonstration["front_rgb"])
-            if wrist:
-                shown["wrist_video_history"] = list(demonstration["wrist_rgb"])
-            shown["episode_restart"] = True
+            state = proprioception(observation["joint_positions"], observation["gripper"])
+            payload["states"] = state
+
+        demonstration = self._demonstration
+        self._demonstration = None
+        if demonstration is not None and len(demonstration["joint_positions"]):  # there is a video
+            payload["video_history"] = list(demonstration["front_rgb"])
+            if sends_wrist:
+                payload["wrist_video_history"] = list(demonstration["wrist_rgb"])
+            payload["episode_restart"] = True
         if self._subgoal is not None:
-            shown["subgoal"] = self._subgoal
-        reply = self._send("observation", shown, awaited="action")
-        alone = {"actions": reply["action"]} if "action" in reply else {}
-        return self.read_actions({**alone, **reply})
+            payload["subgoal"] = self._subgoal
+
+        reply = self._send("observation", payload, awaited="action")
+        if "action" in reply:
+            reply = {"actions": reply["action"], **reply}  # the name that `read_actions` reads
+        return self.read_actions(reply)
 
     def _send(self, kind: str, payload: Mapping[str, Any], awaited: str = "") -> dict[str, Any]:
-        """Send a payload in an envelope; return that of the answer, if one is awaited.
+        """Send a payload in an envelope, and return that of the answer.
 
         An answer has the number of its request. The beginning of an episode has none; an error in
         it comes before the next one.
+
+        Args:
+            kind: of the message, such as ``observation``.
+            payload: what it holds.
+            awaited: kind of the answer; empty to wait for none, and return ``{}``.
         """
         from roboirg.policies.remote.message_codec import pack
 
         self._number += 1
         sent = {"type": kind, "payload": payload, "seq": self._number, "timestamp": time.time()}
-        answer = self.connection.exchange(
-            pack(sent, text_keys=True), "a reply" if awaited else "", is_numbered=True
-        )
+        data = pack(sent, text_keys=True)
         if not awaited:
+            self.connection.exchange(data, "", is_numbered=True)
             return {}
-        found, number, inside = (answer.get(name) for name in ("type", "seq", "payload"))
-        if found == "error":
-            words = inside.get("error") if isinstance(inside, dict) else inside
+        answer = self.connection.exchange(data, is_numbered=True)
+        answer_kind = answer.get("type")
+        number = answer.get("seq")
+        content = answer.get("payload")
+        if answer_kind == "error":
+            words = content.get("error") if isinstance(content, dict) else content
             raise self.connection.error_reply(str(words))
-        if found != awaited or number != self._number or not isinstance(inside, dict):
-            raise PolicyReplyError(
-                f"{self.connection} sent a message of type {str(found)[:80]!r} with number "
-                f"{str(number)[:80]}, where {awaited!r} with number {self._number} was expected."
-            )
-        return inside
+        if answer_kind == awaited and number == self._number and isinstance(content, dict):
+            return content
+        raise PolicyReplyError(
+            f"{self.connection} sent a message of type {_clipped(answer_kind)!r} with number "
+            f"{_clipped(number)}, where {awaited!r} with number {self._number} was expected."
+        )
 
     def _wants(self, name: str) -> bool:
         """Return whether the server wants to be shown something; by default it does."""
@@ -149,13 +167,19 @@ class VlaEvalPolicy(RemotePolicy):
         return not isinstance(params, Mapping) or bool(params.get(name, True))
 
     def _check_params(self) -> None:
+        """Raise if the server acts in another action space than the URL gives."""
         params = self.metadata.get("observation_params")
         wanted = params.get("action_space") if isinstance(params, Mapping) else None
         if wanted not in (None, self.actions):
             raise InvalidValueError(
-                f"The server acts in the action space {str(wanted)[:80]!r}, but the policy's URL "
+                f"The server acts in the action space {_clipped(wanted)!r}, but the policy's URL "
                 f"says actions={self.actions}."
             )
+
+
+def _clipped(value: object) -> str:
+    """Return what a server has sent as a text that is short enough for a message."""
+    return str(value)[:_MOST_SHOWN]
 
 
 PROTOCOL = Protocol(

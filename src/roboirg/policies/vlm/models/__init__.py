@@ -12,4 +12,6 @@ def make_model(options: ModelOptions) -> Model:
     from roboirg.policies.vlm.models.google import GoogleModel
     from roboirg.policies.vlm.models.openai_compatible import OpenAIModel
 
-    return (GoogleModel if options.provider == "google" else OpenAIModel)(options)
+    if options.provider == "google":
+        return GoogleModel(options)
+    return OpenAIModel(options)

@@ -9,7 +9,7 @@ from typing import Any
 from urllib.parse import quote
 
 from roboirg.policies.vlm.model_content import Part
-from roboirg.policies.vlm.models.http_model import HttpModel, given, reported_count
+from roboirg.policies.vlm.models.http_model import HttpModel, HttpRequest, given, reported_count
 from roboirg.policies.vlm.models.model import ModelQuery, ModelReply
 from roboirg.util.media import Picture, encode_png
 from roboirg.util.reply_reading import with_thoughts
@@ -23,21 +23,23 @@ class GoogleModel(HttpModel):
 
     home = "https://generativelanguage.googleapis.com"
 
-    def write(self, query: ModelQuery) -> tuple[str, dict[str, str], bytes]:
-        """Return the request for a query."""
+    def write(self, query: ModelQuery) -> HttpRequest:
+        """Return the HTTP request for a query, in the form of Gemini's API."""
         options = self.options
-        named = options.model.startswith(("models/", "tunedModels/"))
-        name = quote(options.model if named else f"models/{options.model}", safe="/:")
-        url = f"{(options.base_url or self.home).rstrip('/')}/v1/{name}"
+        name = options.model
+        if not name.startswith(("models/", "tunedModels/")):
+            name = f"models/{name}"
+        base_url = (options.base_url or self.home).rstrip("/")
         headers = {
             "x-goog-api-key": self.key,
             "X-Server-Timeout": str(math.ceil(options.timeout_s)),
         }
+        contents: list[dict[str, Any]] = []
+        for turn in query.turns:
+            parts = [self._part(part) for part in turn.parts]
+            contents.append({"parts": parts, "role": turn.role})
         body = {
-            "contents": [
-                {"parts": [self._part(part) for part in turn.parts], "role": turn.role}
-                for turn in query.turns
-            ],
+            "contents": contents,
             "systemInstruction": {"parts": [{"text": query.system}], "role": "user"},
             "generationConfig": given(
                 temperature=options.temperature,
@@ -46,10 +48,14 @@ class GoogleModel(HttpModel):
                 responseJsonSchema=query.schema,
             ),
         }
-        return f"{url}:generateContent", headers, json.dumps(body).encode()
+        url = f"{base_url}/v1/{quote(name, safe='/:')}:generateContent"
+        return HttpRequest(url, headers, json.dumps(body).encode())
 
     def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
-        """Return the text of the first candidate and its thoughts, which count as output."""
+        """Return the text of a reply's first candidate with its thoughts, and the tokens of both.
+
+        Thoughts are parts of the text that are marked, and they are paid for like the answer.
+        """
         first = (reply.get("candidates") or [{}])[0]
         parts = first.get("content", {}).get("parts", [])
         answer = "".join(part.get("text", "") for part in parts if not part.get("thought"))
@@ -62,15 +68,15 @@ class GoogleModel(HttpModel):
         return ModelReply(text, reported_count(usage, "promptTokenCount"), output_tokens)
 
     def _part(self, part: Part) -> dict[str, Any]:
+        """Return a text, picture or clip as a part of the request."""
         if isinstance(part, str):
             return {"text": part}
         if isinstance(part, Picture):
             return {"inlineData": _blob(encode_png(part), "image/png")}
-        fps = self.options.sampling_fps
-        return given(
-            inlineData=_blob(part.file, "video/mp4"),
-            videoMetadata=None if fps is None else {"fps": fps},
-        )
+        clip: dict[str, Any] = {"inlineData": _blob(part.file, "video/mp4")}
+        if self.options.sampling_fps is not None:
+            clip["videoMetadata"] = {"fps": self.options.sampling_fps}
+        return clip
 
 
 def _blob(content: bytes, kind: str) -> dict[str, str]:

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from concurrent.futures import Future
 from http import HTTPStatus
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from roboirg.core.errors import (
     ModelBusyError,
@@ -30,6 +30,7 @@ with extra_needed("Models need httpx", "vlm"):
 
 BUSY = frozenset({408, 409, 429, 502, 503, 504})
 """HTTP statuses of a service that is up but cannot answer now."""
+MIB = 2**20
 MAX_RESPONSE_MIB = 64
 MAX_ERROR_LENGTH = 300
 MALFORMED = (
@@ -37,7 +38,21 @@ MALFORMED = (
 )  # fmt: skip
 """What reading a reply of the wrong form raises."""
 
-Fetched = tuple[httpx.Response, bytes]
+
+class HttpRequest(NamedTuple):
+    """What is posted to a service."""
+
+    url: str
+    headers: Mapping[str, str]
+    body: bytes
+
+
+class _Response(NamedTuple):
+    """What a service replied."""
+
+    status: int
+    headers: Mapping[str, str]
+    content: bytes
 
 
 class HttpModel(ABC):
@@ -53,7 +68,8 @@ class HttpModel(ABC):
     home: ClassVar[str]
 
     def __init__(self, options: ModelOptions) -> None:
-        self.options, self.key = options, options.key()
+        self.options = options
+        self.key = options.key()
         proxy = proxy_of(options.base_url or self.home)
         self._name = f"Model {options.model!r} at {options.address()}{proxy.words}"
         # The library itself takes a proxy for this machine, too, and does not name it.
@@ -62,32 +78,25 @@ class HttpModel(ABC):
         weakref.finalize(self, self._client.close)  # the connection ends with this object
 
     @abstractmethod
-    def write(self, query: ModelQuery) -> tuple[str, dict[str, str], bytes]:
-        """Return URL, headers and JSON of the request for a query; its schema is to be sent."""
+    def write(self, query: ModelQuery) -> HttpRequest:
+        """Return the request for a query, with JSON as its body; its schema is to be sent."""
 
     @abstractmethod
     def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
-        """Return a reply in JSON as ours; token counts that cannot be are unknown.
+        """Return a provider's reply as a `ModelReply`; impossible token counts become unknown.
 
         It may raise any error of a missing or wrong text.
         """
 
     def answer(self, query: ModelQuery) -> ModelReply:
-        """Send a query; see `Model`."""
+        """Send a query and return the reply; errors become those that `Model` names."""
         if not self.options.structured:
             query = query._replace(schema=None)
         # No error is chained: the service's message may hold the key, and tracebacks are recorded.
         try:
-            url, headers, body = self.write(query)
-            with waiting(f"the reply of {self._name}"):
-                # The client's limits are those of single reads: they begin again with every byte.
-                found: Future[Fetched] = Future()
-                threading.Thread(
-                    target=self._fetch, args=(url, headers, body, found), daemon=True
-                ).start()
-                response, content = found.result(timeout=self.options.timeout_s)
-            if response.status_code == HTTPStatus.OK:
-                reply = self.read(json.loads(content))
+            response = self._post(self.write(query))
+            if response.status == HTTPStatus.OK:
+                reply = self.read(json.loads(response.content))
                 return reply._replace(text=without_keys(reply.text))
         except (TimeoutError, httpx.TimeoutException):
             raise PolicyTimeoutError(
@@ -96,43 +105,58 @@ class HttpModel(ABC):
             ) from None
         except (httpx.TransportError, httpx.InvalidURL) as error:
             raise PolicyConnectionError(
-                f"{self._name} cannot be reached ({type(error).__name__}: {self._quote(error)})."
+                f"{self._name} cannot be reached ({type(error).__name__}: {_quote(error)})."
             ) from None
         except MALFORMED as error:
             raise UnknownCostError(
                 f"{self._name} replied with something else ({type(error).__name__}: "
-                f"{self._quote(error)})."
+                f"{_quote(error)})."
             ) from None
-        status = response.status_code
-        words = f"HTTP status {status}: {self._quote(content.decode(errors='replace'))}"
-        if status in BUSY:
+        content = response.content.decode(errors="replace")
+        words = f"HTTP status {response.status}: {_quote(content)}"
+        if response.status in BUSY:
             raise ModelBusyError(
                 f"{self._name} is not available: {words}", retry_after_s(response.headers)
             )
         raise PolicyReplyError(f"{self._name} refused or failed: {words}")
 
-    def _fetch(
-        self, url: str, headers: Mapping[str, str], body: bytes, found: Future[Fetched]
-    ) -> None:
-        """Post a request; put the response and its content, or any error, where another waits.
+    def _post(self, request: HttpRequest) -> _Response:
+        """Post a request and return the response; raise what `_fetch` has raised.
+
+        The client's limits are those of single reads, which begin again with every byte; so a
+        thread reads, and the time until it is done is limited here.
+        """
+        fetched: Future[_Response] = Future()
+        thread = threading.Thread(target=self._fetch, args=(request, fetched), daemon=True)
+        with waiting(f"the reply of {self._name}"):
+            thread.start()
+            return fetched.result(timeout=self.options.timeout_s)
+
+    def _fetch(self, request: HttpRequest, fetched: Future[_Response]) -> None:
+        """Post a request; put the response, or any error, where another thread waits.
 
         The error is a `ValueError` if the content is too large.
         """
         # A few compressed kilobytes may become gigabytes: nothing is unpacked.
-        sent = {"Content-Type": "application/json", "Accept-Encoding": "identity", **headers}
+        plain = {"Content-Type": "application/json", "Accept-Encoding": "identity"}
+        headers = {**plain, **request.headers}
         content = bytearray()
         try:
-            with self._client.stream("POST", url, content=body, headers=sent) as response:
+            with self._client.stream(
+                "POST", request.url, content=request.body, headers=headers
+            ) as response:
                 for piece in response.iter_raw():
                     content += piece
-                    if len(content) > MAX_RESPONSE_MIB * 2**20:
+                    if len(content) > MAX_RESPONSE_MIB * MIB:
                         raise ValueError(f"the response has more than {MAX_RESPONSE_MIB} MiB")
-            found.set_result((response, bytes(content)))
+            fetched.set_result(_Response(response.status_code, response.headers, bytes(content)))
         except BaseException as error:  # noqa: BLE001 - raised again in the waiting thread
-            found.set_exception(error)
+            fetched.set_exception(error)
 
-    def _quote(self, words: object) -> str:
-        return " ".join(without_keys(str(words)).split())[:MAX_ERROR_LENGTH]
+
+def _quote(words: object) -> str:
+    """Return the beginning of what a service said, without keys."""
+    return " ".join(without_keys(str(words)).split())[:MAX_ERROR_LENGTH]
 
 
 def given(**entries: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON

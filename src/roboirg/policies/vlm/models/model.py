@@ -24,6 +24,8 @@ KEY_VARIABLES: Mapping[Provider, str] = {"openai": "OPENAI_API_KEY", "google": "
 """Environment variables with the keys of the providers' own services, by default."""
 NO_KEY = "none"
 """Sent as the key to a server that needs none."""
+_PRICED_TOKENS = 1_000_000
+"""Prices are those of so many tokens."""
 MOST_TOKENS = 100_000_000
 """Of one query or reply: ten times the longest context of a model, ten million tokens."""
 
@@ -73,6 +75,7 @@ class ModelOptions(BaseModel):
     @field_validator("base_url")
     @classmethod
     def _has_no_secret(cls, url: str | None) -> str | None:
+        """Refuse an address that could hold a secret, or that is none."""
         parts = urlsplit(url or "http://provider")
         if parts.scheme not in ("http", "https") or not parts.hostname:
             raise ValueError("an address must begin with http:// or https:// and name a host")
@@ -90,7 +93,9 @@ class ModelOptions(BaseModel):
     @property
     def key_variable(self) -> str | None:
         """The environment variable with the key; None if none is needed."""
-        return self.api_key_env or (None if self.base_url else KEY_VARIABLES.get(self.provider))
+        if self.api_key_env:
+            return self.api_key_env
+        return None if self.base_url else KEY_VARIABLES.get(self.provider)
 
     def key(self) -> str:
         """Return the key, or `NO_KEY` if none is needed.
@@ -121,12 +126,16 @@ class ModelOptions(BaseModel):
     @property
     def has_prices(self) -> bool:
         """Whether the cost of replies is known."""
-        return (self.input_price, self.output_price) != (None, None)
+        return self.input_price is not None or self.output_price is not None
 
     def cost_usd(self, reply: ModelReply) -> float:
         """Return what a reply costs: 0 without prices, NaN if tokens with a price are unknown."""
-        paid = ((reply.input_tokens, self.input_price), (reply.output_tokens, self.output_price))
-        return sum(tokens * price for tokens, price in paid if price) / 1_000_000
+        cost = 0.0
+        if self.input_price:
+            cost += reply.input_tokens * self.input_price
+        if self.output_price:
+            cost += reply.output_tokens * self.output_price
+        return cost / _PRICED_TOKENS
 
 
 class ModelQuery(NamedTuple):
@@ -187,5 +196,7 @@ def config_version(model: ModelOptions, about: Mapping[str, Any]) -> str:
 
     The address is left out: a model at another port is the same model.
     """
-    own = {name: value for name, value in model.about().items() if name != "address"}
-    return f"{model.model} {short_hash(json.dumps({**about, 'model': own}, sort_keys=True))}"
+    about_model = model.about()
+    del about_model["address"]
+    text = json.dumps({**about, "model": about_model}, sort_keys=True)
+    return f"{model.model} {short_hash(text)}"

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from roboirg.policies.vlm.model_content import ChatTurn, Part
-from roboirg.policies.vlm.models.http_model import HttpModel, given, reported_count
+from roboirg.policies.vlm.models.http_model import HttpModel, HttpRequest, given, reported_count
 from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply
 from roboirg.util.media import Picture, encode_png, sample_evenly
 from roboirg.util.reply_reading import with_thoughts
@@ -22,23 +22,30 @@ class OpenAIModel(HttpModel):
 
     home = "https://api.openai.com/v1"
 
-    def write(self, query: ModelQuery) -> tuple[str, dict[str, str], bytes]:
-        """Return the request for a query."""
+    def write(self, query: ModelQuery) -> HttpRequest:
+        """Return the HTTP request for a query, in the form of OpenAI's chat completions."""
         options = self.options
-        form = {"name": "answer", "strict": True, "schema": query.schema}
+        response_format = None
+        if query.schema:
+            form = {"name": "answer", "strict": True, "schema": query.schema}
+            response_format = {"type": "json_schema", "json_schema": form}
         body = given(
             model=options.model,
             messages=chat_messages(query, options),
             max_tokens=options.max_output_tokens,
-            response_format=query.schema and {"type": "json_schema", "json_schema": form},
+            response_format=response_format,
             temperature=options.temperature,
         )
         text = json.dumps(body, ensure_ascii=False, separators=(",", ":"))
-        url = f"{(options.base_url or self.home).rstrip('/')}/chat/completions"
-        return url, {"Authorization": f"Bearer {self.key}"}, text.encode()
+        base_url = (options.base_url or self.home).rstrip("/")
+        headers = {"Authorization": f"Bearer {self.key}"}
+        return HttpRequest(f"{base_url}/chat/completions", headers, text.encode())
 
     def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
-        """Return the text of the first choice, which may come in parts, and its thoughts."""
+        """Return the text of a reply's first choice with its thoughts, and the tokens of both.
+
+        Servers differ: a text comes whole or in parts, and thoughts as parts or in a field apart.
+        """
         message = reply["choices"][0]["message"]
         parts = message.get("content") or ""
         if isinstance(parts, str):
@@ -58,22 +65,24 @@ class OpenAIModel(HttpModel):
 
 def chat_messages(query: ModelQuery, options: ModelOptions) -> list[dict[str, Any]]:
     """Return a query as the messages of OpenAI's chat completions."""
-    return [
-        {"role": "system", "content": query.system},
-        *(_message(turn, options) for turn in query.turns),
-    ]
+    messages: list[dict[str, Any]] = [{"role": "system", "content": query.system}]
+    for turn in query.turns:
+        messages.append(_message(turn, options))
+    return messages
 
 
 def _message(turn: ChatTurn, options: ModelOptions) -> dict[str, Any]:
+    """Return a turn of the conversation as a message; those of the model are texts only."""
     if turn.role == "model":
         return {"role": "assistant", "content": "".join(map(str, turn.parts))}
-    return {
-        "role": "user",
-        "content": [piece for part in turn.parts for piece in _pieces(part, options)],
-    }
+    pieces: list[dict[str, Any]] = []
+    for part in turn.parts:
+        pieces += _pieces(part, options)
+    return {"role": "user", "content": pieces}
 
 
 def _pieces(part: Part, options: ModelOptions) -> Iterator[dict[str, Any]]:
+    """Yield the pieces of a message that hold a part: a clip may be several pictures."""
     if isinstance(part, str):
         yield {"type": "text", "text": part}
     elif isinstance(part, Picture):
@@ -81,7 +90,8 @@ def _pieces(part: Part, options: ModelOptions) -> Iterator[dict[str, Any]]:
     elif options.video == "mp4":
         yield {"type": "video_url", "video_url": {"url": _data_url("video/mp4", part.file)}}
     else:
-        yield from map(_image, map(Picture, sample_evenly(part.frames, options.clip_frames)))
+        for frame in sample_evenly(part.frames, options.clip_frames):
+            yield _image(Picture(frame))
 
 
 def _image(picture: Picture) -> dict[str, Any]:

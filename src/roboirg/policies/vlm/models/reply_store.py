@@ -16,9 +16,8 @@ import sqlite3
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from roboirg.core.errors import BudgetError
 from roboirg.core.handed_keys import without_keys
@@ -92,6 +91,7 @@ class ReplyStore:
 
     @functools.cached_property
     def _database(self) -> sqlite3.Connection:
+        """The run's file of replies, opened and if need be made when it is first used."""
         self.settings.folder.mkdir(parents=True, exist_ok=True)
         database = sqlite3.connect(
             self.settings.folder / REPLIES_FILE, timeout=_LOCK_S, isolation_level=None
@@ -107,10 +107,10 @@ class ReplyStore:
             self._database.close()
 
     def replies(self) -> dict[str, ModelReply]:
-        """Return the stored replies to the next call, by the digest of what was sent.
+        """Return the stored replies to this episode's next call, by the digest of what was sent.
 
-        There are none in a run that passes them over. Earlier versions stored keys in them, and
-        counts that cannot be.
+        There are none if the run asks everything anew. What earlier versions have stored is
+        cleaned: texts may hold keys, and counts of tokens may be impossible.
         """
         if self.settings.anew:
             return {}
@@ -178,6 +178,7 @@ class ReplyStore:
                 "SELECT total(next_at) FROM services WHERE name = ?", (service,)
             ).fetchone()
             now = time.time()
+            # The first to come may ask now, each other one `gap` seconds after the one before.
             turn = max(now, next_at)
             self._database.execute(_POSTPONE, (service, turn + gap))
         if turn > now:
@@ -190,11 +191,19 @@ class ReplyStore:
 
 
 def digest(query: ModelQuery, options: ModelOptions) -> str:
-    """Return a digest of everything that is sent and may change the reply."""
+    """Return a digest of everything that is sent to a model and may change its reply.
+
+    Each part leads with its kind and size, so that no two different queries give the same bytes.
+    Stored replies are found by it, so that a change here makes runs ask again.
+    """
+    parts: list[Any] = [options.about(), query.system]
+    parts.append(None if query.schema is None else dict(query.schema))
+    for turn in query.turns:
+        parts.append(turn.role)
+        parts += turn.parts
+
     found = hashlib.sha256()
-    turns = ((turn.role, *turn.parts) for turn in query.turns)
-    schema = None if query.schema is None else dict(query.schema)
-    for part in (options.about(), query.system, schema, *chain.from_iterable(turns)):
+    for part in parts:
         if isinstance(part, Picture):
             found.update(f"picture {part.pixels.shape}".encode())
             found.update(part.pixels.tobytes())

@@ -1,0 +1,109 @@
+"""What understands words: a reader names the task and the goal from words and the first looks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import nn
+
+from roboirg.extension.episodes import goal_schema
+from roboirg_learn.listener.listener_net import ListenerNet
+from roboirg_learn.listener.object_relations import ObjectsInView, rank
+from roboirg_learn.listener.reader_plan import WORDLESS
+from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary
+from roboirg_learn.policy.task_net import TaskNet
+from roboirg_learn.policy.tracks import LookTokens
+from roboirg_learn.policy.trained_body import GoalLayout
+from roboirg_learn.trained_file import TrainedFile, load_trained, save_trained
+
+
+class TrainedReader(NamedTuple):
+    """A trained reader.
+
+    Attributes:
+        vocabulary: of words, classes of things, tasks and parts of goals.
+        corners: (4, 2) of the area where things stand, m.
+        task_net: names the task.
+        net: understands the goal.
+        plan: how it was trained, for records; as `ReaderPlan.about` returns it, and more.
+        version: fingerprint of its file; empty if it comes from none.
+    """
+
+    vocabulary: Vocabulary
+    corners: NDArray[np.float64]
+    task_net: TaskNet
+    net: ListenerNet
+    plan: dict[str, Any]
+    version: str = ""
+
+    @property
+    def nets(self) -> nn.ModuleDict:
+        """Its networks by the names that they have in its file."""
+        return nn.ModuleDict({"task_net": self.task_net, "reader": self.net})
+
+    def understand(
+        self, text: str, looks: Sequence[LookTokens], goals: GoalLayout
+    ) -> NDArray[np.float32]:
+        """Return the goal that an instruction means.
+
+        Args:
+            text: everything that was said.
+            looks: the first one, and a later one of the video if there is one.
+            goals: which numbers stand for which goals.
+        """
+        heard = "" if self.plan["words"] == WORDLESS else text
+        seen = seen_things(looks, self.corners, self.vocabulary.classes)
+        with torch.no_grad():
+            (task_scores,) = self.task_net([heard], [seen])
+            task = self.vocabulary.tasks[int(task_scores.argmax())]
+            (goal_scores,) = self.net([ListenerInput(task, heard, seen)])
+        answers = list(goal_schema(task).goals)
+        return goals.numbers(task, answers[int(goal_scores.argmax())])
+
+
+def seen_things(
+    looks: Sequence[LookTokens], corners: NDArray[np.float64], classes: Sequence[str]
+) -> ObjectsInView:
+    """Return what is seen at one or two looks, for the reader."""
+    places = np.concatenate([look.places for look in looks]).astype(np.float64)
+    return rank([look.classes for look in looks], places, corners, classes)
+
+
+def save_reader(reader: TrainedReader, path: Path) -> None:
+    """Write a trained reader.
+
+    Raises:
+        InvalidValueError: the file cannot be written.
+    """
+    about = {"plan": reader.plan, "vocabulary": reader.vocabulary._asdict()}
+    corners = torch.from_numpy(reader.corners)
+    save_trained("reader", about, reader.nets, {"corners": corners}, path)
+
+
+def load_reader(path: Path) -> TrainedReader:
+    """Return a trained reader; nothing of the file is executed.
+
+    Raises:
+        InvalidValueError: the file is none.
+    """
+    return load_trained(path, "reader", _read)
+
+
+def _read(file: TrainedFile) -> TrainedReader:
+    plan = file.about["plan"]
+    vocabulary = Vocabulary.of(file.about["vocabulary"])
+    reader = TrainedReader(
+        vocabulary=vocabulary,
+        corners=file.tensors["corners"].numpy(),
+        task_net=TaskNet(vocabulary),
+        net=ListenerNet(vocabulary, plan["encoders"]),
+        plan=plan,
+        version=file.version,
+    )
+    file.load(reader.nets)
+    return reader

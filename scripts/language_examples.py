@@ -1,0 +1,163 @@
+"""Examples of what is said, in Markdown, for the pages about the settings.
+
+`write_language_card.py` writes them into docs/language.md and docs/harder-settings.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from written_parts import with_part
+
+from roboirg.core.episode import Episode
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language.generator import find_refusal, instruct
+from roboirg.language.instruction import Described, Instruction, Mention
+from roboirg.language.meaning import field_values
+from roboirg.language.settings import all_settings, plain_settings
+from roboirg.tasks.splits.splits import get_episode, split_episodes
+
+WALK = ("PickXtimes", 6)
+"""A test episode that all settings can express, each by another way."""
+RIVALS: Mapping[str, str] = {
+    "former": "PickXtimes",
+    "latter": "StopCube",
+    "not_former": "VideoUnmask",
+    "not_latter": "VideoPlaceButton",
+}
+"""For each kind of remark the task of its example."""
+SEEN = (
+    ("place", "PickXtimes"),
+    ("place", "VideoUnmaskSwap"),
+    ("betweenness", "VideoUnmask"),
+    ("sets", "ButtonUnmask"),
+    ("counts", "VideoRepick"),
+    ("counts", "BinFill"),
+    ("events", "VideoRepick"),
+    ("events", "VideoPlaceOrder"),
+)
+"""Kinds of what has to be seen, each with the task of an example."""
+
+
+def language_page(page: str) -> str:
+    """Return the page of the settings with its examples."""
+    page = with_part(page, "walk", _texts_of_walk())
+    return with_part(page, "meanings", _meanings_of_walk())
+
+
+def harder_page(page: str) -> str:
+    """Return the page of the harder settings with its examples."""
+    page = with_part(page, "rivals", _rivals())
+    return with_part(page, "seen", _seen())
+
+
+def walk() -> dict[str, Instruction]:
+    """Return what every setting says of the example, the main ones first."""
+    task, index = WALK
+    episode = get_episode(task, "test", index)
+    harder = [name for name, setting in all_settings().items() if setting.plain is not None]
+    names = [*plain_settings(), *harder]
+    return {name: instruct(episode, name) for name in names}
+
+
+def _texts_of_walk() -> str:
+    lines = ["| setting | what is said |", "| --- | --- |"]
+    for name, said in walk().items():
+        turns = marked_turns(said)
+        if name == "contextual":
+            turns = [f"({number}) {turn}" for number, turn in enumerate(turns, start=1)]
+        lines.append(f"| `{name}` | {' '.join(turns)} |")
+    return "\n".join(lines)
+
+
+def _meanings_of_walk() -> str:
+    task, index = WALK
+    episode = get_episode(task, "test", index)
+    lines = [
+        "| setting | introduced | points back | operation | value |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for name, said in walk().items():
+        rows = [" | ".join(cells) for cells in _meanings(said, episode)]
+        lines += [f"| `{name}` | {row} |" for row in rows]
+    return "\n".join(lines)
+
+
+def _meanings(said: Instruction, episode: Episode) -> Iterator[tuple[str, str, str, str]]:
+    """Yield how each field that the command leaves open gets its value."""
+    if said.meaning is None:
+        return
+    for field, term in said.meaning.terms.items():
+        if field in said.meaning.settled:
+            continue
+        operands = [_operand(operand) for operand in term.operands]
+        operation = f"{term.operation} {term.rank}" if term.rank else term.operation
+        values = field_values(said.meaning, field, episode)
+        value = ", ".join(sorted(map(str, values)))
+        yield ", ".join(operands), ", ".join(_pointers(said)), operation, value
+
+
+def _operand(operand: str | int | Described) -> str:
+    return operand.phrase if isinstance(operand, Described) else str(operand)
+
+
+def _pointers(said: Instruction) -> Iterator[str]:
+    """Yield the words of the command that point back, each once."""
+    last = len(said.utterances) - 1
+    words = [
+        said.span(mention)
+        for mention in said.mentions
+        if mention.utterance == last and mention.role == "anaphor"
+    ]
+    yield from dict.fromkeys(f"*{word}*" for word in words)
+
+
+def _rivals() -> str:
+    lines = ["| remark | what is said | meant |", "| --- | --- | --- |"]
+    for remark, task in RIVALS.items():
+        episode = _first_with(task, "direct-rival", "rival_reference", remark)
+        said = instruct(episode, "direct-rival")
+        values = [value for *_, value in _meanings(said, episode)]
+        lines.append(f"| `{remark}` | {marked(said)} | {', '.join(values)} |")
+    return "\n".join(lines)
+
+
+def _seen() -> str:
+    lines = ["| kind | task | what is said |", "| --- | --- | --- |"]
+    for kind, task in SEEN:
+        said = instruct(_first_with(task, "grounded", "pattern", kind), "grounded")
+        lines.append(f"| {kind} | {task} | {marked(said)} |")
+    return "\n".join(lines)
+
+
+def _first_with(task: str, setting: str, note: str, wanted: str) -> Episode:
+    """Return the first test episode of a task whose words have something in their metadata."""
+    options = InstructionOptions(setting)
+    for episode in split_episodes([task], ["test"]):
+        is_said = find_refusal(episode, options) is None
+        if is_said and instruct(episode, setting).metadata[note] == wanted:
+            return episode
+    raise LookupError(f"No test episode of {task} has {wanted} in {setting}.")
+
+
+def marked(instruction: Instruction) -> str:
+    """Return the prompt in Markdown, with antecedents in italics and anaphors in bold."""
+    return " ".join(marked_turns(instruction))
+
+
+def marked_turns(instruction: Instruction) -> list[str]:
+    """Return the utterances, marked like that."""
+    turns: list[str] = []
+    for number, utterance in enumerate(instruction.utterances):
+        text = utterance.text
+        for mention in reversed(instruction.mentions):
+            if mention.utterance == number:
+                sign = _sign(mention)
+                span = f"{sign}{text[mention.start : mention.end]}{sign}"
+                text = f"{text[: mention.start]}{span}{text[mention.end :]}"
+        turns.append(text)
+    return turns
+
+
+def _sign(mention: Mention) -> str:
+    return "**" if mention.role == "anaphor" else "*"

@@ -1,0 +1,1 @@
+"""What follows from records: measured rates and gaps, tables, figures and the HTML page."""

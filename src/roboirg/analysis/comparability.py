@@ -1,0 +1,160 @@
+"""Whether a rate can be compared with the published one of its cell, and what differs if not.
+
+Only the explicit setting can be repeated: its episodes are RoboMME's test episodes and its words
+RoboMME's, which a wording file brings. The paper's implicit instructions are not published.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+from roboirg.analysis.published import MAX_STEPS, TRIALS, published_tasks
+from roboirg.analysis.results.frame import RunNames
+from roboirg.analysis.results.policy_run import PolicyRun
+from roboirg.analysis.results.run_cells import CellKey
+from roboirg.core.arms import TOLD
+from roboirg.core.environment_options import DEFAULT_MESHES
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.plain_text import counted
+from roboirg.core.word_pools import ROBOMME_NAME, words_label
+from roboirg.language.settings import EXPLICIT
+from roboirg.stats.cells import Cell
+
+Differences = tuple[str, ...]
+"""What differs from the published rate; empty if the two can be compared."""
+AllDifferences = Mapping[CellKey, Differences | None]
+"""The differences of cells; None where there is nothing to compare."""
+
+IMPLICIT: Differences = ("the paper's instructions are not published",)
+REAL: Differences = ("the paper's own robot",)
+
+COMPARABLE_SIGN = "="
+DIFFERENT_SIGN = "≠"
+
+_SPLIT = "test"
+
+
+def differences_of(key: CellKey, cell: Cell) -> Differences | None:
+    """Return what differs between a cell and the published rate of that cell.
+
+    The number of policy seeds makes no difference, nor does it matter what the policy is.
+
+    Returns:
+        None if nothing is published for the task, or if the cell has no rate.
+    """
+    if not cell.verdicts:
+        return None
+    if key.task in published_tasks("real"):
+        return REAL
+    if key.task not in published_tasks("main"):
+        return None
+    if key.options.setting != EXPLICIT:
+        return IMPLICIT
+    return tuple(_explicit_differences(key.policy_run, cell))
+
+
+def merged(differences: Iterable[Differences | None]) -> Differences | None:
+    """Return what differs in an average of cells; None if one of them cannot be compared."""
+    merged_differences: list[str] = []
+    for differences_of_cell in differences:
+        if differences_of_cell is None:
+            return None
+        merged_differences += differences_of_cell
+    return tuple(dict.fromkeys(merged_differences))
+
+
+def comparison_sign(differences: Differences | None) -> str:
+    """Return the sign of a rate; empty if no rate of its kind can ever be compared."""
+    if differences in (None, IMPLICIT, REAL):
+        return ""
+    return DIFFERENT_SIGN if differences else COMPARABLE_SIGN
+
+
+def comparison_notes(found: AllDifferences, names: RunNames) -> list[str]:
+    """Return sentences that explain the signs and say what differs, by policy and task."""
+    notes = []
+    if () in found.values():  # nothing differs
+        notes.append(
+            f"{COMPARABLE_SIGN} comparable with the published rate: RoboMME's test episodes, "
+            "words, step limit and world."
+        )
+    notes += _different_notes(found, names)
+    if IMPLICIT in found.values():
+        notes.append(
+            f"Implicit settings are not comparable with the published rates: {IMPLICIT[0]}."
+        )
+    if REAL in found.values():
+        notes.append(f"These rates are not comparable with the published rates: {REAL[0]}.")
+    return notes
+
+
+def _different_notes(found: AllDifferences, names: RunNames) -> Iterator[str]:
+    """Yield a sentence for each text of what differs, with the policies of which it is true.
+
+    For example ``≠ not comparable with the published rate (pi0, max steps 900): 900 steps instead
+    of 1300.`` Policies are named only if there are others.
+    """
+    runs: dict[PolicyRun, dict[str, Differences]] = {}
+    for key, differences in found.items():
+        if differences is not None and comparison_sign(differences):
+            runs.setdefault(key.policy_run, {})[key.task] = differences
+    runs_by_text: dict[str, list[PolicyRun]] = {}
+    for policy_run, tasks in runs.items():
+        runs_by_text.setdefault(_text(tasks), []).append(policy_run)
+
+    for text, policy_runs in runs_by_text.items():
+        if not text:
+            continue  # nothing differs
+        who = ""
+        if len(policy_runs) < len(runs):
+            who = f" ({'; '.join(names[policy_run] for policy_run in policy_runs)})"
+        yield f"{DIFFERENT_SIGN} not comparable with the published rate{who}: {text}."
+
+
+def _text(tasks: Mapping[str, Differences]) -> str:
+    """Return what differs, with the tasks in which it does unless these are all.
+
+    For example ``split train; 1 error (PickXtimes, StopCube)``.
+    """
+    tasks_by_difference: dict[str, list[str]] = {}
+    for task, differences in tasks.items():
+        for difference in differences:
+            tasks_by_difference.setdefault(difference, []).append(task)
+    parts = []
+    for difference, its_tasks in tasks_by_difference.items():
+        part = difference
+        if len(its_tasks) < len(tasks):
+            part += f" ({', '.join(its_tasks)})"
+        parts.append(part)
+    return "; ".join(parts)
+
+
+def _explicit_differences(policy_run: PolicyRun, cell: Cell) -> Iterator[str]:
+    """Yield what differs from the conditions under which the paper's policies were played."""
+    conditions = policy_run.conditions
+    versions = policy_run.versions
+    environment = conditions.environment
+    # Behind the @ stands a hash of the file's words. Only a file with exactly RoboMME's sentences
+    # can be opened under its name, so the name is enough.
+    if (conditions.wordings or "").partition("@")[0] != ROBOMME_NAME:
+        yield words_label(conditions.wordings)
+    episodes = TRIALS["main"].episodes
+    played = len(cell.by_episode().keys() & set(range(episodes)))
+    if conditions.arm != TOLD:
+        yield f"arm {conditions.arm}"
+    if conditions.split != _SPLIT:
+        yield f"split {conditions.split}"
+    elif played < episodes:
+        yield f"{played} of {counted(episodes, 'episode')}"
+    if environment.max_steps != MAX_STEPS:
+        yield f"{environment.max_steps} steps instead of {MAX_STEPS}"
+    if environment.meshes != DEFAULT_MESHES:
+        yield f"{environment.meshes} meshes"
+    if environment.demonstration_frames not in (None, "all"):
+        yield f"frames of the video: {environment.demonstration_frames}"
+    if versions.environment_version not in (None, ENVIRONMENT_VERSION):
+        yield f"environment version {versions.environment_version}"
+    if cell.errors:
+        yield counted(cell.errors, "error")
+    if cell.missing:
+        yield f"{counted(cell.missing, 'trial')} still to be played"

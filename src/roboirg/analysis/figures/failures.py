@@ -1,0 +1,118 @@
+"""Figure: causes of failures, a panel for each policy and in it a stacked bar for each setting."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from roboirg.analysis.figures.figure_style import panels, paper
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.results.option_labels import options_label, options_sort_key
+from roboirg.analysis.tables.diagnostic_tables import FAILURES, count_failures
+from roboirg.analysis.tables.table_notes import where_played
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_COLUMNS = 2
+HEIGHT = 1.55
+"""Of a bar, of the two lines of a row."""
+MIN_LABELED_PERCENT = 6.0
+"""Smallest part with room for its number, percent."""
+_ORANGE = (
+    "#7f2704", "#a63603", "#c0510a", "#dd6a1c", "#ee8130", "#fbb477", "#fddfbf", "#fff1e3",
+)  # fmt: skip
+_BLUE = (
+    "#08306b", "#20578f", "#3271a8", "#4b90c4", "#74b0d8", "#a9d0e8", "#d9ebf6", "#edf5fb",
+)  # fmt: skip
+_GRAY = ("#5f5f5f", "#858585", "#ababab", "#cfcfcf")
+_DARK = frozenset((*_ORANGE[:4], *_BLUE[:4], *_GRAY[:2]))
+NOTE = "n: trials with a verdict; the rest of a bar succeeded."
+
+
+COLORS = dict(zip(FAILURES, (*_ORANGE, *_BLUE, *_GRAY, "#eeeeee"), strict=True))
+"""By name of the failure: orange for grounding, blue for execution, gray for undecided."""
+
+
+def draw_failures(content: RunData) -> Figure | None:
+    """Draw the shares of episodes by cause of failure; return None without failures."""
+    counts_by_bar = count_failures(content.frame, ("run", "options"))
+    occurring: Counter[str] = Counter()
+    for counts in counts_by_bar.values():
+        occurring += counts
+    causes = [name for name in COLORS if occurring[name]]
+    if not causes:
+        return None
+
+    runs = list(dict.fromkeys(run for run, _ in counts_by_bar))
+    settings = sorted({options for _, options in counts_by_bar}, key=options_sort_key)
+    figure, drawn = panels(
+        titles=list(map(content.name, runs)),
+        labels=list(map(options_label, settings)),
+        most_across=MOST_COLUMNS,
+        keys=_keys(causes),
+        notes=[NOTE, where_played(runs)],
+    )
+    for panel, run in zip(drawn, runs, strict=True):
+        for place, options in zip(panel.places, settings, strict=True):
+            _draw_bar(panel.axes, place, counts_by_bar.get((run, options), Counter()), causes)
+        panel.axes.set_xlim(0, 100)
+        panel.axes.set_xticks(range(0, 101, 25))
+        panel.axes.set_xlabel("share of the episodes with a verdict, %", fontsize=6.5)
+    return figure
+
+
+def _keys(causes: Iterable[str]) -> dict[str, Artist]:
+    """Return what the legend explains: the color of each cause.
+
+    It is called by its kind and name, such as ``grounding: wrong object``.
+    """
+    from matplotlib.patches import Patch
+
+    keys: dict[str, Artist] = {}
+    for name in causes:
+        label = name.replace("_", " ")
+        if FAILURES[name]:
+            label = f"{FAILURES[name]}: {label}"
+        keys[label] = Patch(facecolor=COLORS[name], edgecolor=paper())
+    return keys
+
+
+def _draw_bar(axes: Axes, place: float, counts: Counter[str], causes: Sequence[str]) -> None:
+    """Draw the parts of a bar side by side, and the number of trials behind it.
+
+    Args:
+        axes: of the panel.
+        place: vertical position of the bar.
+        counts: trials with a verdict, and failures by cause.
+        causes: the parts of the bar from left to right.
+    """
+    trials = counts["trials"]
+    left = 0.0
+    for name in causes:
+        width = 100 * counts[name] / max(1, trials)
+        axes.barh(
+            place,
+            width,
+            left=left,
+            height=HEIGHT,
+            color=COLORS[name],
+            edgecolor=paper(),
+            linewidth=0.5,
+        )
+        if width >= MIN_LABELED_PERCENT:
+            axes.text(
+                left + width / 2,
+                place,
+                str(counts[name]),
+                ha="center",
+                va="center",
+                fontsize=6.5,
+                color="white" if COLORS[name] in _DARK else "black",
+            )
+        left += width
+    text = f"n = {trials}" if trials else "–"
+    axes.text(1.02, place, text, transform=axes.get_yaxis_transform(), va="center", fontsize=6.5)

@@ -1,0 +1,230 @@
+"""What control arms show: each figure compares two rates over the same scenes.
+
+A control arm plays a scene again with other words, another goal or another policy seed; the arm
+``told`` has the scene's own words. Of a trial, which is a scene with a policy seed, a figure counts
+some arms in its first rate and some in its second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from roboirg.analysis.measures.measure import Measured, pair, with_holm
+from roboirg.analysis.results.frame import Frame
+from roboirg.analysis.results.option_labels import options_sort_key
+from roboirg.analysis.results.policy_run import PolicyRun
+from roboirg.core.arms import (
+    AGAIN,
+    MOST_PARAPHRASES,
+    OTHER_GOAL,
+    SCRAMBLED,
+    SILENT,
+    SILENT_EMPTY,
+    TOLD,
+    paraphrase_number,
+)
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.records.record import Summary
+from roboirg.stats.cells import (
+    Cell,
+    Key,
+    Trial,
+    clustered_interval,
+    rows_of,
+)
+from roboirg.stats.intervals import SEED
+from roboirg.stats.paired_tests import measure_gap
+
+LANGUAGE_USE = "language use"
+WORDS_WORTH = "words' worth"
+ORDERS_WORTH = "order's worth"
+
+Arms = Mapping[str, Summary]
+"""The results of one trial by arm."""
+
+
+Trials = dict[Key, dict[str, Summary]]
+"""The results of trials by arm."""
+
+
+class Sides(NamedTuple):
+    """What a trial counts in the two rates, as results whose outcome is that."""
+
+    first: Sequence[Summary]
+    second: Sequence[Summary]
+
+
+class ArmContrast(NamedTuple):
+    """One figure.
+
+    Attributes:
+        name: of the figure.
+        first: what the first rate counts, in a word or two.
+        second: what the second rate counts.
+        sides: returns what a trial counts in each; None if it lacks an arm.
+    """
+
+    name: str
+    first: str
+    second: str
+    sides: Callable[[Arms], Sides | None]
+
+
+class ArmKey(NamedTuple):
+    """Policy run as of the arm ``told``, options of the instruction, and which figure."""
+
+    run: PolicyRun
+    options: InstructionOptions
+    contrast: ArmContrast
+
+
+ArmFigure = Measured[ArmKey]
+"""The results of the first rate, its gap to the second, and its p-value, corrected over all figures
+of the policy run."""
+
+
+def arm_figures(frame: Frame) -> tuple[ArmFigure, ...]:
+    """Return the figures for which the arms were played, by policy run and setting.
+
+    Each is measured by setting first, and sorted by policy run afterwards.
+    """
+    rng = np.random.default_rng(SEED)
+    groups = _trials_by_group(frame)
+    figures = []
+    # The order of these is part of the results: they draw from one generator.
+    for group in sorted(groups, key=lambda group: options_sort_key(group.options)):
+        for contrast in CONTRASTS:
+            key = ArmKey(group.run, group.options, contrast)
+            figure = _figure(key, groups[group].values(), rng)
+            if figure is not None:
+                figures.append(figure)
+    runs = list(dict.fromkeys(group.run for group in groups))
+    figures.sort(key=lambda figure: runs.index(figure.key.run))
+    return with_holm(figures, lambda key: key.run)
+
+
+class _Group(NamedTuple):
+    """Policy run as of the arm ``told``, and options of the instruction."""
+
+    run: PolicyRun
+    options: InstructionOptions
+
+
+def _trials_by_group(frame: Frame) -> dict[_Group, Trials]:
+    """Return the results with a verdict by policy run and options, by trial, and by arm.
+
+    The arms of a policy run are policy runs of their own in the frame, but one here.
+    """
+    groups: dict[_Group, Trials] = {}
+    for run, options, result in rows_of(frame, "run", "options", "result"):
+        if not isinstance(result, Summary) or result.outcome == "error":
+            continue
+        told_run = run._replace(conditions=run.conditions._replace(arm=TOLD))
+        trials = groups.setdefault(_Group(told_run, options), {})
+        trial = (result.task, result.episode, result.policy_seed)
+        trials.setdefault(trial, {})[result.arm] = result
+    return groups
+
+
+def _figure(key: ArmKey, trials: Iterable[Arms], rng: np.random.Generator) -> ArmFigure | None:
+    """Return a figure over some trials; None if none of them has the arms that it needs."""
+    first: dict[str, Cell] = {}
+    second: dict[str, Cell] = {}
+    for arms in trials:
+        sides = key.contrast.sides(arms)
+        if sides is not None:
+            _count(sides.first, first)
+            _count(sides.second, second)
+    gap = measure_gap(pair(first, second), rng)
+    if gap is None:
+        return None
+    interval = clustered_interval(list(first.values()), rng)
+    other_interval = clustered_interval(list(second.values()), rng)
+    return Measured(key, first, second, interval, gap, other_interval=other_interval)
+
+
+def _count(results: Iterable[Summary], cells: dict[str, Cell]) -> None:
+    """Add results to the cells of their tasks; paraphrases stand as policy seeds of their own.
+
+    So a trial with the seed 0 and its paraphrases have different seeds in the same episode.
+    """
+    for result in results:
+        paraphrase = paraphrase_number(result.arm) or 0
+        seed = result.policy_seed * (MOST_PARAPHRASES + 1) + paraphrase
+        cell = cells.setdefault(result.task, Cell())
+        cell.add(Trial(result.episode, seed), result.outcome)
+
+
+def _is_success(result: Summary) -> bool:
+    return result.outcome == "success"
+
+
+def _with_outcome(result: Summary, *, is_success: bool) -> Summary:
+    """Return a result as if it had succeeded or failed."""
+    return msgspec.structs.replace(result, outcome="success" if is_success else "failure")
+
+
+def _told_against(other: str, arms: Arms) -> Sides | None:
+    """Compare the arm ``told`` with another one."""
+    if TOLD not in arms or other not in arms:
+        return None
+    return Sides([arms[TOLD]], [arms[other]])
+
+
+def _language_use(arms: Arms) -> Sides | None:
+    """Compare reaching each of two goals when stated with reaching one of them in both rollouts.
+
+    In the arm ``told`` the scene's own goal was stated, in the other one another goal of the same
+    scene. Who follows words reaches each of them; who does not, the same one twice.
+    """
+    told = arms.get(TOLD)
+    other = arms.get(OTHER_GOAL)
+    if told is None or other is None or told.goals is None or other.goals is None:
+        return None
+    is_each_reached = _is_success(told) and _is_success(other)
+    is_own_goal_reached_twice = _is_success(told) and other.goals.original == "success"
+    # The world ends with the told verdict, so there the other goal can only be begun.
+    is_other_goal_begun = other.goals.stated in told.goals.agrees
+    is_other_goal_pursued_twice = _is_success(other) and is_other_goal_begun
+    is_same_pursued = is_own_goal_reached_twice or is_other_goal_pursued_twice
+    return Sides(
+        [_with_outcome(told, is_success=is_each_reached)],
+        [_with_outcome(told, is_success=is_same_pursued)],
+    )
+
+
+def _paraphrases(arms: Arms) -> Sides | None:
+    """Compare success in all paraphrases with their mean; None with fewer than two of them.
+
+    The first rate counts each paraphrase as solved only if all of them were.
+    """
+    results = [result for arm, result in sorted(arms.items()) if paraphrase_number(arm)]
+    if len(results) <= 1:
+        return None
+    is_each_solved = all(map(_is_success, results))
+    as_if_alike = [_with_outcome(result, is_success=is_each_solved) for result in results]
+    return Sides(as_if_alike, results)
+
+
+CONTRASTS = (
+    ArmContrast(LANGUAGE_USE, "each reached when stated", "same pursued", _language_use),
+    ArmContrast(WORDS_WORTH, TOLD, SILENT, partial(_told_against, SILENT)),
+    ArmContrast(WORDS_WORTH, TOLD, SILENT_EMPTY, partial(_told_against, SILENT_EMPTY)),
+    ArmContrast(ORDERS_WORTH, TOLD, SCRAMBLED, partial(_told_against, SCRAMBLED)),
+    ArmContrast("paraphrases", "all", "mean", _paraphrases),
+    ArmContrast("repeat", TOLD, AGAIN, partial(_told_against, AGAIN)),
+)
+MEANING = (
+    "Language use: first, the share of scenes in which each of two goals was reached when stated; "
+    "second, that in which the same goal was reached in both rollouts, whichever was stated; told "
+    "ends at its verdict, so there the other goal counts if the first wrong act agrees with it. "
+    "Words' worth: success when told, then in silence. Order's worth: success when told, then with "
+    "scrambled words. Paraphrases: success in all of them, then their mean. Repeat: success when "
+    "told, then with another policy seed."
+)
+"""The two rates of each contrast."""

@@ -1,0 +1,133 @@
+"""What gaps are broken down by: kinds of instructions, and the results on each."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from roboirg.analysis.measures.measure import Measured, measure_groups
+from roboirg.analysis.results.frame import Frame
+from roboirg.analysis.results.option_labels import (
+    REFERENCE_OPTIONS,
+    SortKey,
+    options_sort_key,
+)
+from roboirg.analysis.results.policy_run import PolicyRun
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.stats.cells import NOTHING, ByTask, gather
+
+
+class Breakdown(NamedTuple):
+    """One way to break results down.
+
+    Attributes:
+        name: of a column of the frame. An episode counts in each of its texts, and in none if the
+            question does not apply to it.
+        title: heading of the labels.
+        note: what the labels mean, a sentence.
+        in_explicit: whether explicit instructions are broken down, too.
+    """
+
+    name: str
+    title: str
+    note: str
+    in_explicit: bool = False
+
+
+BREAKDOWNS: Mapping[str, Breakdown] = {
+    breakdown.name: breakdown
+    for breakdown in (
+        Breakdown("pattern", "reasoning pattern", "Each episode counts in its main pattern."),
+        Breakdown(
+            "expression",
+            "referring expression",
+            "An episode counts in each class of expression that its command has.",
+        ),
+        Breakdown(
+            "slots",
+            "hidden slots",
+            "Hidden slots are the values of the goal that the command leaves to its context.",
+        ),
+        Breakdown(
+            "rival",
+            "rival",
+            "With a rival: how the words single out one of two values.",
+        ),
+        Breakdown(
+            "difficulty",
+            "difficulty",
+            "The difficulty is that of the scene: its number of things, swaps or repetitions.",
+            in_explicit=True,
+        ),
+    )
+}
+
+
+class LabelKey(NamedTuple):
+    """Policy run and options, and the label of the instructions."""
+
+    run: PolicyRun
+    options: InstructionOptions
+    label: str
+
+
+def labeled(frame: Frame, breakdown: Breakdown) -> Frame:
+    """Return the episodes with a verdict, each once for each of its labels (column ``label``).
+
+    A value that is several texts, such as the classes of expressions in a command, is several
+    labels. Explicit instructions have none unless the breakdown is of them, too.
+    """
+    judged = frame.take([outcome in ("success", "failure") for outcome in frame["outcome"]])
+    labels_of_rows: list[list[str]] = []
+    for value, options in zip(judged[breakdown.name], judged["options"], strict=True):
+        labels: list[str] = []
+        is_broken_down = breakdown.in_explicit or options != REFERENCE_OPTIONS
+        if is_broken_down and isinstance(value, tuple):
+            labels += map(str, value)
+        elif is_broken_down and value is not None:
+            labels.append(str(value))
+        labels_of_rows.append(labels)
+    return judged.spread("label", labels_of_rows)
+
+
+def break_down(frame: Frame, breakdown: Breakdown) -> tuple[Measured[LabelKey], ...]:
+    """Return a row for each policy run, set of options and label, in the order of the frame.
+
+    Gaps are paired by episode: those of a label are compared with explicit on the very same
+    episodes, whose instruction has the same label or none. P-values are corrected over the policy
+    run. Errors and missing trials are not counted.
+    """
+    by_options = gather(frame, ("run", "options"))
+    by_label = gather(labeled(frame, breakdown), LabelKey._fields)
+    keys = list(map(LabelKey._make, by_label))
+    runs = list(frame.names)
+
+    def sort_key(key: LabelKey) -> SortKey:
+        return runs.index(key.run), options_sort_key(key.options), natural(key.label)
+
+    def explicit(key: LabelKey) -> ByTask:
+        if key.options == REFERENCE_OPTIONS:
+            return NOTHING
+        if breakdown.in_explicit:
+            return groups.get(key._replace(options=REFERENCE_OPTIONS), NOTHING)
+        return by_options.get((key.run, REFERENCE_OPTIONS), NOTHING)
+
+    # Sorted before they are measured, because all draw from one generator.
+    groups = {key: by_label[key] for key in sorted(keys, key=sort_key)}
+    return measure_groups(groups, explicit, family=lambda key: key.run)
+
+
+def natural(text: str) -> list[tuple[bool, int, str]]:
+    """Return what a text is sorted by, so that ``frame 2`` is before ``frame 10``.
+
+    Of each part of it: whether it is no number, the number, and the words. For ``frame 2`` these
+    are ``[(True, 0, "frame "), (False, 2, "")]``.
+    """
+    parts = []
+    for part in re.findall(r"\d+|\D+", text):  # digits, or what is between them
+        if part.isdigit():
+            parts.append((False, int(part), ""))
+        else:
+            parts.append((True, 0, part))
+    return parts

@@ -1,0 +1,128 @@
+"""Expected success of the policies that do not understand: the chance level, and shortcuts.
+
+The forgetful listener hears only the final command and chooses uniformly among the goals that fit
+it. Its expected success, ``command``, follows without playing, assuming flawless execution: the
+share of these goals that have the stages of the right one. The chance level is that of a guess
+among the values that the context names, such as a value and its rival, or else the same. Neither is
+known for words without a meaning. A shortcut listener draws its goal by a surface rule; its
+expected success is the probability that this goal is right. Nothing of this is estimated. Learned
+floors have the level that was measured for the task and setting, on the test split or random
+scenes, in the version of the language that was played.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable
+from fractions import Fraction
+
+from roboirg.analysis.measures.measured_floors import (
+    LEARNED,
+    RANDOM,
+    TEST,
+    FloorKey,
+    measured_floors,
+)
+from roboirg.analysis.results.option_labels import is_usual
+from roboirg.records.record import Job
+from roboirg.runs.job_instruction import instruct_job
+from roboirg.shortcuts import SURFACE_RULES, goal_share, guess_goal
+from roboirg.shortcuts.command_chance import blind_goals, goals_of_command, right_share
+from roboirg.tasks import get_task
+from roboirg.tasks.other_goals import begins_with
+from roboirg.tasks.splits.splits import get_episode
+
+CHANCE = "chance"
+COMMAND = "command"
+FLOORS = (CHANCE, COMMAND, *SURFACE_RULES, *LEARNED)
+"""A blind guess, the forgetful listener, the shortcut listeners by their rules, and learners."""
+
+
+def floor_level(floor: str, jobs: Iterable[Job], language: str = "") -> Fraction | None:
+    """Return the mean level of one of `FLOORS` over the distinct instructions of some jobs.
+
+    Policies and their seeds do not matter. None without jobs, or if no level is known.
+
+    Args:
+        floor: its name.
+        jobs: the jobs.
+        language: version of the language in which they were played, of which learned floors are.
+    """
+    instructions = dict.fromkeys(map(_without_policy, jobs))  # each once, in their order
+    levels = []
+    for instruction in instructions:
+        level = _level(floor, language, instruction)
+        if level is not None:
+            levels.append(level)
+    if not levels:
+        return None
+    return sum(levels, Fraction(0)) / len(levels)
+
+
+def _without_policy(job: Job) -> Job:
+    """Return only what of a job decides its instruction."""
+    return Job(policy="", task=job.task, split=job.split, episode=job.episode, options=job.column)
+
+
+def unmeasured_note(floors: Iterable[str], languages: Iterable[str]) -> str:
+    """Return which learned floors are missing, because a version's were not measured; or nothing.
+
+    Args:
+        floors: the names of those that are asked for.
+        languages: the versions of the language that were played.
+    """
+    learned = [floor for floor in floors if floor in LEARNED]
+    played = filter(None, languages)  # what was not played has none
+    missing = {language for language in played if measured_floors(language) is None}
+    if not learned or not missing:
+        return ""
+    return (
+        f"No learned floors ({', '.join(learned)}) were measured for language version "
+        f"{', '.join(sorted(missing))}."
+    )
+
+
+@functools.lru_cache(maxsize=65_536)
+def silent_chance(task: str, split: str, number: int) -> float:
+    """Return the expected success of who executes a random goal of the scene without any words.
+
+    Goals that begin with all stages of the right one succeed, too.
+    """
+    episode = get_episode(task, split, number)
+    scene = episode.scene
+    definition = get_task(task)
+    goals = 0
+    right_goals = 0
+    for goal in definition.goals(scene):
+        goals += 1
+        right_goals += begins_with(definition.stages(scene, goal), episode.stages)
+    return right_goals / goals
+
+
+@functools.lru_cache(maxsize=65_536)
+def _level(floor: str, language: str, job: Job) -> Fraction | None:
+    """Return the level of a floor for one instruction; None if it is not known."""
+    if floor in LEARNED:
+        return _learned_level(floor, language, job)
+    episode = get_episode(job.task, job.split, job.episode)
+    instruction = instruct_job(job)
+    if floor == CHANCE:
+        return right_share(blind_goals(instruction, episode), episode)
+    if floor == COMMAND:
+        return right_share(goals_of_command(instruction, episode), episode)
+    return goal_share(guess_goal(floor, instruction.text, job.task), episode)
+
+
+def _learned_level(floor: str, language: str, job: Job) -> Fraction | None:
+    """Return what was measured for the task and setting, on the test split or random scenes.
+
+    None for a version that was not measured, and for options other than the usual ones.
+    """
+    floors = measured_floors(language)
+    if floors is None or not is_usual(job.options):
+        return None
+    split = TEST if job.split == TEST else RANDOM
+    row = floors.get(FloorKey(split, job.setting, job.task))
+    if row is None:
+        return None
+    return Fraction(str(row.shares[floor].goals))

@@ -1,0 +1,192 @@
+"""A comparison as sentences."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import cast
+
+from roboirg.analysis.measures.comparison import Compared, Comparison
+from roboirg.analysis.results.option_labels import options_label
+from roboirg.core.plain_text import counted, verb_for
+from roboirg.stats.intervals import ALPHA
+from roboirg.stats.paired_tests import Gap
+from roboirg.stats.power import (
+    MAX_EPISODES,
+    POWER,
+    episodes_needed,
+    smallest_gap,
+)
+from roboirg.stats.rates import interval_note, p_text, points
+
+
+def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
+    """Yield the results, a sentence each; empty ones separate paragraphs.
+
+    First the averages, then the single cells, then each breakdown; at the end what p-values mean
+    and what was left out.
+
+    Args:
+        comparison: of two policies.
+        first: label of the first policy.
+        second: label of the second policy.
+    """
+    averages = [_Result(average, first, second) for average in comparison.averages]
+    cells = [_Result(cell, first, second) for cell in comparison.cells]
+    parts = {}
+    for title, part in comparison.parts.items():
+        parts[title] = [_Result(row, first, second) for row in part]
+    has_several_tasks = any(average.gap.tasks > 1 for average in averages)
+
+    yield f"{first} against {second}, on the same episodes."
+    yield ""
+    for average in averages:
+        yield average.sentence
+    if has_several_tasks:
+        yield ""
+        yield from _decided_cells(cells)
+    for title, rows in parts.items():
+        yield ""
+        yield f"By {title}:" if rows else f"By {title}: no instruction has one."
+        for row in rows:
+            yield f"  {row.sentence}"
+
+    yield ""
+    if has_several_tasks:
+        yield (
+            "p-values are from the exact paired test, after Holm's correction: over the averages, "
+            "and over the single cells. An average is the unweighted mean over tasks."
+        )
+    else:
+        yield "p-values are from the exact paired test, after Holm's correction over the settings."
+    if any(result.is_surprising for result in itertools.chain(averages, *parts.values())):
+        yield (
+            "An interval belongs to one gap alone, so it may exclude 0 although p is above 0.05; "
+            "p is corrected for all gaps that are tested together, and p decides."
+        )
+    if parts:
+        yield "Each breakdown is corrected separately, over all its rows."
+    yield from _left_out(comparison.averages)
+
+
+def _decided_cells(cells: Sequence[_Result]) -> Iterator[str]:
+    """Yield how many single cells show a difference, and these from the largest gap down."""
+    decided = [cell for cell in cells if cell.is_decided]
+    total = f"{counted(len(cells), 'single cell')} (one task in one setting)"
+    if not decided:
+        yield f"None of {total} shows a difference by itself."
+        return
+    verb = "shows" if len(decided) == 1 else "show"
+    yield f"{len(decided)} of {total} {verb} a difference:"
+    for cell in sorted(decided, key=lambda cell: -abs(cell.gap.value)):
+        yield f"  {cell.sentence}"
+
+
+@dataclass(frozen=True)
+class _Result:
+    """One result in words.
+
+    Attributes:
+        result: that has a gap.
+        first: label of the first policy.
+        second: label of the second policy.
+    """
+
+    result: Compared
+    first: str
+    second: str
+
+    @property
+    def gap(self) -> Gap:
+        return cast("Gap", self.result.gap)  # results without one are left out
+
+    @property
+    def p_holm(self) -> float:
+        return cast("float", self.result.p_holm)
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether the corrected test finds one better."""
+        return self.p_holm <= ALPHA and self.gap.value != 0
+
+    @property
+    def is_surprising(self) -> bool:
+        """Whether the interval excludes no difference, and the corrected test does not."""
+        ends = self.gap.interval
+        return not self.is_decided and ends is not None and not ends.low <= 0 <= ends.high
+
+    @property
+    def sentence(self) -> str:
+        """What was compared, who is better, and by how much."""
+        key = self.result.key
+        subject = options_label(key.options)
+        if key.task is not None:
+            subject = f"{key.task}, {subject}"
+        if key.label:
+            subject += f", {key.label}"
+        if not self.is_decided:
+            return f"{subject}: no clear difference, {self._figures}.{self._outlook}"
+        better = self.first if self.gap.value > 0 else self.second
+        return f"{subject}: {better} is better, {self._figures}."
+
+    @property
+    def _figures(self) -> str:
+        """The gap with its interval, the p-value, and the number of episodes."""
+        gap = self.gap
+        p_value = p_text(self.p_holm)
+        uncorrected = p_text(gap.p_value)
+        if self.is_surprising and uncorrected != p_value:
+            p_value += f" (uncorrected {uncorrected.removeprefix('p ').removeprefix('= ')})"
+        episodes = counted(gap.episodes, "episode")
+        if gap.tasks > 1:
+            episodes += f" of {gap.tasks} tasks"
+        return f"{points(gap.value, 1)} points{interval_note(gap.interval)}, {p_value}, {episodes}"
+
+    @property
+    def _outlook(self) -> str:
+        """Which gaps these episodes show, and how many episodes would show this gap.
+
+        For example ``These episodes can show gaps of 9.5 points or more with 80 % power; showing a
+        gap of this size needs about 1,200.``
+        """
+        gap = self.gap
+        # Share of the episodes on which the two differ, at least the gap.
+        discordance = max(abs(gap.value), gap.overlap.discordance or 0.0)
+        detectable_gap = smallest_gap(gap.episodes, discordance)
+        words = " With so few episodes, no gap can be detected"
+        if detectable_gap is not None:
+            words = f" These episodes can show gaps of {100 * detectable_gap:.1f} points or more"
+        words += f" with {100 * POWER:.0f} % power"
+        if gap.value == 0:
+            return f"{words}; the two did equally well."
+        episodes = episodes_needed(gap.value, discordance)
+        number = f"more than {MAX_EPISODES:,}"
+        if episodes is not None:
+            number = f"about {episodes:,}"
+        return f"{words}; showing a gap of this size needs {number}."
+
+
+def _left_out(averages: Iterable[Compared]) -> Iterator[str]:
+    """Yield how many trials are in no result: without a counterpart, or without a verdict."""
+    unpaired = 0
+    unjudged = 0
+    for average in averages:
+        for cell in (*average.cells.values(), *average.others.values()):
+            unpaired += len(cell.verdicts)
+            unjudged += cell.errors + cell.missing
+        if average.gap is not None:
+            unpaired -= average.gap.trials  # those of both policies that were paired
+    if unpaired:
+        verb = verb_for(unpaired, "are")
+        yield f"{counted(unpaired, 'trial')} without a counterpart {verb} left out."
+    if unjudged:
+        yield incomplete_note(unjudged)
+
+
+def incomplete_note(trials: int) -> str:
+    """Return a sentence on trials that are left out, as they have no verdict."""
+    return (
+        f"Incomplete: {counted(trials, 'trial')} without a verdict (an error, or still to be "
+        f"played) {verb_for(trials, 'are')} left out."
+    )

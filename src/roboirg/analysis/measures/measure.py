@@ -1,0 +1,406 @@
+"""Rates of groups of trials, and their gaps to others on the same episodes.
+
+A trial is one play of an episode with a policy seed; a cell holds the trials of one task. A group
+has a cell for each of its tasks, and its rate is the mean of theirs. What it is compared with is
+its reference: the gap pairs trials of the same episode. A scope is a task, a suite, or all tasks.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+
+from roboirg.analysis.results.frame import suite
+from roboirg.analysis.results.option_labels import REFERENCE_OPTIONS
+from roboirg.analysis.results.policy_run import PolicyRun
+from roboirg.analysis.results.run_cells import CellKey, Cells
+from roboirg.core.errors import InvalidValueError, UnknownNameError, check_names
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.stats.cells import (
+    NOTHING,
+    TRIAL,
+    ByTask,
+    Cell,
+    Columns,
+    Counts,
+    Key,
+    cell_interval,
+    clustered_interval,
+    gather,
+    rows_of,
+)
+from roboirg.stats.intervals import SEED, Interval
+from roboirg.stats.paired_tests import Gap, Pairs, holm, measure_gap
+
+ALL_TASKS = "all tasks"
+KEPT_APART = (
+    "policy",
+    "form",
+    "arm",
+    "delivery",
+    "split",
+    "wordings",
+    "max_steps",
+    "meshes",
+    "observe_every",
+    "demonstration_frames",
+    "language_version",
+    "environment_version",
+    "policy_version",
+    "robot",
+    "policy_label",
+    "instruction_options",
+)
+"""Columns over whose values a rate is taken only if the call names them."""
+
+K = TypeVar("K", bound=tuple[Any, ...])
+
+
+@dataclass(frozen=True, slots=True)
+class Measured(Generic[K]):
+    """What was measured of a group.
+
+    Attributes:
+        key: values of the columns that it is grouped by.
+        cells: its trials by task.
+        others: those of the first reference.
+        interval: 95 %, of the rate; None if it was not measured, or with too few episodes.
+        gap: to the first reference on the same episodes; None without pairs.
+        second_gap: to the second reference, if there is one.
+        other_interval: 95 %, of the rate of the first reference; None if it was not measured.
+        p_holm: p-value of the gap after Holm's correction over its family.
+    """
+
+    key: K
+    cells: ByTask
+    others: ByTask = field(default_factory=dict)
+    interval: Interval | None = None
+    gap: Gap | None = None
+    second_gap: Gap | None = None
+    other_interval: Interval | None = None
+    p_holm: float | None = None
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """Tasks with a verdict."""
+        return tuple(task for task, cell in self.cells.items() if cell.verdicts)
+
+    @property
+    def counts(self) -> Counts:
+        """The sums over tasks."""
+        columns = zip(*(cell.counts for cell in self.cells.values()), strict=True)
+        return Counts(*map(sum, columns))
+
+    @property
+    def rate(self) -> Fraction | None:
+        """Unweighted mean of the tasks' success rates; None without a verdict."""
+        return mean_rate(self.cells)
+
+
+def mean_rate(cells: ByTask) -> Fraction | None:
+    """Return the unweighted mean of the tasks' success rates; None without a verdict."""
+    rates = [cell.rate for cell in cells.values() if cell.rate is not None]
+    if not rates:
+        return None
+    return sum(rates, Fraction(0)) / len(rates)
+
+
+def measure(
+    frame: Columns,
+    by: Sequence[str],
+    against: Mapping[str, object] | None = None,
+    family: Sequence[str] = (),
+    pool: Sequence[str] = (),
+) -> tuple[Measured[Key], ...]:
+    """Measure success in each group of episodes, as the mean over tasks.
+
+    Args:
+        frame: as `roboirg.results` returns it, with columns of your own if you like.
+        by: columns whose values make a group.
+        against: values of some of these columns that make the group to compare with, such as
+            ``{"setting": "explicit"}``; the gap is on the same episodes and policy seeds.
+        family: columns of `by` within whose values p-values are corrected together.
+        pool: columns over whose values a rate may be taken, such as ``["form"]``. In the others
+            that tell policies, words and conditions apart, all rows of a group have one value.
+
+    Returns:
+        A row for each group, in the order in which they occur.
+
+    Raises:
+        UnknownNameError: the frame has no such column, or a column no such value.
+        InvalidValueError: a column is not in `by` or stands twice, a row has no task, episode or
+            policy seed, an outcome is none, a group has several policies, words or conditions, or
+            rows of a group are about the same trial.
+    """
+    changed = against or {}
+    _check(frame, by, changed, family, pool)
+    apart = [name for name in KEPT_APART if name in frame and name not in (*by, *pool)]
+    rows = _known_rows(frame, (*by, *apart, *pool, *TRIAL))
+    _check_apart(rows, by, apart)
+    # What is pooled distinguishes trials of an episode, as the policy seed does, so it becomes part
+    # of the seed: a trial of the resolved form has the seed (0, "resolved").
+    rows["policy_seed"] = list(rows_of(rows, "policy_seed", *pool))
+    groups = gather(rows, by)
+    if _trials_in(groups) < len(rows["task"]):
+        raise InvalidValueError(
+            "Several rows of a group are about the same trial of an episode; choose some of them, "
+            f"or group by a column in which they differ, next to {', '.join(by)}."
+        )
+
+    return _measure_against(groups, by, changed, family)
+
+
+def _measure_against(
+    groups: Mapping[Key, ByTask],
+    by: Sequence[str],
+    changed: Mapping[str, object],
+    family: Sequence[str],
+) -> tuple[Measured[Key], ...]:
+    """Measure groups against those of the same key in which some columns have other values.
+
+    Args:
+        groups: by the values of the columns of `by`.
+        by: names of columns, such as ``["policy", "setting"]``.
+        changed: what differs in the reference, such as ``{"setting": "explicit"}``: that of
+            ``("oracle", "direct")`` is ``("oracle", "explicit")``.
+        family: columns within whose values p-values are corrected together.
+    """
+
+    def reference(key: Key) -> ByTask:
+        values = zip(by, key, strict=True)
+        reference_key = tuple(changed.get(name, value) for name, value in values)
+        if reference_key == key:
+            return NOTHING  # nothing is compared with itself
+        return groups.get(reference_key, NOTHING)
+
+    def family_of(key: Key) -> Key:
+        values = dict(zip(by, key, strict=True))
+        return tuple(values[name] for name in family)
+
+    return measure_groups(groups, reference, family=family_of)
+
+
+def _known_rows(frame: Columns, names: Iterable[str]) -> dict[str, list[object]]:
+    """Return some columns with None for missing values; those of `TRIAL` have no missing ones."""
+    rows = {}
+    for name in names:
+        rows[name] = list(map(_known, frame[name]))
+        if name in TRIAL and None in rows[name]:
+            raise InvalidValueError(f"The column {name!r} has no value in some row; fill it in.")
+    return rows
+
+
+def _trials_in(groups: Mapping[Key, ByTask]) -> int:
+    """Return the number of trials, with or without a verdict.
+
+    The same trial counts once if it has several verdicts, as a cell keeps the last one.
+    """
+    trials = 0
+    for by_task in groups.values():
+        for cell in by_task.values():
+            trials += len(cell.verdicts) + cell.errors + cell.missing
+    return trials
+
+
+def _known(value: object) -> object:
+    """Return a value, or None for pandas's many missing ones, which are not equal to themselves."""
+    is_missing = type(value).__name__ == "NAType" or value != value  # noqa: PLR0124
+    return None if is_missing else value
+
+
+def _check_apart(
+    rows: Mapping[str, Sequence[object]], by: Sequence[str], apart: Iterable[str]
+) -> None:
+    """Check that in some columns all rows of a group have the same value.
+
+    Args:
+        rows: columns of equal length.
+        by: columns whose values make a group.
+        apart: the columns that are checked.
+    """
+    for name in apart:
+        groups_with_value = set(rows_of(rows, *by, name))
+        groups = {values[:-1] for values in groups_with_value}
+        if len(groups_with_value) > len(groups):
+            known = ", ".join(sorted(map(str, set(rows[name]))))
+            raise InvalidValueError(
+                f"A rate would be over several values of {name} ({known}): add {name!r} to by, "
+                f"choose the rows of one value, or name {name!r} in pool."
+            )
+
+
+def _check(
+    frame: Columns,
+    by: Sequence[str],
+    against: Mapping[str, object],
+    family: Sequence[str],
+    pool: Sequence[str],
+) -> None:
+    """Check the arguments of `measure`: the frame has the columns, each once, and the values.
+
+    The columns of family and against are among those of by.
+    """
+    columns = list(map(str, frame))
+    check_names("column", (*by, *family, *against, *pool, *TRIAL), columns)
+    for name in columns:
+        if columns.count(name) > 1:
+            raise InvalidValueError(f"The frame has several columns {name!r}; keep one.")
+    for name in (*family, *against):
+        if name not in by:
+            raise InvalidValueError(f"The column {name!r} is not in by: {', '.join(by)}.")
+    for name, value in against.items():
+        known = set(frame[name])
+        if value not in known:
+            raise UnknownNameError(f"row with the {name}", value, sorted(map(str, known)))
+
+
+def _no_reference(_key: Key) -> ByTask:
+    return NOTHING
+
+
+def measure_groups(
+    groups: Mapping[K, ByTask],
+    reference: Callable[[K], ByTask] = _no_reference,
+    second_reference: Callable[[K], ByTask] = _no_reference,
+    *,
+    family: Callable[[K], object] = lambda _key: None,
+    is_mean: Callable[[K], bool] = lambda _key: False,
+    with_intervals: bool = True,
+) -> tuple[Measured[K], ...]:
+    """Measure groups against up to two references.
+
+    Args:
+        groups: to measure.
+        reference: returns the trials with which those of a group are compared.
+        second_reference: returns others with which they are compared, too.
+        family: what is read together: p-values of gaps are corrected over all of the same family.
+        is_mean: whether a group is a mean over tasks even if it has only one.
+        with_intervals: whether rates have intervals.
+    """
+    rng = np.random.default_rng(SEED)
+    measured = []
+    for key, cells in groups.items():
+        # The order of these is part of the results: they draw from one generator.
+        interval = None
+        if with_intervals:
+            interval = _interval(cells, rng, is_mean=is_mean(key))
+        others = reference(key)
+        gap = measure_gap(pair(cells, others), rng)
+        second_gap = measure_gap(pair(cells, second_reference(key)), rng)
+        measured.append(Measured(key, cells, others, interval, gap, second_gap))
+    return with_holm(measured, family)
+
+
+def with_holm(
+    rows: Sequence[Measured[K]], family: Callable[[K], object]
+) -> tuple[Measured[K], ...]:
+    """Return rows with the p-values of their gaps corrected over all rows of the same family.
+
+    Rows without a gap stay as they are.
+
+    Args:
+        rows: in any order, which is kept.
+        family: returns what the family of a row is called, given the row's key.
+    """
+    # For each family its p-values, by the number of the row.
+    families: defaultdict[object, dict[int, float]] = defaultdict(dict)
+    for number, row in enumerate(rows):
+        if row.gap is not None:
+            families[family(row.key)][number] = row.gap.p_value
+    corrected = list(rows)
+    for p_values in families.values():
+        corrected_p_values = holm(list(p_values.values()))
+        for number, p_value in zip(p_values, corrected_p_values, strict=True):
+            corrected[number] = replace(rows[number], p_holm=p_value)
+    return tuple(corrected)
+
+
+def _interval(cells: ByTask, rng: np.random.Generator, *, is_mean: bool) -> Interval | None:
+    """Return the interval of a rate: that of a single cell, or that of a mean over tasks."""
+    judged = [cell for cell in cells.values() if cell.verdicts]
+    if len(judged) == 1 and not is_mean:
+        return cell_interval(judged[0], rng)
+    return clustered_interval(judged, rng)
+
+
+def pair(cells: ByTask, others: ByTask) -> list[Pairs]:
+    """Pair the trials of each task that both have."""
+    pairs = []
+    for task, cell in cells.items():
+        if cell.verdicts and task in others:
+            pairs.append(Pairs.of(cell, others[task]))
+    return pairs
+
+
+class ScopeKey(NamedTuple):
+    """Policy run, scope (a task, a suite, or `ALL_TASKS`) and instruction options."""
+
+    policy_run: PolicyRun
+    scope: str
+    options: InstructionOptions
+
+
+ScopeSummary = Measured[ScopeKey]
+"""What was measured in a scope."""
+Summaries = Mapping[ScopeKey, ScopeSummary]
+
+
+def by_scope(cells: Cells) -> Mapping[ScopeKey, ByTask]:
+    """Group cells by scope, in their order: tasks, then suites, then all tasks.
+
+    A cell is in up to three groups: ``StopCube``, its suite ``permanence``, and ``all tasks``.
+    """
+    scopes: dict[ScopeKey, dict[str, Cell]] = {}
+
+    def add(scope: str, key: CellKey) -> None:
+        in_scope = scopes.setdefault(ScopeKey(key.policy_run, scope, key.options), {})
+        in_scope[key.task] = cells[key]
+
+    for key in cells:
+        add(key.task, key)
+    for key in cells:
+        suite_of_task = suite(key.task)
+        if suite_of_task is not None:
+            add(suite_of_task, key)
+    for key in cells:
+        add(ALL_TASKS, key)
+    return scopes
+
+
+def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
+    """Measure each policy run and set of options in each scope, or in those that are wanted.
+
+    The gap is to explicit, the second gap is the implicit form less the resolved one. P-values are
+    corrected over a policy run's tasks, its suites, or its averages over all tasks.
+
+    Args:
+        cells: of all policy runs.
+        wanted: names of scopes; None for all.
+    """
+    scopes = by_scope(cells)
+    groups = scopes
+    if wanted is not None:
+        groups = {key: by_task for key, by_task in scopes.items() if key.scope in wanted}
+
+    def is_task(key: ScopeKey) -> bool:
+        return key.scope in scopes[key]
+
+    def with_options(key: ScopeKey, options: InstructionOptions) -> ByTask:
+        if options == key.options:
+            return NOTHING
+        return scopes.get(key._replace(options=options), NOTHING)
+
+    found = measure_groups(
+        groups,
+        lambda key: with_options(key, REFERENCE_OPTIONS),
+        lambda key: with_options(key, replace(key.options, form="resolved")),
+        # What is read together: a policy run's tasks, its suites, its averages over all tasks.
+        family=lambda key: (key.policy_run, is_task(key), key.scope == ALL_TASKS),
+        is_mean=lambda key: not is_task(key),
+    )
+    return {summary.key: summary for summary in found}

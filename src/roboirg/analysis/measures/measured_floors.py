@@ -1,0 +1,71 @@
+"""The floors that were measured for a version of the language, and what follows from them.
+
+``scripts/measure_floors.py`` writes a file of them, named with the version: a line for each
+setting, for each of its tasks, and for each slot of a task, on random scenes and on the test split.
+"""
+
+from __future__ import annotations
+
+import csv
+import functools
+from collections.abc import Mapping
+from importlib import resources
+from typing import NamedTuple
+
+from roboirg.shortcuts.shortcut_tables import MARGIN, Excess, ShortcutRow, ShortcutShares
+
+RANDOM = "random"
+TEST = "test"
+"""What floors were measured on: random scenes, or the test split."""
+NAMES = ("chance", "majority", "rules", "text-only", "scene-only", "union")
+"""The floors; of the rules the best."""
+LEARNED = NAMES[3:]
+
+
+class FloorKey(NamedTuple):
+    """What a line is about; task and slot are empty for all of them."""
+
+    split: str
+    setting: str
+    task: str = ""
+    slot: str = ""
+
+
+Floors = Mapping[FloorKey, ShortcutRow]
+
+
+def floors_name(version: str) -> str:
+    """Return the name of the file of a version of the language."""
+    return f"floors-{version}.csv"
+
+
+@functools.cache
+def measured_floors(version: str) -> Floors | None:
+    """Return the floors of a version of the language; None if they were not measured."""
+    file = resources.files(__package__).joinpath(floors_name(version))
+    if not file.is_file():
+        return None
+    return read_floors(file.read_text(encoding="utf-8"))
+
+
+def read_floors(text: str) -> Floors:
+    """Return the floors of a file's text."""
+    floors = {}
+    for line in csv.DictReader(text.splitlines()):
+        key = FloorKey(line["split"], line["setting"], line["task"], line["slot"])
+        shares = {}
+        for name in NAMES:
+            shares[name] = ShortcutShares(float(line[name]), float(line[f"{name} goals"]))
+        excess = Excess(float(line["excess"]), float(line["error"]))
+        floors[key] = ShortcutRow(key, int(line["texts"]), shares, excess)
+    return floors
+
+
+def settings_at_chance(floors: Floors) -> tuple[str, ...]:
+    """Return the settings in which the words alone give away at most the margin above chance."""
+    settings = []
+    for key, row in floors.items():
+        is_whole_setting = key == FloorKey(RANDOM, key.setting)
+        if is_whole_setting and row.excess and row.excess.value <= MARGIN:
+            settings.append(key.setting)
+    return tuple(settings)

@@ -1,0 +1,41 @@
+"""The results of some runs with what is measured of them: what figures and tables are made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from roboirg.analysis.measures.measure import Summaries, summarize
+from roboirg.analysis.results.frame import Frame
+from roboirg.analysis.results.policy_run import PolicyRun
+from roboirg.analysis.results.run_cells import Cells, cells_of
+
+
+@dataclass(frozen=True)
+class RunData:
+    """The results of some runs; what is measured of them is measured when it is asked for."""
+
+    frame: Frame
+
+    @cached_property
+    def cells(self) -> Cells:
+        return cells_of(self.frame)
+
+    @cached_property
+    def summaries(self) -> Summaries:
+        """What `summarize` measures, by policy run, scope and options."""
+        return summarize(self.cells)
+
+    @cached_property
+    def told(self) -> RunData:
+        """The data without control arms, if there is any."""
+        frame = self.frame.told()
+        return self if frame is self.frame else RunData(frame)
+
+    def name(self, policy_run: PolicyRun) -> str:
+        """Return the label of a policy run, marked if some planned trial has no verdict."""
+        label = self.frame.names[policy_run]
+        for key, cell in self.cells.items():
+            if key.policy_run == policy_run and not cell.counts.is_complete:
+                return f"{label} (incomplete)"
+        return label

@@ -1,0 +1,164 @@
+"""What the page's filters read: for each filter a column with the index of each episode's value.
+
+A page of ten thousand episodes must open and filter at once.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple, get_args
+
+from roboirg.analysis.page.episodes import PageEpisodes
+from roboirg.analysis.results.frame import suite, task_order
+from roboirg.analysis.results.option_labels import options_label, options_sort_key
+from roboirg.analysis.tables.diagnostic_tables import FAILURES, UNATTRIBUTED
+from roboirg.core.episode import DIFFICULTIES
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.records.mixing import FAIRNESS
+from roboirg.records.record import ERROR_KINDS, Outcome, Summary
+
+_KINDS: dict[str, str] = {
+    **FAILURES,
+    UNATTRIBUTED: UNATTRIBUTED,
+    **dict.fromkeys(ERROR_KINDS, "error"),
+}
+"""Failures and errors in order, each with its kind."""
+_NO_VALUE = -1
+"""Index of an episode that has no value in a filter."""
+
+
+class Filter(NamedTuple):
+    """A filter of the page.
+
+    Attributes:
+        label: its name in words.
+        values: that can be chosen.
+        column: for each episode the index of its value; -1 without one.
+        groups: for each value the heading above it; empty without headings.
+    """
+
+    label: str
+    values: Sequence[str]
+    column: Sequence[int]
+    groups: Sequence[str] = ()
+
+
+def make_filters(episodes: PageEpisodes) -> dict[str, Filter]:
+    """Return the filters by name, in the order of the page.
+
+    Values are in the order of the benchmark; those that no episode has cannot be chosen.
+    """
+    records = episodes.records
+    tasks = task_order({record.task for record in records})
+    suites = {task: suite(task) or "other tasks" for task in tasks}
+    options = sorted({record.column for record in records}, key=options_sort_key)
+    settings = {column: setting_label(column) for column in options}
+    forms = [column.form for column in options]
+    seeds = sorted({record.policy_seed for record in records})
+    return {
+        "policy": _policy_filter(episodes),
+        "task": _filter("task", records, lambda record: record.task, tasks, suites),
+        "setting": _filter(
+            "setting", records, lambda record: settings[record.column], settings.values()
+        ),
+        "form": _filter("form", records, lambda record: record.form, forms),
+        "difficulty": _filter(
+            "difficulty", records, lambda record: record.difficulty, DIFFICULTIES
+        ),
+        "outcome": _filter("outcome", records, lambda record: record.outcome, get_args(Outcome)),
+        "failure": _filter("why it failed", records, _failure, _KINDS, _KINDS),
+        "seed": _filter(
+            "policy seed", records, lambda record: str(record.policy_seed), map(str, seeds)
+        ),
+    }
+
+
+def _policy_filter(episodes: PageEpisodes) -> Filter:
+    """Return the filter by policy run, whose labels may be equal."""
+    places = {policy_run: place for place, policy_run in enumerate(episodes.names)}
+    column = [places[episode.policy_run] for episode in episodes.all]
+    return Filter("policy", list(episodes.names.values()), column)
+
+
+def _filter(
+    label: str,
+    records: Iterable[Summary],
+    read: Callable[[Summary], str | None],
+    order: Iterable[str],
+    groups: Mapping[str, str] | None = None,
+) -> Filter:
+    """Return a filter by what is read of the records of episodes.
+
+    Episodes with the outcomes success, error and success have, in the order success, failure,
+    error, the values ``["success", "error"]`` and the column ``[0, 1, 0]``.
+
+    Args:
+        label: of the filter.
+        records: of the episodes.
+        read: returns the value of an episode; None if it has none.
+        order: values that come first; others follow by name.
+        groups: the heading above each value; None without headings.
+    """
+    values = list(map(read, records))
+    occurring = {value for value in values if value is not None}
+    choices: list[str] = []
+    places: dict[str | None, int] = {None: _NO_VALUE}
+    for value in (*order, *sorted(occurring)):
+        if value in occurring and value not in places:
+            places[value] = len(choices)
+            choices.append(value)
+    column = [places[value] for value in values]
+    headings = []
+    if groups is not None:
+        headings = [groups[value] for value in choices]
+    return Filter(label, choices, column, headings)
+
+
+def make_numbers(episodes: PageEpisodes) -> dict[str, Sequence[int | str]]:
+    """Return the columns that are no filters.
+
+    Episodes of the same scene have the same number in the column ``scene``. Those of them that can
+    be compared, because seed, options and conditions are the same too, have the same number in the
+    column ``pair``.
+    """
+    fairness = operator.attrgetter(*(trait.path for trait in FAIRNESS))
+    scenes = []
+    pairs = []
+    columns: dict[str, list[int | str]] = {"key": [], "episode": [], "steps": []}
+    for episode in episodes.all:
+        record = episode.record
+        columns["key"].append(episode.key)
+        columns["episode"].append(record.episode)
+        columns["steps"].append(record.steps)
+        scene = (record.task, record.split, record.episode)
+        scenes.append(scene)
+        pairs.append((*scene, record.policy_seed, record.column, fairness(record)))
+    return {**columns, "scene": _numbers(scenes), "pair": _numbers(pairs)}
+
+
+def _numbers(keys: Iterable[tuple[object, ...]]) -> list[int]:
+    """Return a number for each key, the same for equal ones, such as 0, 1, 0, 2."""
+    numbers: dict[tuple[object, ...], int] = {}
+    return [numbers.setdefault(key, len(numbers)) for key in keys]
+
+
+def setting_label(options: InstructionOptions) -> str:
+    """Return the label of options without the form, such as resolved, which is its own filter."""
+    return options_label(replace(options, form="implicit"))
+
+
+def _failure(record: Summary) -> str | None:
+    """Return the name of an episode's failure or error; None for a success.
+
+    A name that this version does not have is not attributed.
+    """
+    if record.outcome == "success":
+        return None
+    if record.error:
+        return record.error
+    attribution = record.attribution
+    if attribution is None or attribution.failure not in FAILURES:
+        return UNATTRIBUTED
+    return attribution.failure

@@ -1,0 +1,417 @@
+"""The details of an opened episode: instruction with mentions, timeline, cause, video.
+
+Every text of the page is stored once. The details of an episode are a line of JSON with indices of
+texts, which the page parses when the episode is opened.
+
+A record leaves out what follows from it: the resolved form of its instruction, and when stages were
+completed. Both are derived by the installed package, so only for records of the same versions; the
+page omits them for others.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import quote
+
+import msgspec
+
+from roboirg.analysis.page.episodes import JsonObject, PageEpisode
+from roboirg.core.conditions import Fact, facts_of
+from roboirg.core.episode import ENVIRONMENT_VERSION, Episode, Scene, describe_goal
+from roboirg.core.errors import RoboIRGError
+from roboirg.core.fact_traits import fact_traits
+from roboirg.core.plain_text import counted
+from roboirg.core.word_pools import words_label
+from roboirg.judging.episode_replay import Event, completed_stages
+from roboirg.judging.judge import describe_object, plain_subgoal
+from roboirg.language.arms import arm_episode
+from roboirg.language.settings import EXPLICIT
+from roboirg.records.record import (
+    Attribution,
+    EventRecord,
+    Job,
+    MentionSpan,
+    Record,
+    SubgoalRecord,
+)
+from roboirg.runs.job_instruction import instruct_job, other_versions
+from roboirg.tasks.splits.splits import get_episode
+
+EMBEDDED = "#"
+"""Stands for a video that is part of the page."""
+
+_KINDS = {"shuttle": "the moving cube", "site": "the spot on the table"}
+"""Words for objects that causes do not name."""
+
+
+@dataclass
+class EpisodeDetails:
+    """Makes the details of one episode after the other.
+
+    Attributes:
+        folder: of the page; links lead from there.
+        embeds: whether videos are part of the page.
+        gone: folders that will not be there when the page is read, so that nothing links to them.
+        links_videos: whether some are next to the page.
+        strings: every text with its index, in order.
+        words: for each episode, the texts that a search looks through.
+        lines: for each episode, its details.
+    """
+
+    folder: Path
+    embeds: bool
+    gone: Sequence[Path] = ()
+    links_videos: bool = False
+    strings: dict[str, int] = field(default_factory=dict)
+    words: list[list[int]] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
+
+    def add(self, episode: PageEpisode, record: Record) -> None:
+        """Add an episode, given its whole record: what is searched, and its line of details."""
+        self.words.append(list(map(self._index, _searched_texts(record))))
+        details = self.details_of(record)
+        paths = {"film": episode.film, "poster": episode.poster, "log": episode.log}
+        for name, path in paths.items():
+            if path is None:
+                continue
+            is_media = name != "log"
+            if is_media and self.embeds:
+                details[name] = EMBEDDED
+                continue
+            is_gone = any(path.is_relative_to(folder) for folder in self.gone)
+            if not is_gone:
+                details[name] = quote(Path(os.path.relpath(path, self.folder)).as_posix())
+                self.links_videos |= is_media
+        self.lines.append(msgspec.json.encode(details).decode())
+
+    def details_of(self, record: Record) -> JsonObject:
+        """Return the details of an episode, with texts as indices; empty ones are left out."""
+        # In this order, in which texts get their indices.
+        details = {
+            **self._of_instruction(record),
+            **self._of_outcome(record),
+            **self._of_course(record),
+            "traceback": self._optional(record.details),
+            "lost": self._optional(record.video_error),
+            "conditions": self._index(_conditions(record)),
+        }
+        return {name: value for name, value in details.items() if value not in (None, [])}
+
+    def _of_instruction(self, record: Record) -> JsonObject:
+        """Return what was said, and what its words mean."""
+        audit = record.prompt
+        reached = None
+        if audit is not None and record.prompt_verdict == "cut":
+            reached = audit.reached
+        turns = []
+        for turn in record.instruction:
+            turns.append([self._index(turn.stage), self._index(turn.text)])
+        return {
+            "turns": turns,
+            "reached": reached,
+            "prompt": self._optional(_prompt(record)),
+            "mentions": list(map(self._mention, record.mentions)),
+            "command": None if record.setting == EXPLICIT else self._index(record.command),
+            "resolved": self._optional(_resolved_words(record)),
+        }
+
+    def _mention(self, mention: MentionSpan) -> list[int]:
+        """Return where a mention stands, whether it refers back, and what it stands for."""
+        return [
+            mention.utterance,
+            mention.start,
+            mention.end,
+            int(mention.role == "anaphor"),
+            self._index(mention.expression or ""),
+            self._index(mention.slot),
+            self._index(str(mention.value)),
+        ]
+
+    def _of_outcome(self, record: Record) -> JsonObject:
+        """Return the goal, and why it was not reached."""
+        has_failed = record.outcome == "failure"
+        return {
+            "goal": self._index(describe_goal(record.goal)),
+            "slots": list(map(self._index, record.goal)),
+            "named": self._optional(_named(record)) if has_failed else None,
+            "cause": self._optional(record.cause),
+            "attribution": self._attribution(record.attribution),
+        }
+
+    def _attribution(self, attribution: Attribution | None) -> list[int | None] | None:
+        """Return kind, name, step and sentence of a failure."""
+        if attribution is None:
+            return None
+        return [
+            self._index(attribution.kind),
+            self._index(attribution.failure),
+            attribution.step,
+            self._index(attribution.sentence),
+        ]
+
+    def _of_course(self, record: Record) -> JsonObject:
+        """Return what happened: events, subgoals of a planner, and stages of the task."""
+        # The installed package knows the stages of its own environment version only.
+        scene = _UNKNOWN_SCENE
+        if record.environment_version == ENVIRONMENT_VERSION:
+            scene = _played_scene(record.task, record.split, record.episode, record.arm)
+        events = []
+        for event in record.events:
+            act = scene.act(event)
+            if act is not None:
+                events.append([event.step, self._index(act), int(event.holds)])
+        subgoals = []
+        for subgoal in record.subgoals:
+            is_right = int(subgoal.verdict == "right")
+            subgoals.append([subgoal.step, self._index(_subgoal_text(subgoal)), is_right])
+        return {
+            "shown": record.demonstration_steps or None,
+            "events": events,
+            "subgoals": subgoals,
+            "stages": [[self._index(words), step] for words, step in scene.stages(record)],
+        }
+
+    def _index(self, text: str) -> int:
+        """Return the index of a text, which is added if it is new."""
+        return self.strings.setdefault(text, len(self.strings))
+
+    def _optional(self, text: str | None) -> int | None:
+        """Return the index of a text, if there is one."""
+        return None if text is None else self._index(text)
+
+
+def _searched_texts(record: Record) -> list[str]:
+    """Return what a search looks through: the instruction, and why it failed."""
+    texts = [turn.text for turn in record.instruction]
+    if record.cause:
+        texts.append(record.cause)
+    if record.attribution is not None and record.attribution.sentence:
+        texts.append(record.attribution.sentence)
+    return texts
+
+
+def _resolved_words(record: Record) -> str | None:
+    """Return the instruction of a record with every reference resolved; see `_resolved_form`.
+
+    None for a record of other versions, whose words the installed package does not have.
+    """
+    if other_versions(record):
+        return None
+    # Of the job only what decides the words, which all policies and seeds share.
+    job = Job(
+        policy="",
+        task=record.task,
+        split=record.split,
+        episode=record.episode,
+        options=record.options,
+        arm=record.arm,
+        wordings_file=record.wordings_file,
+    )
+    return _resolved_form(job)
+
+
+@functools.lru_cache(maxsize=65_536)
+def _resolved_form(job: Job) -> str | None:
+    """Return the same instruction with every reference resolved.
+
+    None if it has this form already, or if its task or wording file is no longer there.
+    """
+    if job.setting == EXPLICIT or job.form == "resolved":
+        return None
+    try:
+        return instruct_job(job.with_options(form="resolved")).text
+    except RoboIRGError:
+        return None
+
+
+class _PlayedStage(NamedTuple):
+    """A stage in words, and the step that completed it; None if none did."""
+
+    subgoal: str
+    step: int | None
+
+
+class _PlayedScene(NamedTuple):
+    """What is the same whenever a scene is played.
+
+    Attributes:
+        episode: None for another environment version, or a task that is no longer installed.
+        names: words for the objects.
+        facts: those that stages depend on, as stages have them.
+    """
+
+    episode: Episode | None
+    names: Mapping[str, str]
+    facts: Mapping[Fact, Fact]
+
+    def act(self, event: EventRecord) -> str | None:
+        """Return an event in words; None if timelines do not show it."""
+        shown = fact_traits(event.kind).timeline
+        if shown == "both" or (shown == "start" and event.holds):
+            return event_text(event, self.names)
+        return None
+
+    def stages(self, record: Record) -> list[_PlayedStage]:
+        """Return the stages of the policy's turn.
+
+        Steps before its turn, while a video was shown, are negative in records, but stages are
+        completed at steps that count from 0. So these are moved back and forth.
+        """
+        if not record.events or self.episode is None:
+            return []
+        steps = [event.step for event in record.events]
+        video_steps = max(0, -min(steps))
+        last_step = max(record.steps, *steps)
+        events = []
+        for event in record.events:
+            fact = self.facts.get(Fact(event.kind, event.subject, event.place))
+            if fact is not None:
+                events.append(Event(event.step + video_steps, fact, event.holds))
+        try:
+            completed = completed_stages(self.episode, events, video_steps + last_step)
+        except KeyError:
+            return []  # incomplete events
+        stages = []
+        for number, stage in enumerate(self.episode.stages):
+            step = completed.get(number)
+            if step is not None:
+                step -= video_steps
+            stages.append(_PlayedStage(plain_subgoal(stage), step))
+        return stages
+
+
+_UNKNOWN_SCENE = _PlayedScene(None, {}, {})
+
+
+@functools.lru_cache(maxsize=4096)
+def _played_scene(task: str, split: str, number: int, arm: str) -> _PlayedScene:
+    """Return the scene of an episode; the unknown one if its task is no longer installed."""
+    try:
+        episode = arm_episode(get_episode(task, split, number), arm)
+    except RoboIRGError:
+        return _UNKNOWN_SCENE
+    facts: dict[Fact, Fact] = {}
+    for stage in (*episode.demonstration, *episode.stages):
+        for condition in (stage.expects, *stage.forbids):
+            facts |= {fact: fact for fact in facts_of(condition)}
+    return _PlayedScene(episode, _object_names(episode.scene), facts)
+
+
+def event_text(event: EventRecord, names: Mapping[str, str]) -> str:
+    """Return an event as what was done, in the past tense: ``picked up the red cube``.
+
+    Args:
+        event: that a fact begins to hold, or ceases.
+        names: words for the objects; others are called by their names.
+    """
+    traits = fact_traits(event.kind)
+    place_name = event.place or ""
+    subject = names.get(event.subject, event.subject.replace("_", " "))
+    place = names.get(place_name, place_name.replace("_", " "))
+    begun = traits.past.format(subject=subject, place=place)
+    if event.holds:
+        return begun
+    if not traits.ceased:
+        return f"{begun}; this no longer holds"
+    return traits.ceased.format(subject=subject, place=place)
+
+
+def _object_names(scene: Scene) -> Mapping[str, str]:
+    """Return words for each object, such as ``the red cube`` for ``cube_2``.
+
+    Where two have the same words, the end of their names is added: ``the red cube (2)``.
+    """
+    names = {}
+    for item in scene.objects:
+        names[item.name] = _KINDS.get(item.kind) or describe_object(item.name, scene)
+    counts = Counter(names.values())
+    for name, words in names.items():
+        if counts[words] > 1:
+            _, _, end = name.rpartition("_")
+            names[name] = f"{words} ({end})"
+    return names
+
+
+def _subgoal_text(subgoal: SubgoalRecord) -> str:
+    """Return a subgoal and, in brackets, what was wrong with it and how it ended.
+
+    For example ``pick up the red cube (wrong thing; due: pick up the blue cube)``.
+    """
+    parts = []
+    if subgoal.verdict != "right":
+        parts.append(subgoal.verdict.replace("_", " "))
+        parts.append(f"due: {subgoal.due or 'nothing'}")
+    if subgoal.ended not in (None, "done"):
+        ended = subgoal.ended
+        if subgoal.why:
+            ended += f": {subgoal.why}"
+        parts.append(ended)
+    if not parts:
+        return subgoal.text
+    return f"{subgoal.text} ({'; '.join(parts)})"
+
+
+def _named(record: Record) -> str | None:
+    """Return what a policy that failed took for the goal.
+
+    That is the goal that a listener reports, or else a planner's last subgoal before the failure:
+    ``“pick up the red cube”; due was “pick up the blue cube”``. None for other policies.
+    """
+    goal = record.policy_metadata.get("understood")
+    if isinstance(goal, dict):
+        return describe_goal(goal)
+    failed_at = record.steps
+    if record.attribution is not None and record.attribution.step is not None:
+        failed_at = record.attribution.step
+    subgoals = [subgoal for subgoal in record.subgoals if subgoal.step <= failed_at]
+    if not subgoals:
+        return None
+    last = subgoals[-1]
+    return f"“{last.text}”; due was “{last.due or 'nothing'}”"
+
+
+def _prompt(record: Record) -> str | None:
+    """Return how many tokens the model reads, and what it missed; None if it read everything.
+
+    For example ``cut: needs 80 tokens, the model reads 48 (counted with gemma); 2 mentions lost, 1
+    of them referring back``.
+    """
+    audit = record.prompt
+    if audit is None or record.prompt_verdict == "heard":
+        return None
+    counted_by = "bounds, no tokenizer"
+    if audit.tokenizer:
+        counted_by = f"counted with {audit.tokenizer}"
+    verdict = "cut" if record.prompt_verdict == "cut" else "may be cut"
+    needed = audit.needed_text
+    text = f"{verdict}: needs {needed} tokens, the model reads {audit.limit} ({counted_by})"
+    if audit.lost:
+        anaphors = sum(record.mentions[place].role == "anaphor" for place in audit.lost)
+        mentions = counted(len(audit.lost), "mention")
+        text += f"; {mentions} lost, {anaphors} of them referring back"
+    return text
+
+
+def _conditions(record: Record) -> str:
+    """Return under which conditions an episode was played, and in which versions."""
+    environment = record.environment
+    parts = [
+        f"{record.split} split",
+        f"at most {environment.max_steps} steps",
+        f"in {words_label(record.options.wordings)}",
+    ]
+    for name in ("actions", "demonstration_frames", "observe_every"):
+        value = getattr(environment, name)
+        if value is not None:
+            parts.append(f"{name.replace('_', ' ')} {value}")
+    versions = (
+        f"policy {record.played_version}, language {record.language_version}, environment "
+        f"{record.environment_version}, roboirg {record.package_version}"
+    )
+    return f"{', '.join(parts)}; {versions}"

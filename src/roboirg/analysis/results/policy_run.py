@@ -1,0 +1,152 @@
+"""Results that may be averaged: one policy under one set of conditions and versions.
+
+Results under other conditions, or of other versions of the policy, the language or the
+environment, are another policy run and never averaged with the rest.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from roboirg.core.arms import TOLD
+from roboirg.core.environment_options import ENVIRONMENT_OPTIONS, EnvironmentOptions
+from roboirg.core.subgoal_text import BETWEEN_VERSIONS, SCRIPTED_HANDS
+from roboirg.core.versions import Versions
+from roboirg.core.word_pools import words_label
+from roboirg.records.record import Job, Summary
+
+CONDITIONS = ("split", *ENVIRONMENT_OPTIONS, "wordings", "arm")
+"""The names of all conditions."""
+
+PRIVILEGED = " (privileged)"
+"""Mark of policies that read the simulator's state."""
+HANDS = f" ({SCRIPTED_HANDS})"
+"""Mark of planners whose hands read it, while they see pictures and words."""
+
+_read_conditions = operator.attrgetter("split", "environment", "options.wordings", "arm")
+
+
+class EvalConditions(NamedTuple):
+    """The conditions under which a policy plays."""
+
+    split: str
+    environment: EnvironmentOptions = EnvironmentOptions()
+    wordings: str | None = None
+    arm: str = TOLD
+
+    @classmethod
+    def of(cls, job: Job) -> EvalConditions:
+        return cls._make(_read_conditions(job))
+
+    def text(self, name: str) -> str:
+        """Return the value of one of `CONDITIONS` in words."""
+        if name == "wordings":
+            return words_label(self.wordings)
+        if name in ENVIRONMENT_OPTIONS:
+            return str(getattr(self.environment, name))
+        return str(getattr(self, name))
+
+    def label(self, name: str) -> str:
+        """Return a condition with its value, such as ``max steps 900``."""
+        if name == "wordings":
+            return self.text(name)
+        return f"{name.replace('_', ' ')} {self.text(name)}"
+
+
+class PolicyRun(NamedTuple):
+    """One policy under one set of conditions and versions.
+
+    Attributes:
+        policy: its name.
+        conditions: under which it played.
+        versions: unknown before it has played; the policy's has that of its server.
+        run: name of the run if several runs hold the same episodes, else empty.
+        is_privileged: whether the policy read the simulator's state.
+        robot: the real robot of a study; None in simulation.
+    """
+
+    policy: str
+    conditions: EvalConditions
+    versions: Versions
+    run: str = ""
+    is_privileged: bool = False
+    robot: str | None = None
+
+    @classmethod
+    def of(cls, result: Summary, run: str = "") -> PolicyRun:
+        versions = Versions(
+            result.ref.makeup,
+            result.environment_version,
+            result.language_version,
+            result.played_version,
+        )
+        conditions = EvalConditions.of(result)
+        return cls(result.policy, conditions, versions, run, result.privileged, result.robot)
+
+    @property
+    def language(self) -> str:
+        """The version of the language that it heard; empty before it has played."""
+        return self.versions.language_version or ""
+
+    @property
+    def marked_policy(self) -> str:
+        """The policy's name, marked if it is privileged."""
+        return self.policy + self.mark
+
+    @property
+    def has_planner(self) -> bool:
+        """Whether it has played as a planner with a policy."""
+        return BETWEEN_VERSIONS in str(self.versions.policy_version)
+
+    @property
+    def mark(self) -> str:
+        """The mark of a privileged policy; empty for the others."""
+        if not self.is_privileged:
+            return ""
+        has_scripted_hands = SCRIPTED_HANDS in str(self.versions.policy_version)
+        return HANDS if has_scripted_hands else PRIVILEGED
+
+
+def labels(policy_runs: Iterable[PolicyRun]) -> dict[PolicyRun, str]:
+    """Return a label for each policy run, with what distinguishes runs of the same policy.
+
+    Privileged policies are marked, because their rates are no rates of policies.
+    """
+    distinct = list(dict.fromkeys(policy_runs))
+    return {policy_run: _label(policy_run, distinct) + policy_run.mark for policy_run in distinct}
+
+
+def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:
+    """Return the policy's name and, after commas, each condition and version that varies.
+
+    For example ``listener, max steps 900``.
+    """
+    parts = [policy_run.policy]
+    for name in CONDITIONS:
+        values = {other.conditions.text(name) for other in policy_runs}
+        if len(values) > 1:
+            parts.append(policy_run.conditions.label(name))
+    parts += _version_labels(policy_run, policy_runs)
+    if policy_run.robot is not None:
+        parts.append(f"on {policy_run.robot}")
+    if policy_run.run:
+        parts.append(policy_run.run)
+    return ", ".join(parts)
+
+
+def _version_labels(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> list[str]:
+    """Return what a policy is and its versions, as far as it differs from others in them.
+
+    For example ``["language 5"]`` if another policy run heard the language's version 4.
+    """
+    labels_by_trait: dict[str, str] = {}
+    for other in policy_runs:
+        other_versions = other.versions
+        if other.policy != policy_run.policy:
+            # What a policy is matters only among runs of the same policy.
+            other_versions = other_versions._replace(policy_version=None, makeup=())
+        for mismatch in policy_run.versions.differences(other_versions):
+            labels_by_trait[mismatch.what] = mismatch.label
+    return [labels_by_trait[trait] for trait in sorted(labels_by_trait)]

@@ -1,0 +1,141 @@
+"""The frame of stored runs, and its columns about words, which only whole records know."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+from roboirg.analysis.results.frame import Frame, FrameColumn, as_column, make_frame
+from roboirg.analysis.results.sources import Source
+from roboirg.language.instruction import command_expressions
+from roboirg.records.record import Job, Record
+from roboirg.records.record_codec import identity_key
+from roboirg.util.freed_memory import paused_collection
+
+SINGLED = "one of two"
+"""Before the kind of words that single out one of two values."""
+
+Texts = tuple[str, ...]
+
+
+def _expressions(record: Record) -> Texts:
+    """Return the classes of the referring expressions in the command, which is said last."""
+    return command_expressions(record.mentions, len(record.instruction) - 1)
+
+
+def _rival(record: Record) -> str | None:
+    """Return how the words tell the right value from its rival; None without a rival."""
+    reference = record.metadata.get("rival_reference")
+    if reference is None:
+        return None
+    return f"{SINGLED}: {reference}"
+
+
+WORD_COLUMNS: Mapping[str, FrameColumn] = {
+    column.name: column
+    for column in (
+        FrameColumn(
+            "pattern",
+            "text",
+            "main reasoning pattern",
+            "no reasoning",
+            lambda record: record.metadata.get("pattern"),
+        ),
+        FrameColumn(
+            "expression",
+            "texts",
+            "classes of the command's referring expressions",
+            "",
+            _expressions,
+        ),
+        FrameColumn(
+            "slots",
+            "number",
+            "values of the goal that the command leaves to its context",
+            "none",
+            lambda record: record.metadata.get("hidden_slots") or None,
+        ),
+        FrameColumn(
+            "rival",
+            "text",
+            "how the words single out one of two values",
+            "no rival",
+            _rival,
+        ),
+        FrameColumn(
+            "landmark",
+            "texts",
+            "landmarks in the words",
+            "",
+            lambda record: tuple(record.metadata.get("landmarks", ())),
+        ),
+        FrameColumn(
+            "words",
+            "number",
+            "words of all utterances",
+            "",
+            lambda record: sum(len(turn.text.split()) for turn in record.instruction),
+        ),
+        FrameColumn(
+            "command",
+            "text",
+            "the same task in explicit words",
+            "",
+            lambda record: record.command,
+        ),
+    )
+}
+
+
+@paused_collection()
+def read_frame(sources: Sequence[Source], *, words: bool = False) -> Frame:
+    """Return the results of runs and what is missing in them, with `WORD_COLUMNS` if wanted."""
+    runs = [(str(source.path), source.results) for source in sources]
+    planned: list[Job] = []
+    for source in sources:
+        planned += source.planned
+    frame = make_frame(runs, planned)
+    if not words:
+        return frame
+    records = itertools.chain.from_iterable(source.records() for source in sources)
+    return with_words(frame, records)
+
+
+def with_words(frame: Frame, records: Iterable[Record]) -> Frame:
+    """Return a frame with `WORD_COLUMNS`; see `with_columns`."""
+    reads = {name: column.read for name, column in WORD_COLUMNS.items()}
+    return with_columns(frame, records, reads)
+
+
+def with_columns(
+    frame: Frame, records: Iterable[Record], reads: Mapping[str, Callable[[Record], object]]
+) -> Frame:
+    """Return a frame of results with further columns, which are read from whole records.
+
+    Args:
+        frame: of results.
+        records: of its runs, in any order; they are read one by one, and none is kept.
+        reads: returns the value of a record, by the name of the column.
+    """
+    results = frame["result"]
+    rows_by_play: dict[object, list[int]] = {}
+    for row, result in enumerate(results):
+        rows_by_play.setdefault(_play_key(result), []).append(row)
+
+    columns = {name: as_column([None] * len(results)) for name in reads}  # None if not played
+    for record in records:
+        rows = rows_by_play.get(_play_key(record))
+        if rows is None:
+            continue  # played again since, or of another policy
+        for name, read in reads.items():
+            # As a column, because numpy would spread a tuple over the rows.
+            columns[name][rows] = as_column([read(record)])
+    return frame.extended(columns)
+
+
+def _play_key(job: Job) -> tuple[object, ...]:
+    """Return what tells apart the same episode in two runs, or played again in one.
+
+    An episode that was not played has no time at which it began.
+    """
+    return identity_key(job), getattr(job, "started_at", None)

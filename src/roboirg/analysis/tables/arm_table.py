@@ -1,0 +1,147 @@
+"""Table of what control arms show, and its comparison of two policies in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from roboirg.analysis.measures.arm_figures import (
+    LANGUAGE_USE,
+    MEANING,
+    WORDS_WORTH,
+    ArmFigure,
+    arm_figures,
+)
+from roboirg.analysis.measures.chance import silent_chance
+from roboirg.analysis.measures.measure import mean_rate, measure_groups
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.results.frame import Frame
+from roboirg.analysis.results.option_labels import options_label
+from roboirg.analysis.results.policy_run import labels
+from roboirg.analysis.tables.table import Row, Table, named_columns
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.stats.cells import NOTHING, ByTask
+from roboirg.stats.intervals import TOO_FEW, Interval
+from roboirg.stats.rates import (
+    NOT_APPLICABLE,
+    gap_words,
+    interval_note,
+    p_text,
+    points,
+)
+
+_NOTE = (
+    "Each figure compares two rates on the same scenes, as means over tasks, in percent with 95 "
+    f"% intervals. {MEANING} Chance is the success of pursuing a random goal of the scene without "
+    "words. Differences are in points; p-values are after Holm's correction over all rows of the "
+    "policy. "
+    "Scenes without an arm are left out of its figures."
+)
+
+
+def make_arm_table(data: RunData) -> Table:
+    """Make the table, one row for each figure of a policy in a setting.
+
+    Raises:
+        InvalidValueError: the runs have no control arms.
+    """
+    figures = arm_figures(data.frame)
+    if not figures:
+        raise InvalidValueError(
+            "The runs have no control arms; play them with --arms told,other-goal,silent,scrambled."
+        )
+    # As in other tables where these name a policy run, which they do if it was given its commands.
+    names = {**labels(figure.key.run for figure in figures), **data.told.frame.names}
+    rows = []
+    for figure in figures:
+        key = figure.key
+        contrast = key.contrast
+        group = f"{names[key.run]}, {options_label(key.options)}"
+        name = f"{contrast.name}: {contrast.first} − {contrast.second}"
+        rows.append(Row(group, name, _words(figure)))
+    return Table(
+        key="arms",
+        title="Control arms",
+        heads=("policy and setting", "figure"),
+        columns=named_columns(
+            "episodes", "first, %", "second, %", "chance", "difference", "95 % interval", "p"
+        ),
+        rows=rows,
+        notes=(_NOTE,),
+    )
+
+
+def language_use_sentences(first: Frame, second: Frame, names: tuple[str, str]) -> Iterator[str]:
+    """Yield how the language use of two policies differs, a sentence for each setting.
+
+    P-values are corrected over the settings.
+
+    Args:
+        first: results of one policy.
+        second: results of the other, which are subtracted.
+        names: of both policies.
+    """
+    first_name, second_name = names
+    subtracted = _language_use(second)
+    compared = measure_groups(
+        _language_use(first), lambda key: subtracted.get(key, NOTHING), with_intervals=False
+    )
+    for measured in compared:
+        gap = measured.gap
+        if gap is None or measured.p_holm is None:
+            continue  # the two have no scenes in common
+        (options,) = measured.key
+        yield (
+            f"Language use, {options_label(options)}: {first_name} less {second_name} "
+            f"{points(gap.value, 1)} points{interval_note(gap.interval)}, "
+            f"{p_text(measured.p_holm)} after Holm's correction, {gap.episodes} scenes."
+        )
+
+
+def _language_use(frame: Frame) -> dict[tuple[InstructionOptions], ByTask]:
+    """Return the results of the figure of language use by instruction options."""
+    results = {}
+    for figure in arm_figures(frame):
+        if figure.key.contrast.name == LANGUAGE_USE:
+            results[(figure.key.options,)] = figure.cells
+    return results
+
+
+def _words(figure: ArmFigure) -> Sequence[str]:
+    """Return the cells of a row; only the figure of what words are worth has a chance level."""
+    chance = NOT_APPLICABLE
+    if figure.key.contrast.name == WORDS_WORTH:
+        chance = _chance_text(figure)
+    episodes = 0
+    if figure.gap is not None:
+        episodes = figure.gap.episodes
+    return (
+        str(episodes),
+        _rate_text(figure.cells, figure.interval),
+        _rate_text(figure.others, figure.other_interval),
+        chance,
+        *gap_words(figure.gap, figure.p_holm),
+    )
+
+
+def _chance_text(figure: ArmFigure) -> str:
+    """Return the chance level without words on the scenes of a figure, such as ``33.3``.
+
+    It is the mean over tasks, in percent.
+    """
+    split = figure.key.run.conditions.split
+    chances = []
+    for task, silent in figure.others.items():
+        scenes = [silent_chance(task, split, trial.episode) for trial in silent.verdicts]
+        chances.append(np.mean(scenes))
+    return f"{100 * float(np.mean(chances)):.1f}"
+
+
+def _rate_text(cells: ByTask, interval: Interval | None) -> str:
+    """Return a rate with its interval in percent, such as ``50.0 (31.2 to 68.8)``."""
+    ends = TOO_FEW
+    if interval is not None:
+        ends = f"{100 * interval.low:.1f} to {100 * interval.high:.1f}"
+    return f"{100 * float(mean_rate(cells) or 0):.1f} ({ends})"

@@ -1,0 +1,442 @@
+"""Tables that the paper has no numbers for: forms, failures, cut prompts, kinds of words."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from roboirg.analysis.measures.breakdowns import Breakdown, break_down
+from roboirg.analysis.measures.comparison_text import incomplete_note
+from roboirg.analysis.measures.failure_rates import (
+    EndRates,
+    ShareBounds,
+    grounding_share,
+    measure_ends,
+)
+from roboirg.analysis.measures.heard_rates import (
+    HeardCounts,
+    count_heard,
+    cut_text,
+)
+from roboirg.analysis.measures.measure import (
+    ALL_TASKS,
+    Measured,
+    ScopeKey,
+    ScopeSummary,
+    by_scope,
+    with_holm,
+)
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.results.frame import Frame, suite
+from roboirg.analysis.results.option_labels import (
+    REFERENCE_OPTIONS,
+    SortKey,
+    has_default_options,
+    options_sort_key,
+    setting_sort_key,
+)
+from roboirg.analysis.results.policy_run import PolicyRun
+from roboirg.analysis.results.run_cells import cells_of
+from roboirg.analysis.tables.arm_table import make_arm_table
+from roboirg.analysis.tables.facts_table import make_facts_table
+from roboirg.analysis.tables.subgoal_table import make_subgoal_table
+from roboirg.analysis.tables.table import (
+    POLICY,
+    Column,
+    Entry,
+    Row,
+    Table,
+    named_columns,
+)
+from roboirg.core import failures
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.records.record import Record
+from roboirg.stats.cells import NOTHING, Key, rows_of
+from roboirg.stats.rates import (
+    NOT_APPLICABLE,
+    gap_words,
+    percent,
+    percent_range,
+)
+
+UNATTRIBUTED = "not attributed"
+FAILURES: Mapping[str, str] = {
+    **{name: failure.kind for name, failure in failures.FAILURES.items()},
+    UNATTRIBUTED: "",
+}
+"""The names of failures in the order of the core's table, each with its kind, such as grounding.
+
+A failure that was not attributed has no kind.
+"""
+OF_CELLS = ("policy and setting", "task")
+"""Headings of tables with a row for each task in each setting of a policy."""
+RowCells = Sequence[Entry | str]
+"""The cells of a row, as entries or as texts."""
+
+_WITH_VERDICT = ("success", "failure")
+"""Outcomes of episodes that a rate counts; an error, for example, is none."""
+
+_FORMS_NOTE = (
+    "The same episodes in the implicit form and in the resolved one, which names the goal: trials "
+    "solved in both, in one alone, in neither. The difference, the mean over tasks, and its "
+    "interval are in points; p-values are after Holm's correction over all rows of the policy."
+)
+_KINDS_NOTE = " ".join(
+    f"{kind.capitalize()}: {means}." for kind, means in failures.FAILURE_KINDS.items()
+)
+_RATES_NOTE = (
+    "Rates of all episodes with a verdict in percent, means over the tasks: success and the three "
+    "kinds of failure add up to 100. Next to explicit on the same episodes, success changes by the "
+    "gap, in points, and the kinds of failure by what makes up for it: for example "
+    "grounding +6.9 and execution +1.8 make a gap of −8.7. Brackets have 95 % intervals. A "
+    "failure that was not attributed is undecided."
+)
+_SHARES_NOTE = (
+    "Grounding of failures: its share in percent, first as if all that is undecided were "
+    "execution, then as if it were grounding. Such a share conditions on failing; compare it with "
+    "the same in explicit words, on the same tasks."
+)
+_BREAKDOWN_NOTE = (
+    "Success in percent, the gap to explicit on the same episodes in points, its interval, and "
+    "its p-value after Holm's correction over all rows of the policy. Rates are means over the "
+    "tasks that have such instructions, so two rows may differ in their tasks, too."
+)
+_HEARD_NOTE = (
+    "Cut: the policy's model reads fewer tokens than the prompt needs, so the end of the prompt, "
+    "where the command stands, does not arrive; between two bounds if the tokenizer is not "
+    "known. Success in percent over all episodes with a verdict, and over those that were heard "
+    "whole. Of all tasks, shares and rates are means over the tasks that have such episodes. "
+    "Policies that declare no limit (prompt_tokens) are not in this table."
+)
+
+
+def make_forms_table(data: RunData) -> Table:
+    """Make the table of implicit against resolved forms, by policy run, suite and setting.
+
+    Of a policy run, the rows over all tasks come last, if there are several suites.
+
+    Raises:
+        InvalidValueError: no episode was played in both forms.
+    """
+    rows = []
+    for average in _implicit_averages(data):
+        gap = average.gap
+        if gap is None:
+            continue  # no episode of these was played in both forms
+        # Trials are compared in pairs: the implicit form is the first, the resolved one the second.
+        overlap = gap.overlap
+        counts = (
+            overlap.trials,
+            overlap.both,
+            overlap.only_second,
+            overlap.only_first,
+            overlap.neither,
+        )
+        cells = (*map(str, counts), *gap_words(gap, average.p_holm))
+        key = average.key
+        group = f"{data.frame.names[key.policy_run]}, {key.scope}"
+        rows.append(Row(group, key.options.setting, cells))
+    if not rows:
+        raise InvalidValueError(
+            "The runs have no episode in both forms; play them with --forms implicit,resolved."
+        )
+    return Table(
+        key="forms",
+        title="Implicit and resolved form",
+        heads=(POLICY, "setting"),
+        columns=named_columns(
+            "trials", "both", "only resolved", "only implicit", "neither", "implicit − resolved",
+            "95 % interval", "p",
+        ),
+        rows=rows,
+        notes=(_FORMS_NOTE,),
+    )  # fmt: skip
+
+
+def _implicit_averages(data: RunData) -> Sequence[ScopeSummary]:
+    """Return the averages over suites, and over all tasks, in each setting's implicit form.
+
+    Their gap is the one to the resolved form. They are sorted by policy run, suite and setting.
+    """
+    suites = {suite(key.task) for key in data.cells}
+    suites.discard(None)  # of tasks that are in no suite
+    averages = []
+    for key, summary in data.summaries.items():
+        is_task = key.scope in summary.cells
+        if is_task or not has_default_options(key.options):
+            continue
+        if key.scope == ALL_TASKS and len(suites) <= 1:
+            continue  # it would only repeat the suite
+        averages.append(replace(summary, gap=summary.second_gap))
+
+    runs = list(data.frame.names)
+    scopes = list(dict.fromkeys(average.key.scope for average in averages))
+
+    def row_order(average: ScopeSummary) -> SortKey:
+        key = average.key
+        setting = setting_sort_key(key.options.setting)
+        return runs.index(key.policy_run), scopes.index(key.scope), setting
+
+    averages.sort(key=row_order)
+    return with_holm(averages, lambda key: key.policy_run)
+
+
+def count_failures(frame: Frame, by: Sequence[str]) -> Mapping[Key, Counter[str]]:
+    """Count trials with a verdict, and failures by name, for each combination of some columns.
+
+    By ``("run", "task")``, for example, the counts of a policy run's 10 trials of a task are
+    ``{"trials": 10, "wrong_object": 3}`` if 7 succeeded and 3 took hold of the wrong object.
+    """
+    counts_by_key: defaultdict[Key, Counter[str]] = defaultdict(Counter)
+    for *values, outcome, failure in rows_of(frame, *by, "outcome", "failure"):
+        if outcome not in _WITH_VERDICT:
+            continue
+        counts = counts_by_key[tuple(values)]
+        counts["trials"] += 1
+        if outcome == "failure":
+            name = failure if failure in FAILURES else UNATTRIBUTED
+            counts[name] += 1
+    return counts_by_key
+
+
+def make_failure_table(data: RunData, *, means: bool = False) -> Table:
+    """Make the table of how all episodes ended, and of what the gap to explicit consists.
+
+    Args:
+        data: of the runs.
+        means: whether to have only the means over all tasks, and no rows of single tasks.
+
+    Raises:
+        InvalidValueError: no episode failed.
+    """
+    scopes = {ALL_TASKS}
+    if not means:
+        scopes.update(data.frame["task"])
+    ends = measure_ends(data, scopes)  # of each row
+    if all(rates.success.rate == 1 for rates in ends.values()):
+        raise InvalidValueError("No episode of the runs failed.")
+    changes = [f"{kind}, change" for kind in failures.FAILURE_KINDS]
+    return Table(
+        key="failures",
+        title="How episodes ended, and what the gap to explicit consists of",
+        heads=OF_CELLS,
+        columns=named_columns(
+            "trials",
+            "failures",
+            "success",
+            *failures.FAILURE_KINDS,
+            "gap to explicit",
+            *changes,
+            "grounding of failures",
+            "the same in explicit",
+        ),
+        rows=_rows(ends, data, lambda key: _end_cells(ends[key])),
+        notes=(_RATES_NOTE, f"{_KINDS_NOTE} {_SHARES_NOTE}"),
+    )
+
+
+def _end_cells(rates: EndRates) -> RowCells:
+    """Return the cells of a row of the table of failures.
+
+    They are the counts, the rates of success and of each kind of failure, by how much explicit
+    words change these, and the share of grounding failures, here and in explicit words.
+    """
+    success, *kinds = rates
+    own_results = []
+    explicit_results = []
+    for kind in kinds:
+        own_results.append(kind.cells)
+        explicit = kind.others
+        explicit_results.append(
+            {task: explicit[task] for task in success.tasks if task in explicit}
+        )
+    counts = success.counts
+    return (
+        str(counts.trials),
+        str(counts.trials - counts.successes),
+        *map(_rate, rates),
+        *map(_change_text, rates),
+        _share_text(grounding_share(*own_results)),
+        _share_text(grounding_share(*explicit_results)),
+    )
+
+
+def _change_text(rate: ScopeSummary) -> str:
+    """Return the gap to explicit with its interval in brackets, such as ``+3.1 (+1.0 to +5.2)``."""
+    gap, interval, _ = gap_words(rate.gap, None)
+    if interval == NOT_APPLICABLE:
+        return gap
+    return f"{gap} ({interval})"
+
+
+def _share_text(share: ShareBounds | None) -> str:
+    """Return a share in percent: one number, or the two between which it is."""
+    if share is None:
+        return NOT_APPLICABLE
+    return percent_range(share.least, share.most)
+
+
+def make_failure_name_table(data: RunData) -> Table:
+    """Make the table of the numbers of failures by name, task and setting.
+
+    Raises:
+        InvalidValueError: no episode failed.
+    """
+    counts_by_scope = _failures_by_scope(data)
+    occurring: Counter[str] = Counter()
+    for counts in counts_by_scope.values():
+        occurring += counts
+    names = [name for name in FAILURES if name in occurring]
+    if not names:
+        raise InvalidValueError("No episode of the runs failed.")
+
+    def cells(key: ScopeKey) -> RowCells:
+        counts = counts_by_scope[key]
+        failed = [counts[name] for name in names]
+        return list(map(str, (counts["trials"], sum(failed), *failed)))
+
+    failure_columns = [Column(name.replace("_", " "), FAILURES[name]) for name in names]
+    return Table(
+        key="failure_names",
+        title="Failures by name",
+        heads=OF_CELLS,
+        columns=(*named_columns("trials", "failures"), *failure_columns),
+        rows=_rows(counts_by_scope, data, cells),
+        notes=(f"Failed episodes, and how many of them failed in each way. {_KINDS_NOTE}",),
+    )
+
+
+def _failures_by_scope(data: RunData) -> dict[ScopeKey, Counter[str]]:
+    """Count failures by name in each task and in all tasks."""
+    # Each episode counts twice: for its task, and for all tasks.
+    frame = data.frame.spread("scope", [(task, ALL_TASKS) for task in data.frame["task"]])
+    counts = count_failures(frame, ("run", "scope", "options"))
+    return {ScopeKey(*values): in_scope for values, in_scope in counts.items()}
+
+
+def make_heard_table(data: RunData) -> Table:
+    """Make the table of cut prompts and of success over the episodes that were heard whole.
+
+    Raises:
+        InvalidValueError: no policy declares how many tokens it reads.
+    """
+    counts = count_heard(data.frame, ("options", "task"))
+    if not counts:
+        raise InvalidValueError(
+            "No policy of the runs declares how many tokens it reads; prompt_tokens=N does."
+        )
+    # A row's share of cut prompts is the mean over its tasks: one task, or all of them.
+    counts_by_scope: defaultdict[ScopeKey, list[HeardCounts]] = defaultdict(list)
+    for (run, options, task), counts_of_task in counts.items():
+        counts_by_scope[ScopeKey(run, task, options)].append(counts_of_task)
+        counts_by_scope[ScopeKey(run, ALL_TASKS, options)].append(counts_of_task)
+    played = by_scope(data.cells)
+    heard = by_scope(cells_of(data.frame.where(prompt="heard")))
+
+    def cells(key: ScopeKey) -> RowCells:
+        tasks = counts_by_scope[key]
+        episodes = sum(counts_of_task["episodes"] for counts_of_task in tasks)
+        of_all = Measured(key, played[key])
+        of_heard = Measured(key, heard.get(key, NOTHING))
+        return (
+            str(episodes),
+            cut_text(tasks),
+            _rate(of_all),
+            str(of_heard.counts.trials),
+            _rate(of_heard),
+        )
+
+    return Table(
+        key="heard",
+        title="Instructions that the policies' models read to the end",
+        heads=OF_CELLS,
+        columns=named_columns("episodes", "cut, %", "success, all", "heard", "success, heard"),
+        rows=_rows(counts_by_scope, data, cells),
+        notes=(_HEARD_NOTE,),
+    )
+
+
+def _rows(
+    keys: Iterable[ScopeKey], data: RunData, cells: Callable[[ScopeKey], RowCells]
+) -> list[Row]:
+    """Return the rows of a table, with a group for each policy run and its options.
+
+    The row of all tasks is the last of its group; it is left out if there is only one task.
+
+    Args:
+        keys: what the rows are about.
+        data: of the runs.
+        cells: returns the cells of a row.
+    """
+    runs = list(data.frame.names)
+    groups: dict[tuple[PolicyRun, InstructionOptions], list[ScopeKey]] = {}
+    for key in keys:
+        groups.setdefault((key.policy_run, key.options), []).append(key)
+
+    def group_order(group: tuple[PolicyRun, InstructionOptions]) -> SortKey:
+        policy_run, options = group
+        return runs.index(policy_run), options_sort_key(options)
+
+    rows = []
+    for policy_run, options in sorted(groups, key=group_order):
+        in_group = groups[policy_run, options]
+        all_tasks = ScopeKey(policy_run, ALL_TASKS, options)
+        if all_tasks in in_group:
+            in_group.remove(all_tasks)
+            if len(in_group) != 1:
+                in_group.append(all_tasks)
+        label = data.frame.group_label(policy_run, options)
+        for key in in_group:
+            rows.append(Row(label, key.scope, cells(key)))
+    return rows
+
+
+def make_breakdown_table(breakdown: Breakdown, frame: Frame) -> Table:
+    """Make the table of gaps to explicit, broken down by a column that the frame has."""
+    rows = []
+    lacks_gap = False
+    for measured in break_down(frame, breakdown):
+        key = measured.key
+        group = frame.group_label(key.run, key.options)
+        gap = gap_words(measured.gap, measured.p_holm)
+        cells = (str(measured.counts.episodes), _rate(measured), *gap)
+        rows.append(Row(group, key.label, cells))
+        if measured.gap is None and key.options != REFERENCE_OPTIONS:
+            lacks_gap = True
+    without_verdict = sum(outcome not in _WITH_VERDICT for outcome in frame["outcome"])
+
+    notes = [f"{_BREAKDOWN_NOTE} {breakdown.note}"]
+    if lacks_gap:
+        notes.append(f"{NOT_APPLICABLE} without explicit on the same episodes.")
+    if without_verdict:
+        notes.append(incomplete_note(without_verdict))
+    return Table(
+        key=f"by_{breakdown.name}",
+        title=f"Gap to explicit by {breakdown.title}",
+        heads=(OF_CELLS[0], breakdown.title),
+        columns=named_columns("episodes", "success", "gap", "95 % interval", "p"),
+        rows=rows,
+        notes=notes,
+    )
+
+
+def _rate(measured: Measured[Any]) -> Entry:
+    """Return a success rate with its interval, or a dash if no episode has a verdict."""
+    if measured.rate is None:
+        return Entry(word=NOT_APPLICABLE)
+    return Entry(percent=percent(measured.rate), counts=measured.counts, interval=measured.interval)
+
+
+DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData, Iterable[Record]], Table]] = {
+    "forms": lambda data, _records: make_forms_table(data),
+    "failures": lambda data, _records: make_failure_table(data),
+    "failure-names": lambda data, _records: make_failure_name_table(data),
+    "heard": lambda data, _records: make_heard_table(data),
+    "arms": lambda data, _records: make_arm_table(data),
+    "subgoals": make_subgoal_table,
+    "facts": make_facts_table,
+}
+"""By name, as in the command line; the last two read whole records, too."""

@@ -1,0 +1,223 @@
+"""Table of the facts of a run that a methods section needs; what is unknown is *not reported*."""
+
+from __future__ import annotations
+
+import itertools
+import operator
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.results.option_labels import (
+    options_label,
+    options_sort_key,
+)
+from roboirg.analysis.tables.table import Column, Row, Table
+from roboirg.core.word_pools import words_label
+from roboirg.policies.contract.policy_calls import SERVER
+from roboirg.records.record import Record, Summary
+from roboirg.util.media import CONTROL_RATE
+
+RUN = "the run"
+NOT_REPORTED = "not reported"
+NOT_APPLICABLE = "not applicable, as there is no neural network"
+
+Facts = Iterator[tuple[str, Iterable[object]]]
+"""Names of facts, each with all its values; None is unknown."""
+
+_OF_RUN = {
+    "environment version": "environment_version",
+    "language version": "language_version",
+    "package version": "package_version",
+    "tasks": "task",
+    "split": "split",
+    "control arms": "arm",
+    "meshes": "environment.meshes",
+    "processor": "processor",
+    "render device": "render_device",
+}
+"""Facts that are fields of a result."""
+
+_NEEDS = (
+    "cameras",
+    "depth",
+    "actions",
+    "observe_every",
+    "demonstration_frames",
+    "prompt_tokens",
+    "lowers_prompt",
+)
+"""What a policy declares that it needs, or the run prescribes."""
+
+_OF_NETWORKS = ("preprocessing", "text_normalization", "dtype", "parameter_dtype")
+"""Keys of a policy's ``metadata`` that do not exist without a network."""
+
+_DECLARED = (
+    "network",
+    "trained_on",
+    "reads_text",
+    "chunk",
+    "execute",
+    *_OF_NETWORKS,
+    "device",
+    "libraries",
+    "python",
+)
+"""Keys of a policy's ``metadata``; the last four are also reported by its own process."""
+
+
+def make_facts_table(data: RunData, records: Iterable[Record]) -> Table:
+    """Make the table from the whole records of the runs of `data`."""
+    results = data.frame.played
+    words: defaultdict[_FactKey, dict[str, None]] = defaultdict(dict)
+    for name, values in itertools.chain(_run_conditions(results), _run_counts(results, data)):
+        for value in values:
+            words[_FactKey(RUN, name)] |= dict.fromkeys(_words(value))
+    totals: defaultdict[str, Counter[str]] = defaultdict(Counter)
+    for record in _last_played(records, results):
+        for name, value in _of_policy(record):
+            words[_FactKey(record.policy, name)] |= dict.fromkeys(_words(value))
+        total = totals[record.policy]
+        total.update(steps=record.steps, calls=record.calls)
+        total["executed"] = max(total["executed"], record.executed)
+    for policy, total in totals.items():
+        for name, value in _of_calls(total):
+            words[_FactKey(policy, name)] |= dict.fromkeys(_words(value))
+
+    rows = []
+    for owner in (RUN, *totals):
+        for key, its_words in words.items():
+            if key.owner == owner:
+                rows.append(Row(owner, key.name, ["; ".join(its_words) or NOT_REPORTED]))
+    return Table(
+        key="facts",
+        title="Facts of the run",
+        heads=("of", "fact"),
+        columns=(Column("value", is_text=True),),
+        rows=rows,
+    )
+
+
+class _FactKey(NamedTuple):
+    """The run or the policy that a fact is about, and the fact's name."""
+
+    owner: str
+    name: str
+
+
+def _last_played(records: Iterable[Record], results: Iterable[Summary]) -> Iterator[Record]:
+    """Yield the records that are behind results; others are of episodes that were played again."""
+    played = {(result.slug, result.started_at) for result in results}
+    for record in records:
+        if (record.slug, record.started_at) in played:
+            yield record
+
+
+def _of_calls(total: Counter[str]) -> Iterator[tuple[str, object]]:
+    """Yield how many steps a policy's calls are for, given its numbers of steps and calls."""
+    steps_per_call = None
+    if total["calls"]:
+        steps_per_call = f"{total['steps'] / total['calls']:.1f}"
+    yield "control steps per call, mean", steps_per_call
+    yield "actions executed per call, most", total["executed"] or None
+
+
+def _run_conditions(results: Sequence[Summary]) -> Facts:
+    """Yield under which conditions and in which settings the run was played."""
+    for name, field in _OF_RUN.items():
+        yield name, map(operator.attrgetter(field), results)
+    step_limits = [result.environment.max_steps for result in results]
+    yield "step limit", [f"{steps} at {CONTROL_RATE} a second" for steps in step_limits]
+    options = {result.column for result in results}
+    yield "settings", map(options_label, sorted(options, key=options_sort_key))
+    yield "words", [words_label(result.options.wordings) for result in results]
+    yield "delivery", [result.options.delivery for result in results]
+
+
+def _run_counts(results: Sequence[Summary], data: RunData) -> Facts:
+    """Yield which episodes and seeds were played, and how many trials ended in which way."""
+    episodes = {result.episode for result in results}
+    yield "episodes", [f"{len(episodes)}, from {min(episodes)} to {max(episodes)}"]
+    yield "policy seeds", sorted({result.policy_seed for result in results})
+    yield "trials played", [len(results)]
+    errors = Counter(result.error for result in results if result.outcome == "error")
+    yield "errors, in no rate", [errors or 0]
+    missing = sum(cell.missing for cell in data.cells.values())
+    yield "trials planned and not played", [missing]
+    begun_again = sum(result.attempt > 1 for result in results)
+    yield "trials begun again", [begun_again]
+
+
+def _of_policy(record: Record) -> Iterator[tuple[str, object]]:
+    """Yield the facts of a policy that a record of it has; None is unknown."""
+    version = record.server_version or record.policy_version
+    yield "version", _unless_unknown(version)
+    yield "reads the simulator's state", record.privileged
+    # If a record lists any needs, what it does not list is not needed; else nothing is known.
+    not_listed: object = [] if record.needs else None
+    for name in _NEEDS:
+        yield name.replace("_", " "), record.needs.get(name, not_listed)
+    declared = _declared(record)
+    for name in _DECLARED:
+        yield name.replace("_", " "), declared.get(name)
+    yield "prompts", _unless_unknown(record.prompt_verdict)
+
+
+def _unless_unknown(word: str) -> str | None:
+    return None if word == "unknown" else word
+
+
+def _declared(record: Record) -> dict[str, object]:
+    """Return what a policy declares of itself, and otherwise what was measured of its process.
+
+    What has no value, because there is no network, says that it is not applicable.
+    """
+    metadata = _metadata(record)
+    declared: dict[str, object] = {}
+    if metadata.get("network") == "none":
+        declared |= dict.fromkeys(_OF_NETWORKS, NOT_APPLICABLE)
+    inference = record.inference
+    # Measured is the process that played, which is not that of a policy server.
+    if inference is not None and SERVER not in metadata:
+        measured = {
+            "python": inference.python,
+            "libraries": inference.libraries,
+            "parameter_dtype": inference.dtypes,
+            "device": inference.devices,
+        }
+        for name, value in measured.items():
+            if value:
+                declared[name] = value
+    return declared | metadata  # what is declared holds, also if something else was measured
+
+
+def _metadata(record: Record) -> dict[str, Any]:
+    """Return a policy's metadata; for a planner's policy also those of the policy that it directs.
+
+    What the planner itself declares holds.
+    """
+    metadata = record.policy_metadata
+    behind_planner = metadata.get("policy")
+    if not isinstance(behind_planner, Mapping):
+        return dict(metadata)
+    inner = dict(behind_planner)
+    inner.pop("network", None)  # the planner's is not known from it
+    return {**inner, **metadata}
+
+
+def _words(value: object) -> list[str]:
+    """Return the value of a fact in words, nothing if it is unknown.
+
+    For example ``["yes"]`` for True, ``["front, wrist"]`` for a list of two cameras, and
+    ``["numpy 2.1", "torch 2.6"]`` for a mapping.
+    """
+    if value in (None, ""):
+        return []
+    if isinstance(value, Mapping):
+        return [f"{key} {part}" for key, part in value.items()]
+    if isinstance(value, list | tuple):
+        return [", ".join(map(str, value)) or "none"]
+    if isinstance(value, bool):
+        return ["yes" if value else "no"]
+    return [str(value)]

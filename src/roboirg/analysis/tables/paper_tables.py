@@ -1,0 +1,326 @@
+"""The tables of the paper: main, planners, context, real world, coverage, and two like them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from roboirg.analysis.comparability import AllDifferences, differences_of
+from roboirg.analysis.measures.chance import floor_level
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.published import (
+    PublishedRow,
+    published_lines,
+    published_rows,
+)
+from roboirg.analysis.results.frame import RunNames
+from roboirg.analysis.results.option_labels import (
+    REFERENCE_OPTIONS,
+    SortKey,
+    setting_sort_key,
+    staged_options,
+)
+from roboirg.analysis.results.run_cells import CellKey, Cells
+from roboirg.analysis.tables.table import (
+    ERROR_MARK,
+    MISSING_MARK,
+    POLICY,
+    Column,
+    Entry,
+    Row,
+    Source,
+    Table,
+    grouped,
+    named_columns,
+    with_averages,
+    with_best,
+    with_changes,
+)
+from roboirg.analysis.tables.table_kinds import (
+    PAPER_TABLES,
+    PaperTable,
+    row_order,
+    stages_text,
+)
+from roboirg.analysis.tables.table_notes import notes_of
+from roboirg.core.errors import check_names
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language.settings import EXPLICIT, all_settings, settings_of
+from roboirg.records.record import Job
+from roboirg.stats.cells import Cell, cell_interval
+from roboirg.stats.intervals import SEED
+from roboirg.stats.rates import percent
+from roboirg.tasks import all_tasks, every_task
+
+OWN_NAME = "RoboIRGBench"
+COVERAGE = "coverage"
+
+WHICH = (*PAPER_TABLES, COVERAGE)
+
+
+def make_table(
+    which: str, data: RunData | None, *, published: bool = False, floors: Sequence[str] = ()
+) -> Table:
+    """Make one of the paper's tables.
+
+    Args:
+        which: main, planner, context, real, harder, other or coverage.
+        data: results, of which control arms are left out; None if only published rows are shown.
+        published: whether to add the paper's rows, and to say which rates can be compared.
+        floors: those of `FLOORS` whose expected success is added below the policies.
+    """
+    if which == COVERAGE:
+        return _coverage()
+    check_names("table", [which], WHICH)
+    names: RunNames = {}
+    cells: Cells = {}
+    if data is not None:
+        names = data.told.frame.names_as_played
+        cells = data.told.cells
+    table = PAPER_TABLES[which]
+    columns = table.columns(table.tasks(cells))
+    # The harder settings have the tasks of a table of the paper, but no published rates.
+    shows_published = published and table.of_paper == table.name
+    differences: AllDifferences = {}
+    if shows_published:
+        differences = {key: differences_of(key, cell) for key, cell in cells.items()}
+
+    rows = _policy_rows(table, columns, cells, names, differences)
+    if not table.is_by_stages:
+        for floor in floors:
+            rows += _floor_rows(floor, table, columns, cells)
+    if shows_published:
+        for published_row in published_rows(table.name):
+            rows.append(_published_row(table, columns, published_row))
+    if not table.is_by_stages:
+        rows.sort(key=lambda row: setting_sort_key(row.group))
+    rows = list(with_best(_compared_rows(table, columns, rows)))
+    notes = notes_of(table, columns, rows, cells, names, differences, floors)
+    # Last, because the best policy is one of a setting's rows, which are apart from here on.
+    if table.heads == (POLICY, "setting"):
+        rows = _by_policy(rows)
+    return Table(table.name, table.title, table.heads, columns, rows, notes)
+
+
+def is_informative(which: str, data: RunData) -> bool:
+    """Return whether a run has enough rows to make a table worth printing.
+
+    The table of planners needs several policy runs, one of them with a planner; that of contexts
+    needs several contexts, and the harder one a setting other than explicit.
+    """
+    if which == COVERAGE:
+        return False
+    told = data.told
+    rows = list(PAPER_TABLES[which].positions(told.cells, told.frame.names))
+    options = {row.options for row in rows}
+    if which == "planner":
+        runs = {row.policy_run for row in rows}
+        return len(runs) > 1 and any(run.has_planner for run in runs)
+    if which == "context":
+        return len(options) > 1
+    if which == "harder":
+        # Explicit alone is a reference, but nothing to read.
+        options.discard(REFERENCE_OPTIONS)
+    return bool(options)
+
+
+def _policy_rows(
+    table: PaperTable,
+    columns: Sequence[Column],
+    cells: Cells,
+    names: RunNames,
+    differences: AllDifferences,
+) -> list[Row]:
+    """Return the rows of the policies that were played, as listed by the table."""
+    # One generator for all, so an interval depends on the entries before it.
+    rng = np.random.default_rng(SEED)
+    rows = []
+    for position in table.positions(cells, names):
+        entries = {}
+        for task in table.tasks(cells):
+            key = CellKey(position.policy_run, task, position.options)
+            entries[task] = _entry(key, cells.get(key), differences, rng)
+        rows.append(table.row(position.options, position.label, with_averages(columns, entries)))
+    return rows
+
+
+def _entry(
+    key: CellKey, cell: Cell | None, differences: AllDifferences, rng: np.random.Generator
+) -> Entry:
+    """Return the rate of a task in a setting; without a rate if no episode of it was planned."""
+    if cell is None:
+        return Entry(applies=_applies(key.task, key.options))
+    marks = ""
+    if cell.errors:
+        marks += ERROR_MARK
+    if cell.missing:
+        marks += MISSING_MARK
+    rate = cell.rate
+    return Entry(
+        percent=None if rate is None else percent(rate),
+        marks=marks,
+        counts=cell.counts,
+        interval=cell_interval(cell, rng),
+        differences=differences.get(key),
+    )
+
+
+def _applies(task: str, options: InstructionOptions) -> bool:
+    """Whether a task has a setting; taken for granted if either is not installed."""
+    installed = every_task().get(task)
+    if installed is None or options.setting not in all_settings():
+        return True
+    return options.setting in settings_of(installed)
+
+
+def _floor_rows(
+    floor: str, table: PaperTable, columns: Sequence[Column], cells: Cells
+) -> Iterator[Row]:
+    """Yield the rows of a floor, one for each setting and split that any policy played.
+
+    Their levels are of the same episodes.
+    """
+    tasks = table.tasks(cells)
+    played = {}
+    for key, cell in cells.items():
+        if key.task in tasks and table.shows(key.options) and cell.verdicts:
+            played[key] = cell
+    jobs = _jobs_by_instructions(played)
+    # Of several versions of the words it is not known what can be learned.
+    languages = {key.policy_run.language for key in played}
+    language = languages.pop() if len(languages) == 1 else ""
+    has_several_splits = len({instructions.split for instructions in jobs}) > 1
+    for instructions in sorted(jobs, key=_instruction_order):
+        options = instructions.options
+        entries = _floor_entries(floor, options, tasks, jobs[instructions], language)
+        if all(entry.percent is None for entry in entries.values()):
+            continue  # the floor has not been measured
+        name = floor
+        if has_several_splits:
+            name += f", split {instructions.split}"
+        yield Row(options.setting, name, with_averages(columns, entries), "chance")
+
+
+def _floor_entries(
+    floor: str,
+    options: InstructionOptions,
+    tasks: Sequence[str],
+    jobs: Sequence[Job],
+    language: str,
+) -> dict[str, Entry]:
+    """Return the level of a floor in each task, over those of the jobs that are of the task."""
+    entries = {}
+    for task in tasks:
+        jobs_of_task = [job for job in jobs if job.task == task]
+        level = floor_level(floor, jobs_of_task, language)
+        rate = None if level is None else percent(level)
+        entries[task] = Entry(rate, applies=_applies(task, options))
+    return entries
+
+
+class _Instructions(NamedTuple):
+    """The split whose instructions are meant, and the options that word them."""
+
+    split: str
+    options: InstructionOptions
+
+
+def _instruction_order(instructions: _Instructions) -> SortKey:
+    return row_order(instructions.options), instructions.split
+
+
+def _jobs_by_instructions(cells: Cells) -> dict[_Instructions, list[Job]]:
+    """Return the episodes with a verdict by split and options, each as a job without a policy.
+
+    Those of tasks and settings that are not installed are left out.
+    """
+    jobs: defaultdict[_Instructions, list[Job]] = defaultdict(list)
+    for (policy_run, task, options), cell in cells.items():
+        split = policy_run.conditions.split
+        jobs_of_instructions = jobs[_Instructions(split, options)]
+        if task not in every_task() or options.setting not in all_settings():
+            continue
+        for episode in cell.by_episode():
+            job = Job(policy="", task=task, split=split, episode=episode, options=options)
+            jobs_of_instructions.append(job)
+    return jobs
+
+
+def _published_row(table: PaperTable, columns: Sequence[Column], published: PublishedRow) -> Row:
+    """Return a row of the paper as a row of the table."""
+    entries = {}
+    for task, rate in published.rates.items():
+        entries[task] = Entry(percent=rate, applies=rate is not None)
+    cells = list(with_averages(columns, entries))
+    # The overall average is the last column: as the paper prints it, which has none of suites.
+    cells[-1] = Entry(percent=published.average)
+    row = table.row(published.options, published.model, cells)
+    return replace(row, source="published")
+
+
+def _by_policy(rows: Sequence[Row]) -> list[Row]:
+    """Return rows in groups by policy, and named by setting, given the reverse.
+
+    Published policies are apart from played ones of the same name.
+    """
+    swapped = []
+    for group in grouped(rows, lambda row: (row.source, row.name)):
+        for row in group:
+            swapped.append(replace(row, group=row.name, name=row.group))
+    return swapped
+
+
+def _compared_rows(
+    table: PaperTable, columns: Sequence[Column], rows: Sequence[Row]
+) -> Iterator[Row]:
+    """Yield rows with their changes from explicit, or from the shortest context.
+
+    A row is compared with another of the same policy and source; references stay as they are, and
+    so do floors, which are not of a policy.
+    """
+    rows_by_position = {(row.group, row.name, row.source): row for row in rows}
+    shortest = stages_text(staged_options()[0])
+    for row in rows:
+        # Groups are settings and names policies, but the other way round in the table of contexts.
+        reference_position = (EXPLICIT, row.name, row.source)
+        if table.is_by_stages:
+            reference_position = (row.group, shortest, row.source)
+        reference = rows_by_position.get(reference_position)
+        is_reference = reference_position == (row.group, row.name, row.source)
+        if reference is None or is_reference or row.source == "chance":
+            yield row
+        else:
+            yield with_changes(columns, row, reference)
+
+
+def _coverage() -> Table:
+    """Return the paper's table of which benchmark has which setting.
+
+    The row of this benchmark is not the paper's, but follows from its tasks.
+    """
+    lines = published_lines(COVERAGE)
+    settings = [name for name in lines[0] if name not in ("kind", "benchmark")]
+    our_settings: set[str] = set()
+    for task in all_tasks().values():
+        our_settings.update(settings_of(task))
+    rows = []
+    for line in lines:
+        source: Source = "cited"
+        if line["benchmark"] == OWN_NAME:
+            source = "ours"
+            for setting in settings:
+                line[setting] = "yes" if setting in our_settings else "no"
+        words = [line[setting] for setting in settings]
+        rows.append(Row(line["kind"], line["benchmark"], words, source))
+    return Table(
+        key=COVERAGE,
+        title="Implicit references in benchmarks",
+        heads=("kind", "benchmark"),
+        columns=named_columns(*settings),
+        rows=rows,
+        notes=("partial: pronouns within a chain of actions only. Source: the paper.",),
+    )

@@ -1,0 +1,277 @@
+"""The terminal's table of a run: tasks × settings, one for each policy run."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
+from dataclasses import replace
+from fractions import Fraction
+
+from rich.console import Console
+from rich.text import Text
+
+from roboirg.analysis.comparability import (
+    AllDifferences,
+    comparison_notes,
+    differences_of,
+)
+from roboirg.analysis.measures.headline import headline_notes
+from roboirg.analysis.measures.heard_rates import heard_notes
+from roboirg.analysis.measures.measure import (
+    ALL_TASKS,
+    Measured,
+    ScopeKey,
+    ScopeSummary,
+    Summaries,
+    by_scope,
+    pair,
+)
+from roboirg.analysis.results.frame import Frame
+from roboirg.analysis.results.option_labels import (
+    REFERENCE_OPTIONS,
+    SortKey,
+    options_label,
+    options_sort_key,
+)
+from roboirg.analysis.results.policy_run import PolicyRun
+from roboirg.analysis.results.run_cells import CellKey, Cells, cells_of
+from roboirg.analysis.tables.table import (
+    ERROR_MARK,
+    MISSING_MARK,
+    Column,
+    Entry,
+    Row,
+    Table,
+)
+from roboirg.analysis.tables.table_notes import range_text, where_played
+from roboirg.core.arms import TOLD
+from roboirg.core.plain_text import counted, printable
+from roboirg.records.record import Summary
+from roboirg.stats.cells import NOTHING, ByTask
+from roboirg.stats.paired_tests import paired_rates
+from roboirg.stats.rates import NOT_APPLICABLE, points, whole_percent
+
+MAX_FAILURES = 10
+"""Episodes of a policy that are listed below the tables."""
+
+_GOOD = Fraction(3, 4)
+_FAIR = Fraction(2, 5)
+"""The smallest rates in green and in yellow."""
+
+
+def make_run_tables(frame: Frame) -> list[Table]:
+    """Make a table for each policy run, in their order.
+
+    What the signs mean is the last note of the last table.
+    """
+    cells = cells_of(frame)
+    scopes = by_scope(cells)
+    summaries_of_runs: defaultdict[PolicyRun, dict[ScopeKey, ScopeSummary]] = defaultdict(dict)
+    gaps = {}
+    for key, by_task in scopes.items():
+        is_suite = key.scope not in by_task and key.scope != ALL_TASKS
+        if not is_suite:
+            summaries_of_runs[key.policy_run][key] = Measured(key, by_task)
+            gaps[key] = gap_text(key, scopes)
+
+    tables = []
+    for policy_run, label in frame.names.items():
+        names = {policy_run: label}  # the notes below a table are about its policy run alone
+        differences = _explicit_differences(cells, policy_run)
+        summaries = summaries_of_runs[policy_run]
+        notes = [f"{where_played([policy_run])} {_sizes(summaries)}"]
+        notes += comparison_notes(differences, names)
+        notes += heard_notes(frame.where(run=policy_run), names)
+        notes += headline_notes(cells, names)
+        tables.append(_make_run_table(label, summaries, gaps, differences, notes))
+    if tables:
+        legend = "; ".join(_legend(summaries_of_runs.values(), set(gaps.values())))
+        last = tables[-1]
+        tables[-1] = replace(last, notes=(*last.notes, legend))
+    return tables
+
+
+def _explicit_differences(cells: Cells, policy_run: PolicyRun) -> AllDifferences:
+    """Return how the cells of explicit instructions differ from those of the published rates.
+
+    Rates of no other setting can be compared with these.
+    """
+    differences = {}
+    for key, cell in cells.items():
+        if key.policy_run == policy_run and key.options == REFERENCE_OPTIONS:
+            differences[key] = differences_of(key, cell)
+    return differences
+
+
+def print_failures(frame: Frame, console: Console) -> None:
+    """Print the first episodes without success of each policy run, and how many more there are."""
+    for run, label in frame.names.items():
+        failures = [result for result in frame.where(run=run).played if result.outcome != "success"]
+        failures.sort(key=_scene_order)
+        if failures:
+            title = f"{counted(len(failures), 'episode')} without success"
+            console.print(Text.assemble((label, "bold"), f": {title}"), soft_wrap=True)
+        for result in failures[:MAX_FAILURES]:
+            console.print(Text(f"  {failure_text(result)}"), highlight=False, soft_wrap=True)
+        if len(failures) > MAX_FAILURES:
+            console.print(f"  and {len(failures) - MAX_FAILURES} more", highlight=False)
+
+
+def _scene_order(result: Summary) -> SortKey:
+    """Sort results in an order that is the same for any number of worker processes."""
+    return result.task, result.split, result.episode, options_sort_key(result.options)
+
+
+def failure_text(result: Summary) -> str:
+    """Return the episode, its instruction options and the cause of its failure.
+
+    For example ``PickXtimes test/3 relational (policy seed 1): picked up the wrong cube``.
+    """
+    text = f"{result.task} {result.split}/{result.episode} {options_label(result.options)}"
+    if result.policy_seed:
+        text += f" (policy seed {result.policy_seed})"
+    if result.arm != TOLD:
+        text += f" ({result.arm})"
+    text += f": {printable(result.cause or result.outcome)}"
+    if result.outcome == "error":
+        text += f" {ERROR_MARK}"
+    return text
+
+
+def gap_text(key: ScopeKey, scopes: Mapping[ScopeKey, ByTask]) -> str:
+    """Return the gap to explicit on the same episodes, the mean over tasks.
+
+    For example ``−12``; a dash if neither has a success, as such a gap says nothing. Empty for
+    explicit itself, and if no episode was played in both settings.
+    """
+    reference = key._replace(options=REFERENCE_OPTIONS)
+    if key == reference:
+        return ""
+    rates = paired_rates(pair(scopes[key], scopes.get(reference, NOTHING)))
+    if rates is None:
+        return ""
+    if not any(rates):
+        return NOT_APPLICABLE
+    return points(rates.first - rates.second)
+
+
+def _make_run_table(
+    label: str,
+    summaries: Summaries,
+    gaps: Mapping[ScopeKey, str],
+    differences: AllDifferences,
+    notes: Sequence[str],
+) -> Table:
+    """Return the table of a policy run, with a row for each task and a column for each setting.
+
+    An entry is the success rate and, in brackets, the gap to explicit.
+
+    Args:
+        label: of the policy run, the title.
+        summaries: the results of the policy run by task, and those of all tasks.
+        gaps: as printed.
+        differences: from the conditions of the published rates.
+        notes: below the table.
+    """
+    policy_run = next(iter(summaries)).policy_run
+    scopes = list(dict.fromkeys(key.scope for key in summaries))
+    if not _has_several_tasks(scopes):
+        scopes = scopes[:1]  # what is of all tasks would only repeat it
+    settings = sorted({key.options for key in summaries}, key=options_sort_key)
+    columns = [Column(options_label(options), options.setting) for options in settings]
+    rows = []
+    for scope in scopes:
+        entries = []
+        for options in settings:
+            summary = summaries.get(ScopeKey(policy_run, scope, options))
+            entries.append(_entry(summary, gaps, differences))
+        group = ALL_TASKS if scope == ALL_TASKS else ""
+        rows.append(Row(group, scope, entries))
+    return Table(key="run", title=label, heads=("task",), columns=columns, rows=rows, notes=notes)
+
+
+def _has_several_tasks(scopes: Collection[str]) -> bool:
+    """Return whether scopes have more than one task, next to that of all tasks."""
+    return len(set(scopes) - {ALL_TASKS}) > 1
+
+
+def _entry(
+    summary: ScopeSummary | None, gaps: Mapping[ScopeKey, str], differences: AllDifferences
+) -> Entry:
+    """Return an entry such as ``62 (−12)``, the success rate and the gap to explicit in brackets.
+
+    It is a dash where nothing was played or planned, or no episode has a verdict.
+    """
+    if summary is None:
+        return Entry(applies=False)
+    counts = summary.counts
+    marks = []
+    if counts.errors:
+        marks.append(f"{counts.errors}{ERROR_MARK}")
+    if counts.missing:
+        marks.append(f"{counts.missing}{MISSING_MARK}")
+    rate = summary.rate
+    if rate is None:
+        return Entry(word=NOT_APPLICABLE, marks=" ".join(marks))
+
+    word = whole_percent(rate)
+    gap = gaps[summary.key]
+    if gap:
+        word += f" ({gap})"
+    return Entry(
+        word=word,
+        marks=" ".join(marks),
+        differences=differences.get(CellKey(*summary.key)),
+        style=_color(rate),
+    )
+
+
+def _color(rate: Fraction) -> str:
+    if rate >= _GOOD:
+        return "green"
+    if rate >= _FAIR:
+        return "yellow"
+    return "red"
+
+
+def _legend(summaries_of_runs: Iterable[Summaries], gaps: Set[str]) -> Iterator[str]:
+    """Yield what the signs mean that occur in the tables.
+
+    Args:
+        summaries_of_runs: what each table shows.
+        gaps: as they are printed in brackets; empty where a rate has none.
+    """
+    counts: Counter[str] = Counter()
+    for summaries in summaries_of_runs:
+        for key, summary in summaries.items():
+            counts["errors"] += summary.counts.errors
+            counts["missing"] += summary.counts.missing
+            counts["privileged"] += key.policy_run.is_privileged
+    if any(gaps):
+        yield "success rate in %, in brackets the gap to explicit on the same episodes in points"
+    else:
+        yield "success rate in %"
+    if NOT_APPLICABLE in gaps:
+        yield f"({NOT_APPLICABLE}) explicit has no success either, so the gap says nothing"
+    if counts["errors"]:
+        yield f"{ERROR_MARK} episodes ended in an error and are left out of the rates"
+    if counts["missing"]:
+        yield f"{MISSING_MARK} episodes are still to be played"
+    if counts["privileged"]:
+        yield "privileged policies and scripted hands use the simulator's state"
+
+
+def _sizes(summaries: Summaries) -> str:
+    """Return how many trials a cell has, and how many all tasks together.
+
+    For example ``n = 10 to 20 episodes per cell, 160 episodes for all tasks, the mean over tasks``.
+    """
+    of_cells: list[int] = []
+    of_all_tasks: list[int] = []
+    for key, summary in summaries.items():
+        trials = of_all_tasks if key.scope == ALL_TASKS else of_cells
+        trials.append(summary.counts.trials)
+    text = f"n = {range_text(of_cells, 'episode')} per cell"
+    if _has_several_tasks({key.scope for key in summaries}):
+        text += f", {range_text(of_all_tasks, 'episode')} for {ALL_TASKS}, the mean over tasks"
+    return text

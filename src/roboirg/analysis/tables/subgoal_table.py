@@ -1,0 +1,144 @@
+"""Table of planners: their subgoals, what they cost, and how their episodes went wrong."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping
+
+from roboirg.analysis.measures.planner_failures import PLANNER_FAILURES, planner_failure
+from roboirg.analysis.measures.run_data import RunData
+from roboirg.analysis.results.reading import with_columns
+from roboirg.analysis.results.run_cells import CellKey
+from roboirg.analysis.tables.table import Column, Row, Table
+from roboirg.core.errors import InvalidValueError
+from roboirg.judging import SUBGOAL_VERDICTS
+from roboirg.records.record import Record
+from roboirg.stats.cells import rows_of
+
+_NOTE = (
+    "Subgoals that a planner named, each counted when it or the due stage was new: right (the one "
+    "that was due), wrong thing (or a point off it), wrong place (for the right thing), wrong "
+    "count (the right act at another time), or lost (an act that was not due). Shares are of the "
+    "cell's subgoals."
+)
+_COSTS = {
+    "calls": "calls",
+    "input_tokens": "tokens in",
+    "output_tokens": "tokens out",
+    "cost_usd": "US$",
+    "answered_s": "s for answers",
+    "waited_s": "s in queues",
+    "refused": "refusals",
+    "missed": "misses",
+}
+"""What a planner costs: keys of a record's usage, and their headings."""
+_UNKNOWN_IF_ABSENT = ("input_tokens", "output_tokens", "cost_usd")
+"""What a service may not report, so that the records of its replies lack it."""
+
+
+def _usage(record: Record) -> dict[str, float]:
+    """Return the usage of a record, with NaN for what is unknown of the models that it asked."""
+    if "calls" not in record.usage:
+        return dict(record.usage)
+    unknown = dict.fromkeys(_UNKNOWN_IF_ABSENT, math.nan)
+    return {**unknown, **record.usage}
+
+
+_READ: Mapping[str, Callable[[Record], object]] = {
+    "verdicts": lambda record: tuple(subgoal.verdict for subgoal in record.subgoals),
+    "planner_failure": planner_failure,
+    "usage": _usage,
+}
+"""What the table reads of whole records."""
+
+
+def make_subgoal_table(data: RunData, records: Iterable[Record]) -> Table:
+    """Make the table from the whole records of the runs of `data`.
+
+    Raises:
+        InvalidValueError: no record holds a subgoal, or the failure of a planner.
+    """
+    counts_by_cell = _count_in_cells(data, records)
+    if not counts_by_cell:
+        raise InvalidValueError("No planner of the runs named a subgoal; their records hold none.")
+    occurring: set[str] = set()
+    for counts in counts_by_cell.values():
+        occurring.update(name for name in counts if counts[name] > 0)
+    failures = [name for name in PLANNER_FAILURES if name in occurring]
+    costs = [name for name in _COSTS if name in occurring]
+
+    rows = []
+    for key, counts in counts_by_cell.items():
+        group = data.frame.group_label(key.policy_run, key.options)
+        rows.append(Row(group, key.task, list(_words(counts, failures, costs))))
+    notes = [_NOTE]
+    if failures:
+        meanings = "; ".join(f"{failure}: {PLANNER_FAILURES[failure]}" for failure in failures)
+        notes.append(f"Failed episodes, by what the planner did: {meanings}.")
+    return Table(
+        key="subgoals",
+        title="Subgoals of planners",
+        heads=("policy and setting", "task"),
+        columns=_columns(failures, costs),
+        rows=rows,
+        notes=notes,
+    )
+
+
+def _columns(failures: Iterable[str], costs: Iterable[str]) -> list[Column]:
+    """Return the columns: subgoals by verdict, then the failures and the costs that occur."""
+    columns = [Column("subgoals")]
+    for verdict in SUBGOAL_VERDICTS:
+        columns.append(Column(verdict.replace("_", " ")))
+    for failure in failures:
+        columns.append(Column(failure, "failed episodes"))
+    for cost in costs:
+        columns.append(Column(_COSTS[cost], "per episode"))
+    return columns
+
+
+def _count_in_cells(data: RunData, records: Iterable[Record]) -> dict[CellKey, Counter[str]]:
+    """Count what the table shows, in each cell in which a planner has a subgoal or a failure.
+
+    A count is the number of ``episodes``, that of subgoals with a verdict or of failures, by name,
+    or the sum of a cost: ``{"episodes": 10, "right": 31, "wrong_place": 2, "calls": 40, …}``.
+    """
+    frame = with_columns(data.frame, records, _READ)
+    counts_by_cell: defaultdict[CellKey, Counter[str]] = defaultdict(Counter)
+    names = ("run", "task", "options", *_READ)
+    for run, task, options, verdicts, failure, usage in rows_of(frame, *names):
+        if usage is None:
+            continue  # the episode was not played
+        counts = counts_by_cell[CellKey(run, task, options)]
+        counts["episodes"] += 1
+        counts.update(verdicts)
+        if failure:
+            counts[failure] += 1
+        for name in _COSTS:
+            if name in usage:
+                counts[name] += usage[name]
+
+    return {key: counts for key, counts in counts_by_cell.items() if _has_planner(counts)}
+
+
+def _has_planner(counts: Counter[str]) -> bool:
+    """Return whether a planner named a subgoal or failed in the episodes that were counted."""
+    return any(counts[name] for name in (*SUBGOAL_VERDICTS, *PLANNER_FAILURES))
+
+
+def _words(counts: Counter[str], failures: Iterable[str], costs: Iterable[str]) -> Iterator[str]:
+    """Yield the cells of a row, in the order of the columns.
+
+    The subgoals, those of each verdict with their share, such as ``31 (94 %)``, the failed
+    episodes, and the mean costs of an episode.
+    """
+    total = sum(counts[verdict] for verdict in SUBGOAL_VERDICTS)
+    yield str(total)
+    for verdict in SUBGOAL_VERDICTS:
+        yield f"{counts[verdict]} ({100 * counts[verdict] / max(total, 1):.0f} %)"
+    for failure in failures:
+        yield str(counts[failure])
+    for cost in costs:
+        mean = counts[cost] / counts["episodes"]  # NaN if an episode's cost is unknown
+        yield "unknown" if math.isnan(mean) else f"{mean:.3g}"

@@ -1,0 +1,161 @@
+"""Which rows and columns each table of rates has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from roboirg.analysis.published import AVERAGE, RateTable, published_tasks
+from roboirg.analysis.results.frame import RunNames
+from roboirg.analysis.results.option_labels import (
+    REFERENCE_OPTIONS,
+    SortKey,
+    has_default_options,
+    is_usual,
+    setting_sort_key,
+    staged_options,
+)
+from roboirg.analysis.results.policy_run import PolicyRun
+from roboirg.analysis.results.run_cells import Cells
+from roboirg.analysis.tables.table import POLICY, Column, Entry, Row
+from roboirg.core.instruction_options import ALL_STAGES, InstructionOptions
+from roboirg.tasks import all_tasks, every_task
+
+Shows = Callable[[InstructionOptions], bool]
+
+TWIN_MARK = " (twin)"
+"""After policies that played the simulated twin of a real robot's task."""
+
+
+def row_order(options: InstructionOptions) -> SortKey:
+    """Return a key that sorts rows by setting, and within it those with fewer stages first."""
+    stages = options.stages
+    return (*setting_sort_key(options.setting), len(stages), stages)
+
+
+def stages_text(options: InstructionOptions) -> str:
+    """Return the stages of options, such as ``1,5``."""
+    return ",".join(map(str, options.stages))
+
+
+class RowPosition(NamedTuple):
+    """What a row is about.
+
+    Attributes:
+        policy_run: that played it.
+        options: of the instructions.
+        label: of the policy.
+    """
+
+    policy_run: PolicyRun
+    options: InstructionOptions
+    label: str
+
+
+@dataclass(frozen=True)
+class PaperTable:
+    """What a table of rates has columns and rows for.
+
+    Attributes:
+        name: as in the command line.
+        title: above it.
+        of_paper: the table of the paper with its tasks; None for all other tasks.
+        shows: whether it has rows for instruction options.
+        reference: returns the options that changes are from.
+        heads: of the groups of rows and of their names.
+        by_suite: whether its columns are grouped by suite, each with an average.
+    """
+
+    name: str
+    title: str
+    of_paper: RateTable | None
+    shows: Shows = has_default_options
+    reference: Callable[[], InstructionOptions] = lambda: REFERENCE_OPTIONS
+    heads: tuple[str, ...] = ("setting", POLICY)
+    by_suite: bool = False
+
+    @property
+    def is_by_stages(self) -> bool:
+        """Whether the rows of a group are sets of stages, and the groups policies."""
+        return len(self.heads) > 2  # noqa: PLR2004 - a column for each stage
+
+    def tasks(self, cells: Cells) -> tuple[str, ...]:
+        """Return the paper's tasks, or all others that were played, those not installed last."""
+        if self.of_paper is not None:
+            return published_tasks(self.of_paper)
+        in_paper = {*published_tasks("main"), *published_tasks("real")}
+        others = {key.task for key in cells} - in_paper
+        return tuple(sorted(others, key=lambda task: (task not in every_task(), task)))
+
+    def columns(self, tasks: Sequence[str]) -> tuple[Column, ...]:
+        """Return the columns of some tasks: by suite with its average, or in their order.
+
+        The overall average comes last.
+        """
+        overall = Column(AVERAGE, averages=tuple(tasks))
+        if not self.by_suite:
+            return (*map(Column, tasks), overall)
+        suites: dict[str, list[str]] = {}
+        for task in tasks:
+            suite = all_tasks()[task].suite.capitalize()
+            suites.setdefault(suite, []).append(task)
+        columns = []
+        for suite, tasks_of_suite in suites.items():
+            for task in tasks_of_suite:
+                columns.append(Column(task, suite))
+            columns.append(Column(f"{suite} {AVERAGE}", suite, tuple(tasks_of_suite)))
+        return (*columns, overall)
+
+    def positions(self, cells: Cells, names: RunNames) -> Iterator[RowPosition]:
+        """Yield what each row is about, by policy run and options.
+
+        There is a row if the policy run has a task of the table, played or planned, with options
+        that the table shows.
+        """
+        tasks = self.tasks(cells)
+        options_of_runs: dict[PolicyRun, set[InstructionOptions]] = {}
+        for policy_run, task, options in cells:
+            if task in tasks and self.shows(options):
+                options_of_runs.setdefault(policy_run, set()).add(options)
+        for policy_run, name in names.items():
+            label = name
+            if self.of_paper == "real" and policy_run.robot is None:
+                label += TWIN_MARK
+            for options in sorted(options_of_runs.get(policy_run, ()), key=row_order):
+                yield RowPosition(policy_run, options, label)
+
+    def row(self, options: InstructionOptions, policy: str, cells: Sequence[Entry]) -> Row:
+        """Return a row with its labels."""
+        if self.is_by_stages:
+            return Row(policy, stages_text(options), cells)
+        return Row(options.setting, policy, cells)
+
+
+PAPER_TABLES: Mapping[str, PaperTable] = {
+    table.name: table
+    for table in (
+        PaperTable("main", "Success by task and setting", "main", by_suite=True),
+        PaperTable("planner", "High-level planners", "planner", heads=(POLICY, "setting")),
+        PaperTable(
+            "context",
+            "Stages of the contextual setting",
+            "context",
+            shows=lambda options: options in staged_options(),
+            reference=lambda: staged_options()[0],
+            heads=(POLICY, *map(str, ALL_STAGES)),
+        ),
+        PaperTable("real", "Real world", "real"),
+        PaperTable(
+            "harder",
+            "Harder settings",
+            "main",
+            shows=lambda options: (
+                options == REFERENCE_OPTIONS
+                or (is_usual(options) and not has_default_options(options))
+            ),
+            by_suite=True,
+        ),
+        PaperTable("other", "Tasks outside the paper", None),
+    )
+}

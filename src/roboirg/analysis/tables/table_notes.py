@@ -1,0 +1,259 @@
+"""Notes below a table: the meaning of its signs, and limits of the results."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from roboirg.analysis.comparability import AllDifferences, comparison_notes
+from roboirg.analysis.measures.chance import unmeasured_note
+from roboirg.analysis.measures.headline import headline_notes
+from roboirg.analysis.published import NOTES
+from roboirg.analysis.results.frame import Frame, RunNames
+from roboirg.analysis.results.option_labels import (
+    is_usual,
+    options_label,
+    options_sort_key,
+)
+from roboirg.analysis.results.policy_run import PolicyRun
+from roboirg.analysis.results.run_cells import CellKey, Cells
+from roboirg.analysis.tables.table import (
+    ERROR_MARK,
+    MISSING_MARK,
+    PARTIAL_MARK,
+    Column,
+    Entry,
+    Row,
+    Table,
+)
+from roboirg.analysis.tables.table_kinds import TWIN_MARK, PaperTable
+from roboirg.core.plain_text import counted, verb_for
+from roboirg.records.mixing import mixtures
+from roboirg.stats.cells import Counts
+from roboirg.stats.rates import NOT_APPLICABLE
+from roboirg.tasks import every_task
+
+RATES_NOTE = (
+    "Success rate in percent, the mean over policy seeds; averages are unweighted means over tasks."
+)
+_FLOORS_NOTE = (
+    "Rows without a policy are expected success. chance: a guess among the goals that fit the "
+    "command; first-mention, last-mention, elimination (a value that is not named), surface (key "
+    "words): rules for the words alone; text-only, scene-only: learners that see the words or the "
+    "scene alone; union: for each value the better of these two (docs/floors.md)."
+)
+_TWIN_NOTE = f"{TWIN_MARK.strip()}: the study's twin, in simulation, not on a robot."
+
+
+def notes_of(
+    table: PaperTable,
+    columns: Sequence[Column],
+    rows: Sequence[Row],
+    cells: Cells,
+    names: RunNames,
+    differences: AllDifferences,
+    floors: Sequence[str],
+) -> tuple[str, ...]:
+    """Return the notes of a table of rates.
+
+    Args:
+        table: which one.
+        columns: of the table; the last is the average over all tasks.
+        rows: of the table.
+        cells: of all runs.
+        names: labels of the policy runs.
+        differences: from published rates; none if these are not shown.
+        floors: expected successes that are asked for.
+    """
+    tasks = columns[-1].averages
+    shown_cells = {}
+    for key, cell in cells.items():
+        if key.task in tasks and table.shows(key.options):
+            shown_cells[key] = cell
+    policy_runs = list(dict.fromkeys(key.policy_run for key in shown_cells))
+    entries: list[Entry] = []
+    for row in rows:
+        entries += row.entries
+
+    notes = [RATES_NOTE]
+    notes += _sign_notes(table, entries)
+    notes.append(where_played(policy_runs))
+    notes += _count_notes([cell.counts for cell in shown_cells.values()], entries)
+    if len(policy_runs) == 1:
+        notes.append("Only one policy was played; nothing is compared.")
+    if table.name == "main":
+        notes += _omission_notes(table, cells, tasks)
+        notes += headline_notes(cells, names)
+    notes.append(_absent_tasks(shown_cells))
+    notes += _origin_notes(table, rows, floors, policy_runs)
+    notes += comparison_notes({key: differences.get(key) for key in shown_cells}, names)
+    notes += _average_notes(columns, rows)
+    return tuple(filter(None, notes))  # some have nothing to say and are empty
+
+
+def with_mixtures(tables: Sequence[Table], frame: Frame) -> list[Table]:
+    """Return tables with a note on everything that their results do not have in common."""
+    notes = mixtures(frame.told().played)
+    noted = []
+    for table in tables:
+        if table.key == "coverage":
+            noted.append(table)  # it is not about results
+        else:
+            noted.append(replace(table, notes=(*table.notes, *notes)))
+    return noted
+
+
+def where_played(policy_runs: Collection[PolicyRun]) -> str:
+    """Return a sentence with the split, the words and the limit; each only if all have the same.
+
+    For example ``Played on the test split, in own words, with at most 1300 steps.``
+    """
+    phrases = {
+        "split": "on the {} split",
+        "wordings": "in {}",
+        "max_steps": "with at most {} steps",
+    }
+    parts = []
+    for name, phrase in phrases.items():
+        values = {policy_run.conditions.text(name) for policy_run in policy_runs}
+        if len(values) == 1:
+            parts.append(phrase.format(*values))
+    if not parts:
+        return ""
+    return f"Played {', '.join(parts)}."
+
+
+def range_text(counts: Sequence[int], noun: str) -> str:
+    """Return the smallest and the largest count: ``1 to 3 trials``, or ``5 trials`` if equal."""
+    low = min(counts)
+    high = max(counts)
+    if low == high:
+        return counted(high, noun)
+    return f"{low} to {counted(high, noun)}"
+
+
+def _sign_notes(table: PaperTable, entries: Sequence[Entry]) -> Iterator[str]:
+    """Yield what arrows, bold numbers and dashes mean, each only if some entry has one."""
+    if any(entry.change is not None for entry in entries):
+        reference = "the shortest context" if table.is_by_stages else "explicit"
+        yield (
+            f"↑ above, ↓ below, → equal to {reference} of the same policy, by how many points, "
+            "as printed, on the same tasks; an arrow does not imply a significant difference."
+        )
+    if any(entry.best for entry in entries):
+        whose = "policy in a setting" if table.name == "planner" else "of its group"
+        yield f"Bold: the best {whose}."
+    if any(not entry.applies for entry in entries):
+        yield f"{NOT_APPLICABLE} the setting is not defined for the task."
+
+
+def _sizes(judged: Sequence[Counts]) -> str:
+    """Return how many episodes and trials cells have.
+
+    For example ``10 to 50 episodes per cell, each played once.``
+    """
+    episodes = range_text([cell.episodes for cell in judged], "episode")
+    if all(cell.episodes == cell.trials for cell in judged):
+        return f"{episodes} per cell, each played once."
+    trials = range_text([cell.trials for cell in judged], "trial")
+    return f"{episodes} and {trials} per cell: several policy seeds."
+
+
+def _origin_notes(
+    table: PaperTable,
+    rows: Sequence[Row],
+    floors: Sequence[str],
+    policy_runs: Iterable[PolicyRun],
+) -> Iterator[str]:
+    """Yield what rows are that are not of a policy on its own robot or in the simulator."""
+    sources = {row.source for row in rows}
+    if any(row.name.endswith(TWIN_MARK) for row in rows):
+        yield _TWIN_NOTE
+    if "chance" in sources:
+        yield _FLOORS_NOTE
+    yield unmeasured_note(floors, [policy_run.language for policy_run in policy_runs])
+    if table.of_paper is not None and "published" in sources:
+        yield from NOTES[table.of_paper]
+
+
+def _count_notes(cells: Sequence[Counts], entries: Sequence[Entry]) -> Iterator[str]:
+    """Yield how many trials cells with a verdict have, and what signs of incomplete ones mean."""
+    judged = []
+    errors = 0
+    missing = 0
+    for cell in cells:
+        errors += cell.errors
+        missing += cell.missing
+        if cell.trials:
+            judged.append(cell)
+    if judged:
+        yield _sizes(judged)
+    if errors:
+        yield (
+            f"{ERROR_MARK} {counted(errors, 'trial')} ended in an error and "
+            f"{verb_for(errors, 'are')} left out of the rates."
+        )
+    if missing:
+        yield (
+            f"{MISSING_MARK} {counted(missing, 'trial')} of the plan "
+            f"{verb_for(missing, 'are')} still to be played."
+        )
+    if any(PARTIAL_MARK in entry.marks for entry in entries):
+        yield f"{PARTIAL_MARK} a partial average: a task is incomplete or was not played."
+    if errors or missing:
+        yield "Incomplete entries have no arrow, and their columns no best entry."
+
+
+def _omission_notes(table: PaperTable, cells: Cells, tasks: Sequence[str]) -> Iterator[str]:
+    """Yield what was played and is not in the table: other tasks, and other options.
+
+    Options that belong into the table of harder settings are named apart.
+    """
+    other_tasks = set()
+    hidden = set()
+    for key in cells:
+        if key.task not in tasks:
+            other_tasks.add(key.task)
+        elif not table.shows(key.options):
+            hidden.add(key.options)
+    if other_tasks:
+        yield f"Not in this table: the results of {', '.join(sorted(other_tasks))}."
+    harder: list[str] = []
+    other: list[str] = []
+    for options in sorted(hidden, key=options_sort_key):
+        labels = harder if is_usual(options) else other
+        labels.append(options_label(options))
+    if harder:
+        yield f"In the table harder: {'; '.join(harder)}."
+    if other:
+        yield f"Not in this table: {'; '.join(other)}."
+
+
+def _absent_tasks(shown: Iterable[CellKey]) -> str:
+    """Return which tasks are not installed here; nothing if all are."""
+    absent = {key.task for key in shown} - every_task().keys()
+    if not absent:
+        return ""
+    names = ", ".join(sorted(absent))
+    return f"The package with {names} is not installed: what its runs lack is not counted."
+
+
+def _average_notes(columns: Sequence[Column], rows: Sequence[Row]) -> Iterator[str]:
+    """Yield which settings have averages over fewer tasks than the reference has, and how many.
+
+    Their change is not the difference between the two averages as printed.
+    """
+    played = []  # the numbers of the columns of tasks that were played
+    for number, column in enumerate(columns):
+        has_rate = any(row.entries[number].percent is not None for row in rows)
+        if has_rate and not column.averages:
+            played.append(number)
+    tasks_of_groups = {}
+    for row in rows:
+        tasks_of_groups[row.group] = sum(row.entries[number].applies for number in played)
+    for group, number in tasks_of_groups.items():
+        if 0 < number < len(played):
+            yield (
+                f"Averages of {group} are over the {number} of {len(played)} tasks that have it; "
+                "their changes are from the average over the same tasks."
+            )

@@ -1,0 +1,73 @@
+"""Files of answers: JSON lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import msgspec
+
+from roboirg.apps.grounding.items.grounding_item import (
+    GroundingItem,
+    QuestionKind,
+    decode_lines,
+)
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import clip_text
+from roboirg.util.atomic_write import write_atomically
+
+_MAX_QUOTE = 60
+
+
+class Answer(msgspec.Struct, frozen=True):
+    """One answer; a line of JSON has its fields.
+
+    Attributes:
+        id: of the item.
+        kind: of the question.
+        reply: what was answered, as text.
+    """
+
+    id: str
+    kind: QuestionKind
+    reply: str
+
+
+def read_answers(path: Path, items: Sequence[GroundingItem]) -> list[Answer]:
+    """Return the answers of a file, each for a question of the items.
+
+    Raises:
+        InvalidValueError: the file cannot be read, a line is no answer, names an unknown item, or
+            answers a question again.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InvalidValueError(f"Answers {str(path)!r} cannot be read ({error}).") from error
+    known = {item.id for item in items}
+    answers: dict[tuple[str, QuestionKind], Answer] = {}
+    for number, answer in decode_lines(content, Answer, path):
+        question = answer.id, answer.kind
+        if answer.id not in known:
+            raise _bad_line(
+                path,
+                number,
+                f"the dataset has no item {clip_text(answer.id, _MAX_QUOTE)!r}; are these answers "
+                "to another dataset?",
+            )
+        if question in answers:
+            raise _bad_line(path, number, f"{answer.kind} of item {answer.id!r} occurs again.")
+        answers[question] = answer
+    if not answers:
+        raise InvalidValueError(f"Answers {str(path)!r}: the file holds no answers.")
+    return list(answers.values())
+
+
+def _bad_line(path: Path, number: int, problem: str) -> InvalidValueError:
+    """Return the error of a line."""
+    return InvalidValueError(f"{path}, line {number}: {problem}")
+
+
+def write_answers(path: Path, answers: Iterable[Answer]) -> None:
+    """Write answers as JSON lines."""
+    write_atomically(path, msgspec.json.Encoder().encode_lines(answers))

@@ -1,0 +1,144 @@
+"""What a reply to a question means, and whether it is right."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from typing import Annotated, NamedTuple
+
+import msgspec
+
+from roboirg.apps.grounding.items.grounding_item import (
+    LETTERS,
+    GroundingItem,
+    PointTarget,
+    QuestionKind,
+)
+from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.util.reply_reading import UnparsableReplyError, chosen_letter, last_json
+
+Coordinate = Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
+"""Columns or rows of a picture. No bound holds for NaN."""
+
+
+class Pixel(msgspec.Struct, frozen=True):
+    """A place in a picture: `x` columns from the left, `y` rows from the top."""
+
+    x: Coordinate
+    y: Coordinate
+
+
+class ReplyVerdict(NamedTuple):
+    """The verdict on one reply.
+
+    Attributes:
+        right: whether all of it is right.
+        understood: the reply in its usual form: slots as canonical JSON, a letter, or points as
+            JSON; None if it is unreadable: it names no answer to the question, or several letters.
+        parts: for slots, whether each field is right, by name; for points, whether each thing that
+            is meant is hit, by number from 1.
+    """
+
+    right: bool
+    understood: str | None
+    parts: Mapping[str, bool]
+
+
+def judge_reply(item: GroundingItem, kind: QuestionKind, reply: str) -> ReplyVerdict:
+    """Return the verdict on a model's reply to one of an item's questions.
+
+    It is read as by the language-model listener (`roboirg.util.reply_reading`): thoughts are left
+    out, words and code fences around a JSON object do no harm, but a value that the task does not
+    have makes the reply unreadable.
+
+    Raises:
+        UnknownNameError: the item's task is not installed.
+    """
+    return _JUDGES[kind](item, reply)
+
+
+def guess_chance(item: GroundingItem, kind: QuestionKind) -> float:
+    """Return how often a random answer is right.
+
+    Slots are a goal of the scene, choices a letter that has one, and points as many random
+    pixels as there are things.
+    """
+    if kind == "slots":
+        return len(item.answers) / len(item.goals)
+    if kind == "choice":
+        return 1 / len(item.choices)
+    shares = [float(point.mask.mean()) for point in item.points]
+    orders = 1 if item.points_in_order else math.factorial(len(shares))
+    return math.prod(shares) * orders
+
+
+def right_reply(item: GroundingItem, kind: QuestionKind) -> str:
+    """Return a reply that is right: slots as JSON, a letter, or a pixel for each thing."""
+    if kind == "slots":
+        return item.answer
+    if kind == "choice":
+        return item.choice
+    points = [{"x": point.x, "y": point.y} for point in item.points]
+    return json.dumps({"points": points})
+
+
+def _judge_slots(item: GroundingItem, reply: str) -> ReplyVerdict:
+    schema = goal_schema(item.task)
+    wanted = json.loads(item.answer)
+    try:
+        answer = schema.answers[schema.read(reply)]
+    except UnparsableReplyError:
+        return ReplyVerdict(False, None, dict.fromkeys(wanted, False))
+    found = json.loads(answer)
+    parts = {name: found[name] == value for name, value in wanted.items()}
+    return ReplyVerdict(answer in item.answers, answer, parts)
+
+
+def _judge_choice(item: GroundingItem, reply: str) -> ReplyVerdict:
+    try:
+        letter = chosen_letter(reply, LETTERS[: len(item.choices)])
+    except UnparsableReplyError:
+        return ReplyVerdict(False, None, {})
+    return ReplyVerdict(letter == item.choice, letter, {})
+
+
+def _judge_points(item: GroundingItem, reply: str) -> ReplyVerdict:
+    points = _read_points(reply)
+    parts = {}
+    for number, target in enumerate(item.points):
+        candidates = points[number : number + 1] if item.points_in_order else points
+        parts[str(number + 1)] = any(_hits(target, point) for point in candidates)
+    if not points:
+        return ReplyVerdict(False, None, parts)
+    is_right = all(parts.values()) and len(points) == len(item.points)
+    return ReplyVerdict(is_right, msgspec.json.encode(points).decode(), parts)
+
+
+def _read_points(reply: str) -> list[Pixel]:
+    """Return the points of a reply; empty if it has none or is unreadable.
+
+    They are in a field, in a list, or a single one is the object itself.
+    """
+    try:
+        found = last_json(reply)
+        if isinstance(found, dict):
+            found = found.get("points", [found])
+        # Not strict: a number may be a text.
+        return msgspec.convert(found, list[Pixel], strict=False)
+    except (UnparsableReplyError, msgspec.ValidationError):
+        return []
+
+
+def _hits(target: PointTarget, point: Pixel) -> bool:
+    """Return whether a point lies in the pixels of a mask; a pixel begins at its number."""
+    height, width = target.size
+    is_inside = 0 <= point.x < width and 0 <= point.y < height
+    return is_inside and bool(target.mask[int(point.y), int(point.x)])
+
+
+_JUDGES: Mapping[QuestionKind, Callable[[GroundingItem, str], ReplyVerdict]] = {
+    "slots": _judge_slots,
+    "choice": _judge_choice,
+    "points": _judge_points,
+}

@@ -1,1 +1,0 @@
-"""Validation of the instructions: read every one back, and check its rules."""

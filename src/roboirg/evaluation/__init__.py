@@ -1,1 +1,0 @@
-"""Plans, runs and records of episodes, and all that follows from records."""

@@ -1,1 +1,0 @@
-"""Analysis of records alone: statistics, tables, figures and the HTML page."""

@@ -1,1 +1,0 @@
-"""Statistics of records: cells, rates, intervals, paired tests, power."""

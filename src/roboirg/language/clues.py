@@ -1,0 +1,221 @@
+"""Clues: words for what only who sees the scene or the video can know.
+
+A clue is known by its words: whoever hears them finds the thing or the value here, without the
+goal. No clue names a color: the colors of a scene are exchangeable, and no place is more likely for
+one of them, so the words say nothing about the goal's color.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import Literal, NamedTuple
+
+from roboirg.core.episode import Scene, SceneObject
+from roboirg.core.goal_slots import MOMENTS
+from roboirg.core.motions import Swap
+from roboirg.language.landmarks import MARGIN, candidates_in
+from roboirg.language.places import PlaceClass, SpokenPlace, spoken_places
+from roboirg.tasks import Task
+
+ClueKind = Literal["counts", "events", "betweenness", "sets", "place"]
+LEFT = 3
+"""Cubes that *all but three* leaves: BinFill's easy scenes allow it for every number."""
+KEPT_SWAPS = {1: (1, 2), 2: (1, 3), 3: (1, 1)}
+"""Share of the scenes with this number of swaps that say it, so that all are equally frequent.
+
+Of easy scenes half have one swap and half two, of medium ones half two and half three; two of four
+episodes are easy, one is medium.
+"""
+_BETWEEN = (PlaceClass.MIDDLE, PlaceClass.BETWEEN)
+"""Places for which what stands on both sides is looked at."""
+_ASIDE = (PlaceClass.EXTREME, PlaceClass.FIXTURE, PlaceClass.CORNER)
+"""Places of the two things that are set aside."""
+_THREE = 3
+"""Things of which two are set aside."""
+_SIDES = {1: "left", -1: "right"}
+"""By the sign of y in the robot base frame."""
+
+
+class Clue(NamedTuple):
+    """Words for a value that only who sees the scene or the video can tell.
+
+    Attributes:
+        kind: what has to be seen.
+        words: for the thing, the number or the placement.
+        short: the words for a number of times.
+        aside: the places of the other two of three things, if these are what the words say.
+    """
+
+    kind: ClueKind
+    words: str
+    short: str = ""
+    aside: tuple[str, ...] = ()
+
+
+class ThingClue(NamedTuple):
+    """A clue, and the thing that it leads to."""
+
+    thing: SceneObject
+    clue: Clue
+
+
+class EventClue(NamedTuple):
+    """A clue, and the value of a goal's slot that it leads to.
+
+    Attributes:
+        slot: ``color``, ``placement``, ``relation`` or ``repeats``.
+        value: of that slot.
+        clue: its words.
+        share: in how many of how many scenes with it, (1, 3) for a third, it is said; None for all.
+    """
+
+    slot: str
+    value: str | int
+    clue: Clue
+    share: tuple[int, int] | None = None
+
+
+def thing_clues(scene: Scene, task: Task) -> list[ThingClue]:
+    """Return a clue to each thing that a task points at, by where it stands.
+
+    ``the cube in the middle`` leads to the cube there. What has moved before the words are heard is
+    *the container that started in the back*.
+    """
+    kind = task.things.pointed
+    noun = kind.removeprefix("hidden_")
+    # After a video in which things change places, words must name where each one stood first.
+    if scene.motions_of(Swap) and task.demonstration(scene):
+        noun += " that started"
+    places = [place for place in spoken_places(scene, kind, "robot") if place.attributive]
+    found = _with_others_aside(candidates_in(scene, kind), places)
+    for place in places:
+        if place.kind in (PlaceClass.COLOR, PlaceClass.UNUSUAL):
+            continue  # no clue names a color, or is what no one says
+        clue_kind: ClueKind = "betweenness" if place.kind in _BETWEEN else "place"
+        clue = Clue(clue_kind, f"the {noun} {place.attributive}")
+        found.append(ThingClue(place.thing, clue))
+    return found
+
+
+def _with_others_aside(
+    things: Sequence[SceneObject], places: Sequence[SpokenPlace]
+) -> list[ThingClue]:
+    """Return the clues to each of three things by the places of the two others.
+
+    If one is *on the left* and one *next to the button*, these two places lead to the third thing.
+    Without exactly three things there are no such clues.
+    """
+    if len(things) != _THREE:
+        return []
+    found: list[ThingClue] = []
+    simple_places = [place for place in places if place.kind in _ASIDE]
+    for first, second in itertools.combinations(simple_places, 2):
+        remaining = [thing for thing in things if thing not in (first.thing, second.thing)]
+        # Two remain if both places are of the same thing.
+        if len(remaining) == 1:
+            places_aside = (first.said(), second.said())
+            clue = Clue("sets", " ".join(places_aside), aside=places_aside)
+            found.append(ThingClue(remaining[0], clue))
+    return found
+
+
+def event_clues(scene: Scene) -> Iterator[EventClue]:
+    """Yield the clues to what the video shows; nothing if there is no video.
+
+    *The cube that the robot moved* leads to the value ``red`` of the slot ``color``.
+    """
+    acts = [fact.kind for fact in scene.past]
+    # Some videos show a cube that is placed on targets, others a cube that is picked up.
+    if "placed" in acts:
+        yield from _moved_cube(scene)
+        yield from _visited_targets(scene)
+        yield _target_at_press(scene)
+    elif "picked" in acts:
+        yield from _swaps(scene)
+        yield from _cubes_on_sides(scene)
+
+
+def _moved_cube(scene: Scene) -> Iterator[EventClue]:
+    """Yield the color of the cube that the robot moves in the video, if there are others."""
+    moved = scene[scene.past[0].subject]
+    if len(scene.of_kind("cube")) > 1:
+        clue = Clue("events", "the cube that the robot moved")
+        yield EventClue("color", str(moved.color), clue)
+
+
+def _visited_targets(scene: Scene) -> Iterator[EventClue]:
+    """Yield clues to the targets on which the cube was put, by where these lay.
+
+    *The target on the left* leads to placement 2 if it was the second one to be used.
+    """
+    visited = [fact.place for fact in scene.past if fact.kind == "placed"]
+    # The button is pressed between two placements: one is before the press, one after it.
+    has_moments = [fact.kind for fact in scene.past] == ["placed", "pressed", "placed"]
+    noun = "target that started" if scene.motions_of(Swap) else "target"
+    for place in spoken_places(scene, "target", "robot"):
+        is_said = place.attributive and place.kind < PlaceClass.UNUSUAL
+        if not is_said or place.thing.name not in visited:
+            continue
+        clue = Clue("place", f"the {noun} {place.attributive}")
+        order = visited.index(place.thing.name)
+        yield EventClue("placement", order + 1, clue)
+        if has_moments:
+            yield EventClue("relation", MOMENTS[order], clue)
+
+
+def _target_at_press(scene: Scene) -> EventClue:
+    """Return the target on which the cube was at the press, after all placements before it."""
+    acts = [fact.kind for fact in scene.past]
+    words = "the target that the cube was on when the button was pressed"
+    placements_before = acts.index("pressed")  # the cube is then on the last of these
+    return EventClue("placement", placements_before, Clue("events", words))
+
+
+def _swaps(scene: Scene) -> Iterator[EventClue]:
+    """Yield how often the cubes change places in the video: *as many times as …*."""
+    swaps = len(scene.motions_of(Swap))
+    if swaps in KEPT_SWAPS:
+        words = "the cubes switched places"
+        clue = Clue("events", words, f"as many times as {words}")
+        yield EventClue("repeats", swaps, clue, KEPT_SWAPS[swaps])
+
+
+def _cubes_on_sides(scene: Scene) -> Iterator[EventClue]:
+    """Yield how many cubes of each color are left and right of the one that the video shows.
+
+    *Once for each red cube to the left of the cube from the video* leads to the number of repeats.
+    Only where nothing changes places there are several colors; a single color gives no clue.
+    """
+    shown = scene[scene.past[0].subject]
+    cubes = scene.of_kind("cube")
+    colors = list(dict.fromkeys(str(cube.color) for cube in cubes))
+    if len(colors) == 1:
+        return
+    for color in colors:
+        others = [cube for cube in cubes if cube.color == color and cube != shown]
+        for sign, side in _SIDES.items():
+            number = _count_on_side(others, shown, sign)
+            if number:  # neither unclear nor zero
+                yield EventClue("repeats", number, _clue_to_side(color, side))
+
+
+def _clue_to_side(color: str, side: str) -> Clue:
+    """Return the clue to the number of cubes of a color on a side of the one in the video."""
+    where = f"to the {side} of the cube from the video"
+    return Clue("counts", f"{color} cubes {where}", f"once for each {color} cube {where}")
+
+
+def _count_on_side(things: Sequence[SceneObject], reference: SceneObject, sign: int) -> int | None:
+    """Return how many things are on one side of another; None if that is unclear for one.
+
+    `sign` is that of a key of `_SIDES`: 1 for the left, -1 for the right.
+    """
+    count = 0
+    for thing in things:
+        distance = sign * (thing.position.y - reference.position.y)
+        if abs(distance) < 2 * MARGIN:
+            return None  # it is nearly in line, so people may see it on either side
+        if distance > 0:
+            count += 1
+    return count

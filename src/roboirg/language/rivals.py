@@ -1,0 +1,275 @@
+"""Rivals: a second value of the same kind as one that is meant, on equal terms.
+
+RoboMME's goals are given and uneven; the rivals are ours. Two episodes of a split with different
+values, each possible in the other, are partners: the value of one is the rival in the other. So of
+two values each is the meant one in half of a split's episodes.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from roboirg.core.episode import SPLITS, Difficulty, Episode, Split, values_in
+from roboirg.core.goal_slots import COLOR_SLOTS
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language.instruction import REFERENCE
+from roboirg.language.request import GoalValue, InstructionRequest
+from roboirg.language.word_sampler import sampler_for, sampler_of
+from roboirg.tasks import Task, get_task
+from roboirg.tasks.splits.splits import split_episodes
+
+REFERENCE_SPLIT: Split = "train"
+"""Its goals show which numbers are usual for a difficulty, and its partners how often each rival
+goes with a value, for episodes outside the splits."""
+_AMOUNT_FIELDS = 2
+"""A goal that counts cubes of one color has two fields: the color and its count."""
+NUMBER_SLOTS = ("repeats", "counts", "visit", "placement")
+
+
+class ValuePair(NamedTuple):
+    """Two values, one of which is meant.
+
+    Attributes:
+        meant: a value of the goal; of two colors in order, the one that comes first.
+        rival: the other value; its slot is ``reference`` unless the goal has it too.
+    """
+
+    meant: GoalValue
+    rival: GoalValue
+
+    @property
+    def slot(self) -> str:
+        """The goal slot of the meant value."""
+        return self.meant.slot
+
+    @property
+    def is_ordered(self) -> bool:
+        """Whether the goal has both values, and only their order is open."""
+        return self.rival.slot == self.meant.slot
+
+
+def pair_refusal(request: InstructionRequest) -> str | None:
+    """Return why an episode can have no rival; None if it can."""
+    if rival_pairs(request):
+        return None
+    if len(request.values_of("amount")) > _AMOUNT_FIELDS:
+        return "a goal that counts cubes of several colors leaves no rival"
+    return "the scene has no second value that the goal could ask for"
+
+
+def rival_pairs(request: InstructionRequest) -> list[ValuePair]:
+    """Draw one of the slots that can have a rival, and return all pairs of its value.
+
+    A color that the video gives away has none: its words would tell nothing.
+    """
+    found: dict[str, list[ValuePair]] = {}
+    for pair in possible_pairs(request):
+        is_given_away = pair.slot in COLOR_SLOTS and request.shows_color
+        if not is_given_away:
+            found.setdefault(pair.slot, []).append(pair)
+    if not found:
+        return []
+    return found[request.sampler.pick("rival slot", list(found))]
+
+
+def possible_pairs(request: InstructionRequest) -> Iterator[ValuePair]:
+    """Yield a pair, the meant value and a rival, for every other value that the goal could have.
+
+    For the goal *red* in a scene with red and blue cubes: red and its rival blue. Of two colors in
+    order, the rival is the other order: *first red, then blue* or *first blue, then red*.
+    """
+    if len(request.values_of("amount")) > _AMOUNT_FIELDS:
+        return
+    for slot, _ in request.episode.goal.slots:
+        meant = request.values_in(slot)
+        if len(meant) == 1:
+            yield from _single_pairs(request, meant[0])
+            continue
+        # Several values have one rival only: the same values in the opposite order.
+        values = tuple(value.value for value in meant)
+        swapped = values[::-1]
+        if swapped != values and swapped in request.alternatives(slot):
+            yield ValuePair(meant[0], meant[1])
+
+
+def _single_pairs(request: InstructionRequest, meant: GoalValue) -> Iterator[ValuePair]:
+    """Yield a pair for every other value that a slot with one value can have.
+
+    A number is a rival only if other episodes of the same difficulty ask for it.
+    """
+    usual = _usual_numbers(request.task.name, request.episode.difficulty, meant.slot)
+    for content in request.alternatives(meant.slot):
+        if len(content) > 1 or content == (meant.value,):
+            continue  # it is no single value, or the one that is meant
+        (value,) = content
+        if meant.slot not in NUMBER_SLOTS or value in usual:
+            yield ValuePair(meant, meant._replace(field="rival", slot=REFERENCE, value=value))
+
+
+@functools.cache
+def _usual_numbers(task: str, difficulty: Difficulty, slot: str) -> frozenset[str | int]:
+    """Return the numbers that goals of a difficulty have in a slot: ``{1, 2, 3}`` repeats.
+
+    Any other number would give itself away as the rival: only hard episodes ask for four or five.
+    """
+    found: set[str | int] = set()
+    for episode in split_episodes([get_task(task).name], [REFERENCE_SPLIT]):
+        if episode.difficulty == difficulty:
+            found.update(values_in(episode.goal[slot]))
+    return frozenset(found)
+
+
+class _SlotValue(NamedTuple):
+    """A value in a slot: another slot may have the same one."""
+
+    slot: str
+    value: str | int
+
+
+class _SplitEntry(NamedTuple):
+    """An episode that can have a rival.
+
+    Attributes:
+        episode: the episode.
+        meant: its value.
+        rivals: each value that it may have instead.
+    """
+
+    episode: Episode
+    meant: _SlotValue
+    rivals: frozenset[_SlotValue]
+
+    def is_partner(self, other: _SplitEntry) -> bool:
+        """Return whether the value of each episode can be the rival in the other."""
+        return other.meant in self.rivals and self.meant in other.rivals
+
+
+class _SplitRivals(NamedTuple):
+    """The rivals in a split, by index of the episode.
+
+    Attributes:
+        entries: the episodes that can have a rival.
+        values: the rivals of those that have a partner, in the order in which partners were found.
+    """
+
+    entries: Mapping[int, _SplitEntry]
+    values: Mapping[int, str | int]
+
+
+def balanced_rival(request: InstructionRequest, pairs: list[ValuePair]) -> ValuePair:
+    """Return one of the pairs of a value: that of the partner, or of a likely one."""
+    by_rival = {pair.rival.value: pair for pair in pairs}
+    likely = _likely_rivals(request, pairs[0].meant)
+    possible = [value for value in likely if value in by_rival]
+    return by_rival[request.sampler.pick("rival", possible or list(by_rival))]
+
+
+def _likely_rivals(request: InstructionRequest, meant: GoalValue) -> list[str | int]:
+    """Return the rivals that fit an episode best; empty if there are none.
+
+    For an episode of a split that is the value of its partner. For any other episode these are the
+    rivals that the training split pairs with the same value, in episodes of the same difficulty: a
+    rival that goes with the value often is in the list often.
+    """
+    episode = request.episode
+    split = episode.split if episode.split in SPLITS else REFERENCE_SPLIT
+    split_rivals = _rivals_in(request.task.name, split)
+    entry = split_rivals.entries.get(episode.index)
+    # The episode itself is in the split; another one may have the same index.
+    if entry and entry.episode.split == episode.split and entry.episode.seed == episode.seed:
+        if episode.index in split_rivals.values:
+            return [split_rivals.values[episode.index]]
+        return []
+
+    wanted = _SlotValue(meant.slot, meant.value)
+    likely: list[str | int] = []
+    for index, rival in split_rivals.values.items():
+        other = split_rivals.entries[index]
+        if other.episode.difficulty == episode.difficulty and other.meant == wanted:
+            likely.append(rival)
+    return likely
+
+
+@functools.cache
+def _rivals_in(task: str, split: Split) -> _SplitRivals:
+    """Return the episodes of a split that can have a rival, and the values of their partners."""
+    entries: dict[int, _SplitEntry] = {}
+    for episode in split_episodes([task], [split]):
+        entry = _entry_of(episode, get_task(task))
+        if entry is not None:
+            entries[episode.index] = entry
+    return _SplitRivals(entries, _partner_values(entries))
+
+
+def _entry_of(episode: Episode, task: Task) -> _SplitEntry | None:
+    """Return an episode with the rivals that it can have; None if it can have none."""
+    request = InstructionRequest(episode, task, InstructionOptions(), sampler_of(episode))
+    pairs = rival_pairs(request)
+    if not pairs:
+        return None
+    meant = _SlotValue(pairs[0].slot, pairs[0].meant.value)
+    rivals = [_SlotValue(pair.slot, pair.rival.value) for pair in pairs]
+    return _SplitEntry(episode, meant, frozenset(rivals))
+
+
+def _partner_values(entries: Mapping[int, _SplitEntry]) -> dict[int, str | int]:
+    """Pair the episodes of a split, and return for each index the value of its partner.
+
+    If episode 3 means red and its partner, 7, means blue: ``{3: "blue", 7: "red"}``. Partners are
+    found among the values that are left most often, so that few episodes remain without one.
+    """
+    values: dict[int, str | int] = {}
+    unmatched = dict(entries)
+    while unmatched:
+        frequency = Counter(entry.meant for entry in unmatched.values())
+        # The most frequent value goes first; of its episodes, the one with the lowest index.
+        ranks = {index: (frequency[entry.meant], -index) for index, entry in unmatched.items()}
+        first = max(unmatched, key=ranks.__getitem__)
+        entry = unmatched.pop(first)
+        partners = [index for index, other in unmatched.items() if entry.is_partner(other)]
+        if partners:
+            second = max(partners, key=ranks.__getitem__)
+            partner = unmatched.pop(second)
+            values[first] = partner.meant.value
+            values[second] = entry.meant.value
+    return values
+
+
+class PairOrder(NamedTuple):
+    """In which order two values are said, and at which one the last words point.
+
+    Attributes:
+        is_meant_first: whether the value that is meant is introduced first.
+        points_at_meant: whether the remark points at it; else it sets the rival aside.
+    """
+
+    is_meant_first: bool
+    points_at_meant: bool
+
+
+_ORDERS = (
+    PairOrder(is_meant_first=True, points_at_meant=True),
+    PairOrder(is_meant_first=True, points_at_meant=False),
+    PairOrder(is_meant_first=False, points_at_meant=True),
+    PairOrder(is_meant_first=False, points_at_meant=False),
+)
+"""Their positions are in the log of draws."""
+BLOCK = len(_ORDERS)
+
+
+def draw_order(request: InstructionRequest) -> PairOrder:
+    """Draw the order for an episode; each block of four episodes has every one once.
+
+    With independent draws a split of fifty could favor the value named first by chance.
+    """
+    episode = request.episode
+    block, place = divmod(episode.index, BLOCK)
+    # The block has its own sampler, so that its four episodes share one shuffled row of orders.
+    cycle = sampler_for(f"{episode.task}|{episode.split}|{block}").cycle("rival order", _ORDERS)
+    order = next(itertools.islice(cycle, place, None))
+    request.sampler.log.append(f"rival order/{_ORDERS.index(order)}")
+    return order

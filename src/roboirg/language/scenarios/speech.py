@@ -1,0 +1,330 @@
+"""The words of one scenario: its sentences with values filled in, and the command.
+
+The lead stands before the command, *So,*. The skeleton is a command with fields to be filled, *Pick
+up {color}*. A field is hidden if its words point back; it is settled if the command alone says it.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import cast
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.language.instruction import REFERENCE, Expression, Meaning, Term
+from roboirg.language.phrases import (
+    Phrase,
+    TaggedText,
+    anaphor,
+    antecedent,
+    fill,
+    listed,
+    plain,
+    swap_particles,
+    words_of,
+)
+from roboirg.language.request import AMOUNT_FIELD, InstructionRequest
+from roboirg.language.scenarios.amounts import (
+    NUMBERS,
+    amount_text,
+    amount_texts,
+    hidden_fields,
+    hidden_term,
+    stated_counts,
+)
+from roboirg.language.scenarios.choice import rival_values
+from roboirg.language.scenarios.declared import ChoosingRemark, SaidValues
+from roboirg.language.scenarios.introduced import Introduced
+from roboirg.language.scenarios.markup import (
+    Agreement,
+    Pointer,
+    Slot,
+    Text,
+    parse,
+    pointers_in,
+    slots_in,
+)
+from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
+from roboirg.language.scenarios.scenario_file import general
+from roboirg.language.settings import all_settings
+
+_LOOKING = ("spatial", "grounded")
+"""Ways to the goal on which the scene gives a value; the resolved form says where to look."""
+_ALWAYS_CAPITAL = re.compile(r"I\b|[A-Z]{2}")
+"""*I*, *I'd*, and words in capitals: they stay as they are within a sentence."""
+
+
+class Speech:
+    """The words of one scenario in one episode.
+
+    Args:
+        request: the episode, and how to instruct it.
+        words: of the task.
+        introduced: the values that can be named.
+        scenario: None for a command alone.
+    """
+
+    def __init__(
+        self,
+        request: InstructionRequest,
+        words: TaskScenarios,
+        introduced: Introduced,
+        scenario: Scenario | None = None,
+    ) -> None:
+        self._request = request
+        self._words = words
+        self._introduced = introduced
+        self._scenario = scenario
+        self._said = SaidValues(request.frame)
+        self._terms: dict[str, Term] = {}
+        self._hidden: set[str] = set()
+        self._agrees: dict[str, bool] = {}
+
+    def begin_command(self) -> None:
+        """Forget with what the words before agree: the last utterance begins."""
+        self._agrees.clear()
+
+    def phrase(
+        self, text: Text, introduced: Introduced | None = None, *, resolved: bool = False
+    ) -> Phrase:
+        """Return a sentence with its slots filled, such as *Red is nice* for ``{color} is nice``.
+
+        What it names counts as said from now on.
+
+        Args:
+            text: the sentence.
+            introduced: the values of its slots; None for the usual ones.
+            resolved: whether words that point back are replaced by what they stand for.
+        """
+        values = introduced or self._introduced
+        pieces: list[TaggedText] = []
+        for part in text:
+            if isinstance(part, TaggedText):
+                pieces.append(part)
+            elif isinstance(part, Slot):
+                pieces.extend(self._slot(part, values))
+            elif isinstance(part, Agreement):
+                pieces.append(self._agreeing(part, values))
+            elif resolved:
+                pieces.extend(self._named(part))
+            else:
+                pieces.extend(self._pointing(part))
+        return tuple(piece for piece in pieces if piece.text)
+
+    def _slot(self, slot: Slot, values: Introduced) -> Phrase:
+        """Return the words for a slot; amounts are said color by color."""
+        if slot.name in ("amounts", "reference") and "amounts" in values.values:
+            texts = amount_texts(NUMBERS[slot.name], len(values.values["colors"]))
+            return listed([self.phrase(text, values) for text in texts])
+        self._said.add(slot.name, values.values[slot.name])
+        return values.phrase(slot)
+
+    def _agreeing(self, agreement: Agreement, values: Introduced) -> TaggedText:
+        """Return the singular or the plural of words, and remember with which they agree.
+
+        ``[repeats: lap|laps]`` is *laps* for two repeats.
+        """
+        controller = agreement.controller
+        if controller == "step":  # *right before*, *two before*
+            self._said.add("step", values.values["step"])
+        is_single = values.count(controller) == 1
+        self._agrees[controller] = is_single
+        return TaggedText(agreement.one if is_single else agreement.many)
+
+    def _pointing(self, pointer: Pointer) -> Phrase:
+        """Return words that point back, as a mention: *it*, which stands for the color red."""
+        values = self._introduced
+        kind = cast("Expression", pointer.expression)
+        if pointer.expression == "rank":
+            values, kind = values.ranked(pointer.of, ordinals="ordinal" in pointer.words)
+        words = words_of(self.phrase(pointer.parts, values))
+        referent = values.referent(pointer.of)
+        return anaphor(words, kind, referent.slot, referent.value)
+
+    def _named(self, pointer: Pointer) -> Phrase:
+        """Return words that name what a pointer stands for: *the red cube* in place of *it*."""
+        text = pointer.resolved
+        if not text:
+            text = self._referent(pointer.of)
+            # "on the left" needs a noun, unless it takes the place of "there".
+            kind = self._introduced.values[pointer.of][-1].kind
+            if kind == "place" and pointer.expression != "there":
+                noun = self._request.task.things.pointed.removeprefix("hidden_")
+                text = (TaggedText(f"the {noun} "), *text)
+        referent = self._introduced.referent(pointer.of)
+        return antecedent(words_of(self.phrase(text)), referent.slot, referent.value)
+
+    def _referent(self, name: str) -> Text:
+        """Return the words for what a slot stands for, to be filled: *the red cube*, *twice*."""
+        values = self._introduced.values[name]
+        kind = values[0].kind if len(values) == 1 else "several"
+        if kind in ("placement", "relation") and name in self._words.stated:
+            return self._words.stated[name]
+        if kind == "color":
+            noun = self._request.task.things.colored
+            return (TaggedText("the "), Slot(name), TaggedText(f" {noun}"))
+        if kind in ("visit", "placement"):
+            return (TaggedText("the "), Slot(name))
+        if kind == "number" and name != REFERENCE:
+            return (Slot(name, "times"),)
+        return (Slot(name),)
+
+    def field(self, name: str, words: Text, remark: ChoosingRemark | None = None) -> Phrase:
+        """Return the words for a field of the command, and remember what they mean.
+
+        In the resolved form, words that name the value may take their place.
+
+        Args:
+            name: of the field, ``color``.
+            words: of the scenario, such as *it*, or those that state the value.
+            remark: words before the command that have chosen what they point at, if any have.
+        """
+        if self._request.resolved and self._scenario:
+            words = self._resolved(name, words, self._scenario)
+        phrases = [self.phrase(words, resolved=self._request.resolved)]
+        fields = self._request.fields_in(name)
+        # The colors that the words leave out are stated after them. A field of amounts holds two
+        # fields of the goal for each color, its name and its count; other words leave out none.
+        colors_said = stated_counts(words) or len(fields)
+        for at in range(colors_said, len(fields) // 2):
+            phrases.append(self.phrase(amount_text("counts", at)))
+
+        hidden = hidden_fields(words, fields)
+        self._hidden.update(hidden)
+        for field in fields:
+            if field in hidden:
+                self._terms[field] = hidden_term(field, words, remark, self._said)
+            else:
+                self._terms[field] = Term("same", self._said.operands(field))
+        return listed(phrases)
+
+    def _resolved(self, name: str, words: Text, scenario: Scenario) -> Text:
+        """Return the words for a field in the resolved form.
+
+        They are the scenario's own if it has any, or those that state the value, or else the same
+        words, in which pointers will be replaced.
+        """
+        own = scenario.texts.get(f"resolved.{name}")
+        if own:
+            return own[0]
+        if self._is_stated(words, scenario):
+            return self._words.stated[name]
+        return words
+
+    def _is_stated(self, words: Text, scenario: Scenario) -> bool:
+        """Return whether the resolved form states the value for which some words stand."""
+        way = all_settings()[scenario.fields.setting].offers
+        if way not in _LOOKING:
+            return way != "reasoning"
+        fields = [value.field for value in self._request.goal_values]
+        return all(pointer.of in fields for pointer in pointers_in(words))
+
+    def meaning(self) -> Meaning:
+        """Return what has been said, of which some fields point back at what came before."""
+        fields = [value.field for value in self._request.goal_values]
+        terms = {field: self._terms[field] for field in fields}
+        settled = set(terms)
+        if not self._request.resolved:
+            settled -= self._hidden
+        return Meaning(terms, frozenset(settled), agrees=dict(self._agrees))
+
+    def command(self, fields: Mapping[str, Phrase], lead: Phrase) -> Phrase:
+        """Return the command with the words for some fields; the others state their values.
+
+        The lead comes before it: *So, pick it up.* or *All right. Pick it up.*
+        """
+        skeleton = self._skeleton(fields)
+        if lead:
+            # After "So," the command goes on in small letters; after "All right." it does not.
+            lead = _begun(lead, str.upper)
+            is_sentence = lead[-1].text.endswith((". ", "! ", "? "))
+            if not is_sentence and not _ALWAYS_CAPITAL.match(skeleton[0].text):
+                skeleton = _begun(skeleton, str.lower)
+        said = (*lead, *skeleton)
+        self._settle_named(said)
+        return said
+
+    def _settle_named(self, command: Phrase) -> None:
+        """Count a field as settled if the command names its value, whatever points back."""
+        named_values: set[tuple[str, str | int]] = set()  # with the slot of each
+        for piece in command:
+            if piece.tag and piece.tag.role == "antecedent":
+                named_values.add((piece.tag.slot, piece.tag.value))
+        for field in list(self._hidden):
+            (value,) = self._introduced.values[field]
+            if (value.slot, value.value) in named_values:
+                self._hidden.remove(field)
+
+    def _skeleton(self, fields: Mapping[str, Phrase]) -> Phrase:
+        """Return a command of the task, filled with the words for its fields.
+
+        Fields for which no words are given state their values: ``Pick up {color} {repeats}.`` with
+        *it* for the color becomes *Pick it up twice*.
+        """
+        wanted = {value.field for value in self._request.goal_values}
+        if self._request.values_of("amount"):
+            wanted = {AMOUNT_FIELD}
+        templates = self._commands_with(wanted)
+        template = self._request.sampler.pick(f"command-{len(wanted)}", templates)
+        words = dict(fields)
+        for name in wanted - fields.keys():
+            words[name] = self.field(name, self._words.stated[name])
+        for name in wanted:
+            if not words[name]:  # nothing is said of one: "put it back, then press the button"
+                template = template.replace(f" {{{name}}}", "")
+        filled = fill(template, words)
+        return swap_particles(filled) if fields else filled
+
+    def _commands_with(self, wanted: set[str]) -> list[str]:
+        """Return the commands of the pool that say exactly the wanted fields."""
+        pool = self._request.pool
+        commands = [text for text in self._words.commands[pool] if _fields_in(text) == wanted]
+        if not commands:
+            marks = " and ".join(f"{{{name}}}" for name in sorted(wanted))
+            raise InvalidValueError(
+                f"{self._words.file} has no command of {self._request.task.name} with {marks} in "
+                f"the pool {pool}."
+            )
+        return commands
+
+    def neutral(self, scenario: Scenario) -> Iterator[Phrase]:
+        """Yield remarks for ever: the scenario's own in any order, then those about anything."""
+        own = scenario.texts.get("distractors", ())
+        in_any_order = self._request.sampler.cycle("own distractor", own)
+        yield from map(self.phrase, itertools.islice(in_any_order, len(own)))
+        known = general().distractors[self._request.pool]
+        yield from map(plain, self._request.sampler.cycle("distractor", known))
+
+    def competing(self, scenario: Scenario) -> Iterator[Phrase]:
+        """Yield the scenario's remarks about other values than the goal's, in any order, for ever.
+
+        Raises:
+            LookupError: none of them has a value for all of its slots.
+        """
+        texts = scenario.texts["competing"]
+        found: dict[Phrase, None] = {}  # each once, in order
+        for text in texts:
+            slots = set(slots_in(text))
+            for values in rival_values(self._request, self._introduced):
+                if slots <= values.values.keys():
+                    found[self.phrase(text, values)] = None
+        if not found:
+            said = itertools.chain.from_iterable(map(slots_in, texts))
+            lacking = sorted(set(said) - self._introduced.values.keys())
+            raise LookupError(f"a competing remark with a value for {' or '.join(lacking)}")
+        return self._request.sampler.cycle("competing distractor", list(found))
+
+
+@functools.cache  # of the same few for every episode
+def _fields_in(command: str) -> frozenset[str]:
+    """Return the fields that a command says."""
+    return frozenset(slots_in(parse(command)))
+
+
+def _begun(words: Phrase, case: Callable[[str], str]) -> Phrase:
+    """Return words whose first letter is made a capital, or small."""
+    first, *rest = words
+    text = case(first.text[:1]) + first.text[1:]
+    return (first._replace(text=text), *rest)

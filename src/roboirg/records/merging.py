@@ -1,0 +1,225 @@
+"""Merge several runs into one folder."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from roboirg.core.arms import TOLD
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.versions import Versions
+from roboirg.records.action_log import action_path
+from roboirg.records.episode_log import log_path, logged_slugs
+from roboirg.records.film import poster_name
+from roboirg.records.mixing import mixtures
+from roboirg.records.record import Summary
+from roboirg.records.record_codec import (
+    RecordKey,
+    StoreError,
+    encode,
+    identity_key,
+    read_record,
+    read_summary,
+)
+from roboirg.records.run_files import (
+    MOST_PLAN_BYTES,
+    keep_earlier_plan,
+    plan_names,
+    run_file,
+)
+from roboirg.records.store import RecordStore, StoredRun
+from roboirg.util.regular_file import read_regular
+
+
+class MergeSummary(NamedTuple):
+    """Result of a merge.
+
+    Attributes:
+        added: number of records added to the folder.
+        duplicates: number of records whose episode was already there.
+        conflicts: duplicates with another verdict than the one kept.
+        warnings: what is mixed in the folder, in sentences.
+    """
+
+    added: int
+    duplicates: int
+    conflicts: tuple[Summary, ...]
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass
+class _Destination:
+    """What a merged run holds so far, and how it came to that."""
+
+    kept: dict[RecordKey, Summary]
+    added: int = 0
+    duplicates: int = 0
+    conflicts: list[Summary] = field(default_factory=list)
+
+    def take(self, results: Iterable[Summary]) -> list[Summary]:
+        """Keep the results that are new, and verdicts in place of errors; return those kept.
+
+        The first verdict of an episode stays; a different one is noted as a conflict.
+        """
+        taken = []
+        for result in results:
+            key = identity_key(result)
+            earlier = self.kept.get(key)
+            if earlier is None:
+                self.added += 1
+            else:
+                self.duplicates += 1
+                if {earlier.outcome, result.outcome} == {"success", "failure"}:  # one of each
+                    self.conflicts.append(result)
+                is_better = earlier.outcome == "error" and result.outcome != "error"
+                if not is_better:
+                    continue
+            self.kept[key] = result
+            taken.append(result)
+        return taken
+
+
+def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
+    """Copy the records, videos and logs of several runs into one folder.
+
+    If several runs have the same episode, the first verdict is kept; a verdict replaces an error.
+    Records are checked and copied one by one; the memory holds only their summaries.
+
+    Args:
+        folders: output folders of the runs; they are not changed.
+        out: destination; may already hold records.
+
+    Raises:
+        InvalidValueError: `out` is one of the runs.
+        StoreError: a file cannot be read or written, or versions differ.
+    """
+    if out.resolve() in [folder.resolve() for folder in folders]:
+        raise InvalidValueError(f"{out} is one of the runs to be merged; choose another --out.")
+    runs = [(folder, StoredRun(folder, _read_checked)) for folder in folders]
+    results = [(folder, run.newest) for folder, run in runs]
+    _check_versions(results)  # before `out` is made, and then with the records that it has
+    with RecordStore(out) as store:
+        _keep_plans(folders, out)
+        _check_versions([(out, store.stored.values()), *results])
+        merged = _Destination(dict(store.stored))
+        for folder, run in runs:
+            taken = merged.take(run.newest)
+            store.extend(_copied_lines(run, taken, folder, out))
+    told = [result for result in merged.kept.values() if result.arm == TOLD]
+    return MergeSummary(
+        merged.added, merged.duplicates, tuple(merged.conflicts), tuple(mixtures(told))
+    )
+
+
+def _keep_plans(folders: Sequence[Path], out: Path) -> None:
+    """Keep the plans of all runs, so that what is missing can be counted."""
+    for folder in folders:
+        for name in plan_names(folder):
+            try:
+                content = read_regular(run_file(folder, name), MOST_PLAN_BYTES)
+            except OSError as error:
+                raise StoreError(f"Cannot read {folder / name}: {error.strerror}.") from error
+            keep_earlier_plan(content, out)
+
+
+def _read_checked(line: bytes, path: Path, number: int) -> Summary:
+    """Check that a line is a whole record and return its summary."""
+    read_record(line, path, number)
+    return read_summary(line, path, number)
+
+
+class _Expected(NamedTuple):
+    """The versions that all folders must have, and the folder where they were found first."""
+
+    folder: Path
+    versions: Versions
+
+
+def _check_versions(runs: Iterable[tuple[Path, Iterable[Summary]]]) -> None:
+    """Raise if records of different folders cannot be in one run, because their versions differ.
+
+    What must be equal has an owner: the versions of environment and language belong to everything,
+    those of words to a task and pool, others to a policy or a scene. Each owner's versions are
+    compared with the first that were found.
+
+    Args:
+        runs: folders, and the results in them.
+    """
+    known: dict[str, _Expected] = {}
+    for folder, results in runs:
+        for result in results:
+            owners = {  # in the words of the error; "" is everything
+                "": Versions(
+                    environment_version=result.environment_version,
+                    language_version=result.language_version,
+                ),
+                f" of {result.words_owner}": Versions(words_version=result.words),
+                f" of {result.policy}": result.policy_versions,
+                f" of {result.task} {result.split} {result.episode}": Versions(seed=result.seed),
+            }
+            for owner, versions in owners.items():
+                found = _Expected(folder, versions)
+                expected = known.setdefault(owner, found)
+                for what, value, other in versions.differences(expected.versions):
+                    raise StoreError(
+                        f"{folder} and {expected.folder} cannot be merged: the {what}{owner} is "
+                        f"{value} in the first and {other} in the second."
+                    )
+                if expected.versions.server_version is None:
+                    # An error may come before the server's version is known: take it from here.
+                    known[owner] = found
+
+
+def _copied_lines(
+    run: StoredRun[Summary], wanted: Sequence[Summary], source: Path, target: Path
+) -> Iterator[bytes]:
+    """Yield the lines of records; copy the videos, logs and actions of each before its line.
+
+    A video whose file is missing is removed from its line.
+
+    Args:
+        run: with the records.
+        wanted: records of it.
+        source: folder of the run.
+        target: folder to copy to.
+    """
+    logs = logged_slugs(source)
+    for result, line in zip(wanted, run.lines(wanted), strict=True):
+        if logs:
+            slug = result.slug  # slow to make
+            if slug in logs:
+                _copy(log_path(Path(), slug).as_posix(), source, target)
+        if result.action_log is not None:
+            _copy(action_path(Path(), result.action_log).as_posix(), source, target)
+        if result.video is None:
+            yield line
+        elif _copy(result.video, source, target):
+            _copy(poster_name(result.video), source, target)
+            yield line
+        else:
+            record = next(run.records([result]))
+            yield encode(msgspec.structs.replace(record, video=None))
+
+
+def _copy(name: str, source: Path, target: Path) -> bool:
+    """Copy a file of a run by its path in it; return whether it exists.
+
+    It replaces a file of that path, as a record that is an error may be replaced.
+    """
+    file = run_file(source, name)
+    copy = run_file(target, name)
+    if not file.is_file():
+        return False
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    copy.unlink(missing_ok=True)
+    try:
+        os.link(file.resolve(), copy)  # takes no space on the same disk
+    except OSError:
+        shutil.copyfile(file, copy)
+    return True

@@ -1,0 +1,118 @@
+"""What results should have in common, and sentences on everything in which they differ."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Collection, Iterable, Iterator
+from typing import Any, NamedTuple
+
+from roboirg.core.environment_options import ENVIRONMENT_OPTIONS
+from roboirg.core.versions import makeup_text
+from roboirg.core.word_pools import words_label
+from roboirg.records.record import Summary
+
+
+class Trait(NamedTuple):
+    """What should be the same in all results, or in all of a policy.
+
+    Attributes:
+        path: of the field of a result, such as ``environment.max_steps``.
+        plural: what several values are called.
+        meaning: a sentence on what it means that there are several.
+        text: returns a value in words, or None if it fits all others.
+        owner: returns what of a result has the value; only values of one owner should be the same.
+    """
+
+    path: str
+    plural: str
+    meaning: str
+    text: Callable[[Any], str | None] = str
+    owner: Callable[[Any], str] = lambda _: ""
+
+
+_UNFAIR = "They are kept apart and cannot be compared."
+_APART = "They are kept apart and never averaged."
+
+FAIRNESS = (
+    Trait("split", "splits", _UNFAIR),
+    Trait("options.wordings", "words", _UNFAIR, words_label),
+    Trait("environment.max_steps", "step limits", _UNFAIR),
+    Trait("environment.meshes", "kinds of meshes", _UNFAIR),
+    Trait("arm", "arms", _UNFAIR),
+    Trait("language_version", "versions of the language", _UNFAIR),
+    Trait("environment_version", "versions of the environment", _UNFAIR),
+    Trait(
+        "words",
+        "words of a task and pool",
+        "They cannot be compared, and rates average over them.",
+        owner=operator.attrgetter("words_owner"),
+    ),
+)
+"""What must be equal in a comparison of policies."""
+
+_COMMON = (
+    Trait(
+        "render_device",
+        "render devices",
+        "Their pictures differ in some pixels by a brightness level, and rates average over them.",
+        lambda device: device,  # results for which nothing was rendered fit every device
+    ),
+    Trait("code", "states of the package's code", "Rates do not tell them apart."),
+)
+
+
+def _environment_traits() -> list[Trait]:
+    """Return the options of an environment that policies may have chosen differently."""
+    fairness_paths = {trait.path for trait in FAIRNESS}
+    traits = []
+    for name in ENVIRONMENT_OPTIONS:
+        path = f"environment.{name}"
+        if path not in fairness_paths:
+            traits.append(Trait(path, name.replace("_", " "), _APART))
+    return traits
+
+
+_OF_POLICY = (
+    Trait("ref.makeup", "policies", _APART, makeup_text),
+    Trait("played_version", "versions", _APART),
+    *_environment_traits(),
+)
+"""What must be equal in all results of a policy."""
+
+
+def mixtures(results: Collection[Summary]) -> list[str]:
+    """Return a sentence for each trait of which the results have several values.
+
+    Some traits should be the same in all results, others only in those of one policy.
+    """
+    sentences = [*differing(results, FAIRNESS), *differing(results, _COMMON)]
+    for policy in sorted({result.policy for result in results}):
+        of_policy = [result for result in results if result.policy == policy]
+        sentences += differing(of_policy, _OF_POLICY, f" of {policy}")
+    return sentences
+
+
+def differing(
+    results: Collection[Summary], traits: Iterable[Trait], of_whom: str = ""
+) -> Iterator[str]:
+    """Yield a sentence for each of some traits of which the results have several values.
+
+    For example ``Mixed splits: test, val. They are kept apart and cannot be compared.``
+
+    Args:
+        results: in which the traits should be the same.
+        traits: that are compared.
+        of_whom: stands behind the trait in a sentence, such as `` of mine``.
+    """
+    for trait in traits:
+        value_of = operator.attrgetter(trait.path)
+        values = {(trait.owner(result), value_of(result)) for result in results}
+        texts: dict[str, set[str]] = {}  # values in words, by owner
+        for owner, value in values:
+            text = trait.text(value)
+            if text is not None:
+                texts.setdefault(owner, set()).add(str(text))
+        for owner in sorted(texts):
+            if len(texts[owner]) > 1:
+                listed = ", ".join(sorted(texts[owner]))
+                yield f"Mixed {trait.plural}{of_whom}: {listed}. {trait.meaning}"

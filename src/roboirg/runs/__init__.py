@@ -1,0 +1,1 @@
+"""Runs: plans, and how their episodes are played, hosted and distributed."""

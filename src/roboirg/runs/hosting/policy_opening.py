@@ -1,0 +1,76 @@
+"""Open a policy once before a run, without running a user's code next to a world."""
+
+from __future__ import annotations
+
+import contextlib
+from dataclasses import replace
+
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.core.policy_ref import SCRIPTED, PolicyRef
+from roboirg.policies.by_name.policy_kinds import make_follower
+from roboirg.policies.contract.batch_policy import forget_batched
+from roboirg.policies.opening import opened
+from roboirg.policies.planners.hierarchical_policy import joint_version
+from roboirg.runs.episode_errors import EpisodeError, EpisodeLostError
+from roboirg.runs.hosting.host_pool import HostPool, HostSettings
+from roboirg.runs.hosting.messages import Call, Outcome
+from roboirg.runs.hosting.policy_line import PolicyLine
+
+LIMIT_S = 600.0
+
+
+def open_policy(
+    ref: PolicyRef, limit_s: float = LIMIT_S, settings: HostSettings | None = None
+) -> PolicyRef:
+    """Return a policy with its version and its needs.
+
+    One of the user's is made in a process of its own and begins a synthetic episode, because it may
+    set its version until its ``reset`` ends. Of ours, both are known.
+
+    Args:
+        ref: as it was named.
+        limit_s: seconds that this may take.
+        settings: of its process, which is on the first of the devices.
+
+    Raises:
+        InvalidValueError: there is no such policy, its module cannot be imported, or its version is
+            no version.
+        MissingDependencyError: a library that it needs is not installed.
+    """
+    if not ref.is_foreign:
+        return ref
+    forget_batched(ref.body)
+    if ref.place == "python":
+        return opened(ref)
+
+    outcome = _describe(ref, limit_s, settings or HostSettings())
+    if outcome.error == "missing":
+        raise MissingDependencyError(outcome.message)
+    if outcome.error is not None:
+        raise InvalidValueError(outcome.message)
+    needs = outcome.needs
+    version = outcome.version
+    if ref.place == "split":
+        hands = make_follower(SCRIPTED, 0)
+        needs = PolicyNeeds.of(hands).merge(needs)
+        version = joint_version(outcome, hands)
+    # Whether it is privileged is not for its own process to say.
+    return replace(ref, needs=needs, version=version, problem=outcome.message or None)
+
+
+def _describe(ref: PolicyRef, limit_s: float, settings: HostSettings) -> Outcome:
+    """Start a process for a policy, and return what it says of it; raises like `open_policy`."""
+    hosted = ref.hosted_part
+    settings = replace(settings, devices=settings.devices[:1])
+    try:
+        with (
+            HostPool(settings) as pool,
+            contextlib.closing(PolicyLine(pool.connect(), hosted, limit_s)) as line,
+        ):
+            return line.call(Call("describe", policy=hosted))
+    except (EpisodeError, EpisodeLostError) as error:
+        reason = str(error)
+        if error.kind == "timeout":
+            reason = f"it was not opened within {limit_s:g} s"
+        raise InvalidValueError(f"Policy {ref.spec!r} cannot be opened: {reason}.") from error

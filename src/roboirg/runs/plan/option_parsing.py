@@ -1,0 +1,263 @@
+"""Parse names, numbers and ranges: as typed on a command line, or lists of YAML and Python."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import NamedTuple, TypeVar
+
+from roboirg import language
+from roboirg.core.arms import parse_arm
+from roboirg.core.episode import DIFFICULTIES, SPLITS, Split
+from roboirg.core.errors import InvalidValueError
+from roboirg.tasks.splits import splits
+
+Value = TypeVar("Value")
+
+Names = tuple[str, ...]
+"""Different names, in the order in which they were given."""
+Numbers = tuple[int, ...]
+"""Different numbers, in the same way."""
+
+ALL = "all"
+"""The name that selects everything."""
+
+_NAME = r"[\w.+ -]+"
+"""Of a policy: it becomes part of names of files."""
+_MAX_NUMBERS = 10_000
+_NUMBER = r"(?:0|[1-9]\d{0,17})"
+"""Without leading zeros: 010 is 8 to some readers."""
+_RANGE = re.compile(rf"(?P<first>{_NUMBER})(?:\s*-\s*(?P<last>{_NUMBER}))?")
+"""``7``, or ``5-9``."""
+_MAX_QUOTED_LENGTH = 40
+_NUMBERS_HINT = "write numbers and ranges such as 0,3,5-9"
+_EPISODES_HINT = f"{_NUMBERS_HINT}, or all"
+
+
+def parse_names(kind: str, given: object) -> Names:
+    """Parse names, in a text separated by commas; repeated names count once.
+
+    Args:
+        kind: what the names are, for the error.
+        given: as typed, or several of these, or a number alone.
+
+    Raises:
+        InvalidValueError: there is none, or they are in a mapping, whose values would be lost.
+    """
+    names = distinct(word for word in _words(kind, given) if word)
+    if not names:
+        raise InvalidValueError(f"No {kind} was given.")
+    return names
+
+
+def _words(kind: str, given: object) -> list[str]:
+    """Split at commas: ``"a, b"``, ``["a", "b"]`` and ``["a,b"]`` all become ``["a", "b"]``."""
+    if given is None:
+        return []
+    if isinstance(given, Mapping):
+        raise InvalidValueError(f"{_shorten(str(given))} is not a valid {kind}; write a list.")
+    parts: Iterable[object] = [given]
+    if isinstance(given, Iterable) and not isinstance(given, str):
+        parts = given
+    words = []
+    for part in parts:
+        words += [word.strip() for word in str(part).split(",")]
+    return words
+
+
+def distinct(values: Iterable[Value]) -> tuple[Value, ...]:
+    """Return values in their order, repeated ones once."""
+    return tuple(dict.fromkeys(values))
+
+
+def parse_arms(given: object) -> Names:
+    """Parse control arms; repeated ones count once.
+
+    Raises:
+        UnknownNameError: there is no such arm.
+        InvalidValueError: there is none, or a number of paraphrases is out of range.
+    """
+    arms: list[str] = []
+    for name in parse_names("arm", given):
+        arms += parse_arm(name)
+    return distinct(arms)
+
+
+def parse_policies(given: Iterable[str]) -> Names:
+    """Parse policies; one text may hold several names separated by commas.
+
+    Raises:
+        InvalidValueError: there is none, or ``NAME=SPEC`` has a name that is not allowed.
+    """
+    found: list[str] = []
+    for text in given:
+        # Addresses and their options may contain commas.
+        if "://" in text or "?" in text:
+            found.append(text.strip())
+        else:
+            found += parse_names("policy", text)
+    policies = distinct(found)
+    if not policies:
+        raise InvalidValueError("No policy was given.")
+    for policy in policies:
+        name, equals, _ = policy.partition("=")
+        # An address has ":" or "?" before its first "=", as "openpi://host?a=1"; "mine=lab:Walk"
+        # begins with a name.
+        is_address = re.search("[:?]", name)
+        if equals and not is_address and not re.fullmatch(_NAME, name):
+            raise InvalidValueError(
+                f"The name of a policy is {name!r} (in {policy!r}); a name has letters, digits, "
+                "blanks and any of . _ + - only."
+            )
+    return policies
+
+
+class NamedSpec(NamedTuple):
+    """A policy as it is typed: its name in records, and the spec that says what it is."""
+
+    name: str
+    spec: str
+
+
+def name_and_spec(policy: str) -> NamedSpec:
+    """Split ``NAME=SPEC`` into name and spec; without a name, the spec is the name."""
+    found = re.fullmatch(rf"(?P<name>{_NAME})=(?P<spec>.+)", policy)
+    if found is None:
+        return NamedSpec(policy, policy)
+    return NamedSpec(found["name"].strip(), found["spec"].strip())
+
+
+def means_all(given: object) -> bool:
+    """Return whether names contain ``all``, in capitals or not."""
+    return ALL in [word.lower() for word in _words("name", given)]
+
+
+def parse_splits(text: str) -> tuple[Split, ...]:
+    """Return the splits of a name: train, val or test, or ``all`` of them."""
+    if means_all(text):
+        return SPLITS
+    return (splits.check_fixed_split(text),)
+
+
+def parse_episodes(given: object, split: str, tasks: Collection[str]) -> Numbers:
+    """Parse episodes: a number of them, positions in a list, or those of some difficulties.
+
+    ``4`` is the first four. With a comma or a dash it is a list of positions, and so is a list of
+    Python or YAML, whose positions are not compared with the size of the split: only those who
+    know the salt of private episodes can draw it.
+
+    In a split of fixed episodes ``all`` is every one, and ``easy``, ``medium``, ``hard`` or several
+    of them are those that have such a difficulty in all of the tasks.
+
+    Raises:
+        UnknownNameError: there is no such split.
+        InvalidValueError: the text is neither a number nor a list, or the split has fewer episodes.
+    """
+    words = parse_names("episode", given)
+    if means_all(words):
+        return _episodes_of_levels(DIFFICULTIES, split, tasks)
+    if {*words} <= {*DIFFICULTIES}:  # all of them are levels
+        return _episodes_of_levels(words, split, tasks)
+    if isinstance(given, Iterable) and not isinstance(given, str):
+        return _union(_parse_ranges("episode", words, _EPISODES_HINT))
+
+    typed = str(given).strip()
+    # A number alone, even a negative one, which is then refused, is a count and no position.
+    if re.fullmatch(rf"-?{_NUMBER}", typed):
+        ranges = [_first_episodes(typed)]
+    else:
+        ranges = _parse_ranges("episode", words, _EPISODES_HINT)
+    for numbers in ranges:
+        size = splits.split_size(split)
+        if numbers[-1] >= size:
+            raise InvalidValueError(
+                f"There is no episode {numbers[-1]}: split {split!r} has episodes 0 to {size - 1}."
+            )
+    return _union(ranges)
+
+
+def _first_episodes(count: str) -> range:
+    """Return the first episodes, as many as a typed number says: ``"4"`` gives 0 to 3."""
+    number = int(count)
+    if number < 1:
+        hint = "; for episode 0 alone write '0,'" if number == 0 else ""
+        raise InvalidValueError(f"The number of episodes is {count}; it must be at least 1{hint}.")
+    return range(number)
+
+
+def _episodes_of_levels(levels: Collection[str], split: str, tasks: Collection[str]) -> Numbers:
+    """Return the episodes of a fixed split whose difficulty is one of these in every task."""
+    size = splits.split_size(split)
+    if split not in SPLITS:
+        raise InvalidValueError(
+            f"The split {split!r} has {size:,} episodes; say how many with --episodes."
+        )
+    episodes = []
+    for index in range(size):
+        difficulties = {splits.get_episode(task, split, index).difficulty for task in tasks}
+        if difficulties <= {*levels}:
+            episodes.append(index)
+    return tuple(episodes)
+
+
+def parse_stages(given: object) -> Numbers:
+    """Parse stages of the contextual setting, such as ``1,5``."""
+    possible = "; ".join(",".join(map(str, stages)) for stages in language.STAGE_SETS)
+    return _union(_parse_ranges("list of stages", given, f"the possible lists are {possible}"))
+
+
+def parse_stage_sets(given: object) -> tuple[Numbers, ...]:
+    """Parse several sets of stages: ``"1,5; 1-3"`` gives ``((1, 5), (1, 2, 3))``.
+
+    A list has a set in each item, as ``[[1, 5], "1-3"]``, but a list of numbers is one set.
+    """
+    sets: Iterable[object] = [given]
+    if isinstance(given, str):
+        sets = given.split(";")
+    elif isinstance(given, list | tuple):
+        is_one_set = all(isinstance(stage, int) for stage in given)
+        sets = [given] if is_one_set else given
+    return distinct(parse_stages(stages) for stages in sets)
+
+
+def parse_numbers(kind: str, given: object) -> Numbers:
+    """Parse numbers and ranges, in a text separated by commas, such as ``0,3,5-9``."""
+    return _union(_parse_ranges(kind, given, _NUMBERS_HINT))
+
+
+def _parse_ranges(kind: str, given: object, hint: str) -> list[range]:
+    """Return numbers and ranges as ranges: ``"3,5-9"`` becomes 3 to 3 and 5 to 9.
+
+    Args:
+        kind: what the numbers are, for the error.
+        given: as in `parse_names`.
+        hint: what could be written instead, for the error.
+    """
+    ranges = []
+    for part in parse_names(kind, given):
+        found = _RANGE.fullmatch(part)
+        numbers = range(0)
+        if found is not None:
+            last = found["last"] or found["first"]
+            numbers = range(int(found["first"]), int(last) + 1)
+        if not numbers:
+            raise InvalidValueError(f"{_shorten(part)!r} is not a valid {kind}; {hint}.")
+        ranges.append(numbers)
+    return ranges
+
+
+def _union(ranges: Sequence[range]) -> Numbers:
+    """Return the numbers of all ranges, each once, in the order in which they were given."""
+    count = sum(len(numbers) for numbers in ranges)
+    if count > _MAX_NUMBERS:
+        raise InvalidValueError(
+            f"The list has {count:,} numbers; at most {_MAX_NUMBERS:,} are allowed."
+        )
+    return distinct(itertools.chain.from_iterable(ranges))
+
+
+def _shorten(text: str) -> str:
+    if len(text) <= _MAX_QUOTED_LENGTH:
+        return text
+    return f"{text[:_MAX_QUOTED_LENGTH]}…"

@@ -1,0 +1,209 @@
+"""The record of an episode: begun before it is played, and concluded from its events."""
+
+from __future__ import annotations
+
+import datetime as dt
+import functools
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import msgspec
+
+from roboirg import language
+from roboirg.core.delivery import TURNS
+from roboirg.core.episode import ENVIRONMENT_VERSION
+from roboirg.core.policy_ref import unknown_policy
+from roboirg.core.version import __version__
+from roboirg.judging import DeclaredIntent, Event, attribute_failure
+from roboirg.judging.episode_replay import decide
+from roboirg.policies.prompt_length.prompt_audit import PromptLimit
+from roboirg.records.record import (
+    Attribution,
+    ErrorKind,
+    Job,
+    MentionSpan,
+    Record,
+    UtteranceRecord,
+)
+from roboirg.runs.episode_errors import format_cause
+from roboirg.runs.job_instruction import PreparedJob
+from roboirg.runs.play.goal_outcomes import find_goal_outcomes, judged_events, name_other_goal
+from roboirg.runs.play.prompt_shares import audit_job, audit_prompt
+from roboirg.util.processor import processor_family
+from roboirg.util.short_hash import DIGITS
+
+
+def begin_record(prepared: PreparedJob) -> Record:
+    """Return the record of an episode that has not begun; needs no simulator.
+
+    It has the words that are to be said, and the policy without its needs, as those with which it
+    is played are a field of their own.
+    """
+    job = prepared.job
+    words = prepared.words
+    policy = job.ref or unknown_policy(job.policy)
+    job_fields = msgspec.structs.asdict(job)
+    job_fields["ref"] = replace(policy, needs=None, problem=None)
+    # To JSON and back, so that the record has exactly what a reader of its file gets.
+    metadata = json.loads(json.dumps(dict(words.instruction.metadata)))
+    return Record(
+        **job_fields,
+        seed=words.episode.seed,
+        difficulty=words.episode.difficulty,
+        outcome="error",
+        error="environment",
+        cause="environment: the episode did not begin",
+        instruction=utterances_at(prepared, ()),
+        mentions=tuple(MentionSpan(**asdict(mention)) for mention in words.instruction.mentions),
+        command=words.command,
+        goal=dict(words.episode.goal.as_mapping()),
+        metadata=metadata,
+        language_version=metadata["language_version"],
+        words=metadata["words"],
+        environment_version=ENVIRONMENT_VERSION,
+        package_version=__version__,
+        code=code_fingerprint(),
+        processor=processor_family(),
+        started_at=utc_now(),
+        duration_s=0.0,
+    )
+
+
+def lost_record(job: Job, kind: ErrorKind, message: str) -> Record:
+    """Return the record of an episode of which nothing is known but why it ended."""
+    record = begin_record(PreparedJob(job))
+    record.record_error(kind, format_cause(kind, message))
+    return record
+
+
+def utterances_at(prepared: PreparedJob, heard: Sequence[int]) -> tuple[UtteranceRecord, ...]:
+    """Return the utterances of a job, each with the step at which it was heard.
+
+    Args:
+        prepared: the job. Unless its delivery is in turns, all are heard at step 0.
+        heard: the steps of those heard so far; the step of all others is None.
+    """
+    in_turns = prepared.job.options.delivery == TURNS
+    records = []
+    for number, utterance in enumerate(prepared.words.instruction.utterances):
+        step: int | None = 0
+        if in_turns:
+            step = heard[number] if number < len(heard) else None
+        records.append(UtteranceRecord(**asdict(utterance), step=step))
+    return tuple(records)
+
+
+def audit_record(record: Record, prepared: PreparedJob, limit: PromptLimit) -> None:
+    """Record what of the instruction fits into the limit of a policy's model.
+
+    If the episode ended before anything was said, all utterances count as said.
+
+    Args:
+        record: gets the audit and its verdict.
+        prepared: its job.
+        limit: that the policy declares.
+
+    Raises:
+        InvalidValueError: the policy's tokenizer does not read this text.
+    """
+    instruction = prepared.words.instruction
+    steps = [utterance.step for utterance in record.instruction]
+    if all(step is None for step in steps):
+        found = audit_job(record, limit, instruction)  # as if each were heard when it is said
+    else:
+        found = audit_prompt(instruction, steps, limit)
+    record.prompt = found.audit
+    record.prompt_verdict = found.verdict
+
+
+def conclude(
+    record: Record,
+    prepared: PreparedJob,
+    start: int,
+    *,
+    timed_out: bool = False,
+    original: str | None = None,
+) -> None:
+    """Record which goals an episode reached, and why it failed, if that is clear.
+
+    Args:
+        record: with a verdict; without events nothing can be concluded.
+        prepared: its job.
+        start: control steps of the episode before the policy's turn.
+        timed_out: whether the policy used up its steps.
+        original: how it ended for the scene's own goal, if the words state another one.
+    """
+    if not record.events:
+        return
+    words = prepared.words
+    events = judged_events(record.events, start)
+    elapsed_steps = start + record.steps
+    decision = decide(words.episode, events, elapsed_steps)
+    goals = find_goal_outcomes(words, events, elapsed_steps, decision, original)
+    record.goals = goals
+    if record.outcome != "failure":
+        return
+
+    attempts = judged_events(record.attempts or (), start)
+    # What the words would mean if left and right were mistaken, which may explain the failure. A
+    # text that mentions nothing, such as a scrambled one, has no sides to exchange.
+    mirrored = None
+    if words.instruction.mentions:
+        mirrored = language.mirrored_objects(words.episode, words.instruction)
+    found = attribute_failure(
+        words.episode,
+        _until(decision.step, events),
+        timed_out=timed_out,
+        policy_start_step=start,
+        elapsed_steps=decision.step,
+        cause=record.cause,
+        mirrored=mirrored,
+        attempts=_until(decision.step, attempts),
+        intent=declared_intent(record),
+    )
+    if found is not None and goals.original is not None:
+        found = name_other_goal(found, prepared.scene_episode, goals)
+    record.attribution = None if found is None else Attribution(**found._asdict())
+
+
+def _until(step: int, events: Iterable[Event]) -> list[Event]:
+    """Return the events up to a step, that one included."""
+    return [event for event in events if event.step <= step]
+
+
+def declared_intent(record: Record) -> DeclaredIntent | None:
+    """Return what a policy declared that it would do; None if it declared nothing.
+
+    A listener says in its metadata which goal it has understood (``understood``), or None for no
+    goal; other policies name subgoals. As metadata may hold anything, a mapping counts as a goal
+    only if it has one of the goal's slots.
+    """
+    # The default is a text, which is no goal: None means that no goal was understood.
+    understood = record.policy_metadata.get("understood", "")
+    is_goal = isinstance(understood, Mapping) and understood.keys() & record.goal
+    if understood is None or is_goal:
+        return DeclaredIntent(listens=True, understood=understood)
+    if not record.subgoals:
+        return None
+    verdicts = tuple((subgoal.step, subgoal.verdict) for subgoal in record.subgoals)
+    return DeclaredIntent(verdicts=verdicts)
+
+
+def utc_now() -> str:
+    """Return the time in ISO 8601, to the second."""
+    return dt.datetime.now(dt.UTC).isoformat(timespec="seconds")
+
+
+@functools.cache
+def code_fingerprint() -> str:
+    """Return a shortened SHA-256 of the names and bytes of the package's files, data included."""
+    digest = hashlib.sha256()
+    root = Path(__file__).parents[2]
+    for path in sorted(root.rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
+            digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()[:DIGITS]

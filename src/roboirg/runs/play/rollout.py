@@ -1,0 +1,315 @@
+"""Play one job and return its record.
+
+| what goes wrong | outcome | kind of error |
+| --- | --- | --- |
+| the policy breaks the task's rules or runs out of steps | failure | |
+| the policy raises or calls `sys.exit` | error | policy |
+| the policy's action cannot be executed | error | invalid_action |
+| the policy's server answers too late or not at all | error | timeout, connection |
+| the environment or the demonstration raises | error | environment |
+| the instruction is too long for the policy, and such episodes are refused | error | prompt |
+| no Vulkan device, a missing dependency | none: the run stops | |
+| a video cannot be written, a policy cannot report its costs | unchanged | |
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from socket import socket
+from typing import NamedTuple
+
+from roboirg.core.error_words import one_line
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.core.policy_ref import SCRIPTED, PolicyRef
+from roboirg.policies.by_name.finding import make_policy
+from roboirg.policies.by_name.policy_kinds import make_follower
+from roboirg.policies.contract.base import Policy, close_policy
+from roboirg.policies.contract.policy_calls import GUESSED, policy_usage
+from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
+from roboirg.policies.prompt_length.prompt_audit import PromptLimit
+from roboirg.policies.prompt_length.tokenizer_file import prompt_limit
+from roboirg.policies.vlm.models.reply_store import ReplySettings, use_replies
+from roboirg.records.action_log import ActionLog, write_actions
+from roboirg.records.film import VIDEO_FOLDER, VideoMode
+from roboirg.records.record import Job, Record
+from roboirg.runs.episode_errors import EpisodeError, EpisodeLostError
+from roboirg.runs.hosting.host_pool import HostSettings
+from roboirg.runs.hosting.hosted_policy import HostedPlanner, HostedPolicy
+from roboirg.runs.job_instruction import PreparedJob, episode_policy_seed
+from roboirg.runs.play.call_guard import CallGuard
+from roboirg.runs.play.episode_record import (
+    audit_record,
+    begin_record,
+    lost_record,
+    utc_now,
+)
+from roboirg.runs.play.guarded_loop import GuardedLoop
+from roboirg.runs.play.policy_environment import job_needs, make_env
+from roboirg.runs.play.prompt_shares import audit_job, check_prompt
+from roboirg.runs.play.video_writer import VideoWriter
+
+PlayJob = Callable[[Job], Record]
+"""Function that plays one job. Executors send it to other processes, so it must be picklable."""
+
+MAX_LOSSES = 20
+"""How often an episode is played again because other episodes broke the policy's process."""
+
+
+class PlayedJob(NamedTuple):
+    """What is left of an episode that was played.
+
+    Attributes:
+        record: how it went.
+        log: the actions, which are not stored yet; None if the policy's turn never came, or the
+            world broke.
+    """
+
+    record: Record
+    log: ActionLog | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class EpisodeRunner:
+    """Plays jobs with the simulator and real policies.
+
+    Attributes:
+        folder: output folder of the run; videos go to ``videos/`` in it.
+        video: which episodes get a video.
+        policy_timeout_s: seconds that one call of the policy may take, if a supervisor watches.
+        plan: fingerprint of the plan, for the records.
+        hosting: how policies get processes of their own; None for policies in the world's process.
+        hosts: the line on which to ask for them; an executor sets it.
+        refuse_long: whether an episode is not played if its prompt is longer than what the policy's
+            model reads.
+        replies: where those of models are kept; None for a run that keeps none.
+    """
+
+    folder: Path
+    video: VideoMode = "off"
+    policy_timeout_s: float | None = None
+    plan: str | None = None
+    hosting: HostSettings | None = None
+    hosts: socket | None = None
+    refuse_long: bool = False
+    replies: ReplySettings | None = None
+
+    def in_folder(self, folder: Path) -> EpisodeRunner:
+        """Return a copy that writes its videos and the replies of models to another folder."""
+        replies = None if self.replies is None else self.replies._replace(folder=folder)
+        return replace(self, folder=folder, replies=replies)
+
+    def with_hosts(self, hosts: socket) -> EpisodeRunner:
+        """Return a copy that asks for hosts on a line, as `HostPool.connect` returns it."""
+        return replace(self, hosts=hosts)
+
+    def __call__(self, job: Job) -> Record:
+        """Play one job.
+
+        Raises:
+            EndOfRunError: no Vulkan device can render, a package has to be installed first, ….
+        """
+        started_at = utc_now()
+        start = time.monotonic()
+        writer = None
+        if self.video != "off":
+            writer = VideoWriter(self.folder / VIDEO_FOLDER / f"{job.slug}.mp4")
+        with use_replies(self.replies, job.slug):
+            played = self._play(job, writer)
+        record = played.record
+        if writer is not None:
+            self._finish_video(writer, record)
+        if played.log is not None:
+            record.action_log = write_actions(played.log, self.folder)
+        record.started_at = started_at
+        record.plan = self.plan
+        record.duration_s = round(time.monotonic() - start, 3)
+        return record
+
+    def _play(self, job: Job, writer: VideoWriter | None) -> PlayedJob:
+        """Play a job; again from its beginning if the policy's process is lost, but not too often.
+
+        Once it was lost in a call about several episodes, this one is played alone.
+        """
+        is_alone = False
+        attempt = 1
+        while True:
+            try:
+                played = self.play_once(job, writer, alone=is_alone)
+                break
+            except EpisodeLostError as error:
+                if attempt == MAX_LOSSES:
+                    message = f"{error}, {attempt} times in a row"
+                    played = PlayedJob(lost_record(job, error.kind, message))
+                    break
+                is_alone = is_alone or error.alone
+            if writer is not None:
+                writer.discard()
+            attempt += 1
+        played.record.attempt = attempt
+        return played
+
+    def play_once(
+        self, job: Job, writer: VideoWriter | None = None, *, alone: bool = False
+    ) -> PlayedJob:
+        """Play one job once; errors of the policy or the environment end up in the record.
+
+        Args:
+            job: what to play.
+            writer: gets the frames of a video.
+            alone: whether a hosted policy must not be asked about it together with others.
+
+        Raises:
+            EpisodeLostError: the policy's process was lost; the episode can be played again.
+            RenderDeviceError: no Vulkan device can render.
+            MissingDependencyError: a package has to be installed first.
+            InvalidValueError: the job's wording file is missing or has changed.
+        """
+        prepared = PreparedJob(job)
+        # A policy of the user's plays in a process of its own (is hosted), ours in this one.
+        hosts = self.hosts if job.ref is not None and job.ref.is_hosted else None
+        record = begin_record(prepared)
+        guard = CallGuard(record.timings, self.policy_timeout_s, is_hosted=hosts is not None)
+        policy: Policy | None = None
+        limit: PromptLimit | None = None
+        loop: GuardedLoop | None = None
+        try:
+            with guard.policy("policy's constructor", "policy_load"):
+                if hosts is None:
+                    policy = load_policy(prepared)
+                else:
+                    policy = load_hosted_policy(hosts, prepared, self.policy_timeout_s, alone=alone)
+                needs = job_needs(policy, job)
+                limit = prompt_limit(needs)
+                # Refused before the episode is played, as the outcome would mean nothing.
+                if self.refuse_long and limit is not None:
+                    found = audit_job(job, limit, prepared.words.instruction)
+                    check_prompt(found.audit, found.verdict)
+            loop = play_with(policy, prepared, needs, record, guard, writer)
+        except EpisodeError as error:
+            record.record_error(error.kind, error.cause, error.details)
+        finally:
+            if policy is not None:
+                _close_policy(policy, record, guard)
+
+        log = None
+        if loop is not None:
+            loop.conclude()
+            log = loop.log
+        if limit is not None:
+            with contextlib.suppress(InvalidValueError):
+                audit_record(record, prepared, limit)
+        return PlayedJob(record, log)
+
+    def _finish_video(self, writer: VideoWriter, record: Record) -> None:
+        """Complete the video, or discard an unwanted one; record its path, and what failed."""
+        is_wanted = self.video == "all" or record.outcome != "success"
+        if is_wanted and writer.finish():
+            record.video = writer.path.relative_to(self.folder).as_posix()
+        else:
+            writer.discard()
+        record.video_error = None if writer.error is None else one_line(writer.error)
+
+
+def play_with(
+    policy: Policy,
+    prepared: PreparedJob,
+    needs: PolicyNeeds,
+    record: Record,
+    guard: CallGuard,
+    writer: VideoWriter | None = None,
+) -> GuardedLoop:
+    """Play one job with a loaded policy, which is not closed; its errors end up in the record.
+
+    Args:
+        policy: answers the observations.
+        prepared: what to play.
+        needs: what the environment offers.
+        record: is filled in.
+        guard: attributes errors and measures calls.
+        writer: gets the frames of a video.
+
+    Returns:
+        What was played; `GuardedLoop.conclude` records how it ended.
+
+    Raises:
+        EpisodeError: the environment cannot be made, or its last state cannot be read.
+    """
+    with guard.environment("env_reset"):
+        env = make_env(prepared, needs)
+        record.needs = needs.declared
+    with contextlib.closing(env):
+        loop = GuardedLoop(env, policy, prepared, needs.action_space, record, guard, writer)
+        try:
+            loop.play()
+        except EpisodeError as error:
+            record.record_error(error.kind, error.cause, error.details)
+            if error.kind == "environment":  # its last state cannot be trusted
+                return loop
+        if loop.has_begun:
+            with guard.environment("env_step"):
+                loop.keep_actions()
+        return loop
+
+
+def load_policy(prepared: PreparedJob) -> Policy:
+    """Return a new policy object, so that no state of an earlier episode remains."""
+    return make_policy(_policy_of(prepared), _seed_of(prepared))
+
+
+def load_hosted_policy(
+    hosts: socket, prepared: PreparedJob, limit_s: float | None, *, alone: bool = False
+) -> HostedPolicy | HierarchicalPolicy:
+    """Return a policy of the user's, whose code runs in a process of its own.
+
+    Of a user's planner with scripted hands only the planner does: the hands need the world, which
+    is in this process.
+
+    Args:
+        hosts: the line on which to ask for the process.
+        prepared: the job.
+        limit_s: seconds that one call may take.
+        alone: whether it must not be asked about this episode together with others.
+    """
+    ref = _policy_of(prepared)
+    seed = _seed_of(prepared)
+    if ref.place != "split":
+        return HostedPolicy(hosts, ref, seed, limit_s, alone=alone)
+    planner = HostedPlanner(hosts, ref.hosted_part, seed, limit_s, alone=alone)
+    hands = make_follower(SCRIPTED, seed)
+    return HierarchicalPolicy(planner, hands, f"{ref.kind}:{ref.target}")
+
+
+def _policy_of(prepared: PreparedJob) -> PolicyRef:
+    """Return the policy of a job."""
+    ref = prepared.job.ref
+    if ref is None:
+        raise ValueError(f"{prepared.job.slug} names no policy to play it")
+    return ref
+
+
+def _seed_of(prepared: PreparedJob) -> int:
+    """Return the policy's seed in the episode of a job."""
+    job = prepared.job
+    return episode_policy_seed(job.policy_seed, prepared.scene_episode.seed, job.arm)
+
+
+def _close_policy(policy: Policy, record: Record, guard: CallGuard) -> None:
+    """Read the policy's costs and close it; errors there do not change the outcome.
+
+    Raises:
+        EpisodeLostError: the policy's process was lost before it reported the costs.
+    """
+    try:
+        with guard.policy("policy's close()", "policy_close"):
+            try:
+                record.usage = policy_usage(policy)
+                record.guessed = GUESSED in record.usage
+            finally:
+                close_policy(policy)
+    except EpisodeError as error:
+        record.details = record.details or error.details

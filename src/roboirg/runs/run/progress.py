@@ -1,0 +1,139 @@
+"""Show the progress of a run: a bar on a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+from typing import Self
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from roboirg.core.arms import TOLD
+from roboirg.core.plain_text import counted, printable
+from roboirg.records.record import Record
+
+_MINUTE = 60
+
+
+class Reporter:
+    """Gets the progress of a run; this one shows nothing."""
+
+    def start(self, total: int, done: int) -> None:
+        """Start a run.
+
+        Args:
+            total: episodes in the plan.
+            done: episodes stored before.
+        """
+
+    def advance(self, record: Record, *, is_new: bool = True) -> None:
+        """Report a stored record; it is not new if the episode was retried."""
+
+    def warn(self, text: str) -> None:
+        """Show a sentence that the user should read now."""
+
+
+class ConsoleReporter(Reporter):
+    """Progress bar on a terminal, one line per episode elsewhere; a context manager."""
+
+    def __init__(self, console: Console) -> None:
+        self._console = console
+        self._outcomes: dict[str, Counter[str]] = {}  # by setting
+        self._total = 0
+        self._done = 0
+        self._played = 0
+        self._start = time.monotonic()
+        self._bar = Progress(
+            TextColumn("[bold]{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("{task.fields[left]} left · {task.fields[pace]:.1f}/min"),
+            console=console,
+        )
+        self._task = self._bar.add_task("episodes", total=None, left="-:--", pace=0.0)
+        # The successes have their own line, because the bar fills a narrow terminal.
+        self._live = Live(console=console, get_renderable=self._render)
+
+    def start(self, total: int, done: int) -> None:
+        """Start counting; the pace is that of this run only."""
+        self._total = total
+        self._done = done
+        self._start = time.monotonic()
+        self._bar.update(self._task, total=total, completed=done)
+        if done:
+            self._console.print(f"{done} of {counted(total, 'episode')} already stored.")
+
+    def advance(self, record: Record, *, is_new: bool = True) -> None:
+        """Count a record; show that on the bar, or in a line where there is no terminal.
+
+        Args:
+            record: that was stored.
+            is_new: whether its episode had not been played before in this run.
+        """
+        if is_new:
+            self._done += 1
+        self._played += 1
+        self._outcomes.setdefault(record.setting, Counter())[record.outcome] += 1
+        elapsed = max(time.monotonic() - self._start, 1e-9)  # never 0, as it divides
+        pace = _MINUTE * self._played / elapsed
+        minutes, seconds = divmod(round(_MINUTE * (self._total - self._done) / pace), _MINUTE)
+        left = f"{minutes}:{seconds:02d}"
+        if self._console.is_terminal:
+            self._bar.update(self._task, completed=self._done, left=left, pace=pace)
+            return
+        self._console.print(
+            f"\\[{self._done}/{self._total}] {escape(printable(_summary(record)))} ({left} left)",
+            soft_wrap=True,
+            highlight=False,
+        )
+
+    def warn(self, text: str) -> None:
+        """Print a line on stderr, above the bar."""
+        sys.stderr.write(f"{printable(text)}\n")
+
+    def __enter__(self) -> Self:
+        if self._console.is_terminal:
+            self._live.start()
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self._live.stop()
+
+    def _render(self) -> RenderableType:
+        return Group(self._bar, Text(self._score(), "dim"))
+
+    def _score(self) -> str:
+        """Return the successes per setting, of the valid episodes, and the errors in one line.
+
+        For example ``explicit 3/4 · direct 1/2 · errors 1``.
+        """
+        parts = []
+        errors = 0
+        for setting, outcomes in self._outcomes.items():
+            successes = outcomes["success"]
+            valid = successes + outcomes["failure"]
+            if valid:
+                parts.append(f"{setting} {successes}/{valid}")
+            errors += outcomes["error"]
+        if errors:
+            parts.append(f"errors {errors}")
+        return " · ".join(parts)
+
+
+def _summary(record: Record) -> str:
+    """Return an episode in one line, such as ``mine StopCube test/3 direct: failure: too late``."""
+    words = f"{record.policy} {record.task} {record.split}/{record.episode} {record.setting}"
+    if record.form != "implicit":
+        words += f" ({record.form})"
+    if record.arm != TOLD:
+        words += f" ({record.arm})"
+    words += f": {record.outcome}"
+    if record.cause is not None:
+        words += f": {record.cause}"
+    return words

@@ -1,0 +1,354 @@
+"""Run a plan: play the episodes that are not stored yet and store their records."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import threading
+from collections import Counter, deque
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from pathlib import Path
+from types import FrameType
+from typing import NamedTuple
+
+from roboirg.core.error_words import MAX_CAUSE_LENGTH
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.plain_text import counted
+from roboirg.policies.vlm.models.reply_store import ReplySettings
+from roboirg.records.film import VIDEO_FOLDER
+from roboirg.records.record import Job, Record, Summary
+from roboirg.records.record_codec import StoreError, identity_key
+from roboirg.records.run_files import refuse_links
+from roboirg.records.store import (
+    RECORDS_FILE,
+    TORN_FILE,
+    RecordStore,
+    check_same,
+    read_index,
+)
+from roboirg.runs.episode_errors import Terminated, format_cause
+from roboirg.runs.job_instruction import other_versions
+from roboirg.runs.plan.plan import Plan
+from roboirg.runs.plan.stored_plans import write_plan
+from roboirg.runs.play.rollout import EpisodeRunner, PlayJob
+from roboirg.runs.play.video_writer import check_video_support, without_unfinished_videos
+from roboirg.runs.run.executor import Executor
+from roboirg.runs.run.progress import Reporter
+from roboirg.tasks.splits.splits import get_episode
+
+UNREACHABLE_AFTER = 20
+"""After this many consecutive connection errors, skip the rest of this policy."""
+
+
+class RunSummary(NamedTuple):
+    """Result of a run.
+
+    Attributes:
+        total: number of jobs in the plan.
+        played: number of episodes played in this run, retries not counted.
+        errors: records of the plan whose outcome is an error.
+        missing: number of jobs of the plan without a record.
+        video_errors: why videos of new records could not be written.
+        unreachable: policies skipped after too many connection errors.
+    """
+
+    total: int
+    played: int
+    errors: tuple[Summary, ...]
+    missing: int
+    video_errors: tuple[str, ...]
+    unreachable: tuple[str, ...]
+
+
+def run_plan(
+    plan: Plan,
+    folder: Path,
+    play: PlayJob,
+    executor: Executor,
+    *,
+    retry_errors: bool = True,
+    reporter: Reporter | None = None,
+) -> RunSummary:
+    """Play the jobs of a plan that the folder lacks; store each record as soon as it arrives.
+
+    An episode that ends in an error of a kind in the plan's `retry_on` is retried after all others,
+    or at once if its machine or process was lost, and played `tries` times at most; the newest
+    record counts.
+
+    Args:
+        plan: what to play.
+        folder: output folder of the run; holds the records.
+        play: plays one job.
+        executor: where jobs are played.
+        retry_errors: play jobs again whose newest record is an error.
+        reporter: gets every record, and first a line that was not finished.
+
+    Raises:
+        StoreError: another run writes to the folder, the records cannot be read or written, or
+            they belong to another version of language, environment, scene or policy.
+        RoboIRGError: an error that would end every episode (no Vulkan device, …).
+        KeyboardInterrupt: Ctrl-C, or SIGTERM as `Terminated`; all finished episodes are stored.
+    """
+    if reporter is None:
+        reporter = Reporter()
+    jobs = plan.jobs()
+    clean_videos = without_unfinished_videos(folder / VIDEO_FOLDER)
+    with _sigterm_interrupts(), RecordStore(folder) as store, clean_videos:
+        _report_torn_line(store, reporter)
+        _check_versions(plan, store.stored.values(), folder)
+        _warn_of_untrained(plan, reporter)
+        write_plan(plan, folder)
+
+        todo = _jobs_to_play(jobs, store, retry_errors=retry_errors)
+        reporter.start(len(jobs), len(jobs) - len(todo))
+        loop = _RunLoop(plan, store, reporter)
+        loop.play(todo, play, executor)
+        return loop.summary(jobs)
+
+
+def _jobs_to_play(jobs: Iterable[Job], store: RecordStore, *, retry_errors: bool) -> list[Job]:
+    """Return the jobs without a record, and those whose record is an error if it is retried."""
+    todo = []
+    for job in jobs:
+        stored = store.stored.get(identity_key(job))
+        is_retried = retry_errors and stored is not None and stored.outcome == "error"
+        if stored is None or is_retried:
+            todo.append(job)
+    return todo
+
+
+def episode_runner(plan: Plan, folder: Path) -> EpisodeRunner:
+    """Return what plays a plan's jobs into a folder."""
+    if plan.video != "off":
+        check_video_support()
+    return EpisodeRunner(
+        folder,
+        plan.video,
+        policy_timeout_s=plan.hosting.policy_timeout_s,
+        plan=plan.fingerprint,
+        hosting=plan.hosting.settings,
+        refuse_long=plan.long_prompts == "refuse",
+        replies=ReplySettings(folder, plan.models.max_cost, plan.models.model_replies == "anew"),
+    )
+
+
+def check_run(plan: Plan, folder: Path) -> None:
+    """Check what `run_plan` checks before it plays, and write nothing.
+
+    Raises:
+        StoreError: the folder cannot be written, or its records belong to another version of
+            language, environment, scene or policy.
+    """
+    _check_writable(folder)
+    refuse_links(folder)
+    _check_versions(plan, read_index(folder).values(), folder)
+
+
+def _check_writable(folder: Path) -> None:
+    """Raise if a run's folder cannot be written or made; nothing is written."""
+    existing = folder
+    if not folder.exists():
+        existing = next(parent for parent in folder.absolute().parents if parent.exists())
+    if not existing.is_dir():
+        raise StoreError(f"Cannot write to {folder}: {existing} is not a folder.")
+    records = folder / RECORDS_FILE
+    can_write = os.access(existing, os.W_OK | os.X_OK)
+    if can_write and records.exists():
+        can_write = os.access(records, os.W_OK)
+    if not can_write:
+        raise StoreError(f"Cannot write to {folder}: Permission denied.")
+
+
+class _RunLoop:
+    """Plays the jobs of a run, stores their records and retries errors.
+
+    Attributes:
+        tries: how often each job was played in this run.
+        video_errors: why videos could not be written.
+        unreachable: policies skipped after too many connection errors.
+    """
+
+    def __init__(self, plan: Plan, store: RecordStore, reporter: Reporter) -> None:
+        self._plan = plan
+        self._store = store
+        self._reporter = reporter
+        self._connection_errors: Counter[str] = Counter()  # in a row, by policy
+        self.tries: Counter[Job] = Counter()
+        self.video_errors: list[str] = []
+        self.unreachable: list[str] = []
+
+    def play(self, todo: Sequence[Job], play: PlayJob, executor: Executor) -> None:
+        """Play jobs, and retry those that ended in an error of a retryable kind."""
+        queue = deque(todo)
+        jobs = {identity_key(job): job for job in todo}
+        with contextlib.closing(executor.run(queue, play, self._reporter.warn)) as records:
+            for record in records:
+                job = jobs[identity_key(record)]
+                self._store_record(job, record)
+                # The executor takes its next job from the queue, so that is changed in place.
+                if self._is_unreachable(record):  # its remaining jobs are skipped
+                    remaining = [queued for queued in queue if queued.policy != record.policy]
+                    queue.clear()
+                    queue.extend(remaining)
+                elif not self._should_retry(job, record):
+                    continue
+                elif record.error == "infrastructure":
+                    queue.appendleft(job)  # what was lost with a machine can be played at once
+                else:
+                    queue.append(job)
+
+    def summary(self, jobs: Sequence[Job]) -> RunSummary:
+        """Return what has become of all jobs of the plan, and how the run went."""
+        records = [self._store.stored.get(identity_key(job)) for job in jobs]
+        found = [record for record in records if record is not None]
+        return RunSummary(
+            total=len(jobs),
+            played=len(self.tries),
+            errors=tuple(record for record in found if record.outcome == "error"),
+            missing=len(jobs) - len(found),
+            video_errors=tuple(self.video_errors),
+            unreachable=tuple(self.unreachable),
+        )
+
+    def _store_record(self, job: Job, record: Record) -> None:
+        """Store a record, and count and report it; raises if it is of other versions than ours."""
+        _refuse_other_versions(
+            record, f"A worker returned {record.slug} with", "the record was not stored"
+        )
+        # Only code in the world's process can write this, such as a policy that patches the judge.
+        if record.outcome == "success" and record.cause is not None:
+            cause = format_cause("policy", f"a success came with a cause ({record.cause})")
+            record.record_error("policy", cause[:MAX_CAUSE_LENGTH])
+        earlier = self._store.stored.get(identity_key(job))
+        if earlier is not None:
+            record.attempt += earlier.attempt
+        self._store.append(record)
+        self.tries[job] += 1
+        self._reporter.advance(record, is_new=self.tries[job] == 1)
+        if record.video_error:
+            self.video_errors.append(record.video_error)
+
+    def _should_retry(self, job: Job, record: Record) -> bool:
+        return (
+            record.error in self._plan.attempts.retry_on
+            and self.tries[job] < self._plan.attempts.tries
+            and job.policy not in self.unreachable
+        )
+
+    def _is_unreachable(self, record: Record) -> bool:
+        """Count a policy's connection errors in a row; return whether this one is the last.
+
+        It is if there are `UNREACHABLE_AFTER` now: then the policy is given up, with a warning.
+        """
+        policy = record.policy
+        if record.error != "connection":
+            self._connection_errors[policy] = 0
+            return False
+        self._connection_errors[policy] += 1
+        if self._connection_errors[policy] != UNREACHABLE_AFTER:
+            return False
+        self.unreachable.append(policy)
+        self._reporter.warn(
+            f"{policy} could not be reached in {UNREACHABLE_AFTER} episodes in a row "
+            f"({record.cause}); this run skips its remaining episodes."
+        )
+        return True
+
+
+def _refuse_other_versions(record: Summary, found: str, end: str) -> None:
+    """Refuse a record of another language, of other words or of another environment.
+
+    Args:
+        record: that was found.
+        found: how the sentence begins, up to what differs.
+        end: how it ends.
+    """
+    for what, version, ours in other_versions(record):
+        raise StoreError(f"{found} {what} {version}, but this roboirg has version {ours}; {end}.")
+
+
+def _report_torn_line(store: RecordStore, reporter: Reporter) -> None:
+    """Warn of a line that an earlier run did not finish, if there was one."""
+    if store.torn:
+        reporter.warn(
+            f"An earlier run was stopped while it wrote a record; moved the unfinished line "
+            f"({counted(len(store.torn), 'byte')}) to {store.folder / TORN_FILE}."
+        )
+
+
+def _warn_of_untrained(plan: Plan, reporter: Reporter) -> None:
+    """Name the tasks that a policy plays without having been trained on them, if that is known."""
+    for policy in plan.policies:
+        if policy.needs is None or policy.needs.trained_tasks is None:
+            continue
+        trained = policy.needs.trained_tasks
+        untrained = [task for task in plan.tasks if task not in trained]
+        if untrained:
+            reporter.warn(
+                f"{policy.name} plays {', '.join(untrained)}, which it was not trained on: it was "
+                f"trained on {', '.join(trained)}."
+            )
+
+
+def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> None:
+    """Raise if a run's folder has records of other versions, as rates must not mix them.
+
+    Compared are the versions of this package and of words, the seeds of scenes, and the policies.
+    """
+    for record in records:
+        _refuse_other_versions(record, f"{folder} holds episodes of", "choose another --out")
+    scenes = {(record.task, record.split, record.episode, record.seed) for record in records}
+    for task, split, episode, seed in scenes:
+        expected: str | int = "no such episode"
+        with contextlib.suppress(InvalidValueError):
+            expected = get_episode(task, split, episode).seed
+        if seed != expected:
+            raise StoreError(
+                f"{folder} holds {task} {split}/{episode} with scene seed {seed}, but this roboirg "
+                f"has {expected}; choose another --out."
+            )
+    _check_policies(plan, records, folder)
+
+
+def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> None:
+    """Refuse records of another policy of the same name, or of another version of it."""
+    planned = {ref.name: ref for ref in plan.policies}
+    played = {(record.policy, record.policy_versions, record.outcome) for record in records}
+    for name, versions, outcome in played:
+        policy = planned.get(name)
+        if policy is None:
+            continue
+        # Two versions that could not be read may differ, so a verdict counts even with such a
+        # version; an error with one does no harm.
+        is_known = outcome != "error" or versions.policy_version != policy.version
+        if policy.problem is not None and is_known:
+            raise StoreError(
+                f"{folder} holds episodes of {name} version {versions.policy_version}, but the "
+                f"policy cannot be opened to read its version now ({policy.problem}); choose "
+                "another --out."
+            )
+        check_same(folder, name, versions.differences(policy.versions))
+
+
+@contextlib.contextmanager
+def _sigterm_interrupts() -> Iterator[None]:
+    """Treat SIGTERM like Ctrl-C: end the workers and keep the records."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread can handle signals
+        return
+
+    received = threading.Event()
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        received.set()
+        raise Terminated
+
+    earlier_handler = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    except KeyboardInterrupt as error:  # a library such as Ray may raise it in place of ours
+        kind = Terminated if received.is_set() else type(error)
+        raise kind from error
+    finally:
+        signal.signal(signal.SIGTERM, earlier_handler)

@@ -1,0 +1,1 @@
+"""Statistics of trials, from numbers alone: cells, rates, intervals, paired tests, power."""

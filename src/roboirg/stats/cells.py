@@ -1,0 +1,175 @@
+"""Trials of one task that are counted together, and groups of them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.stats.intervals import (
+    DRAWS,
+    Interval,
+    Rows,
+    resampled_interval,
+    resampled_rates,
+    wilson_interval,
+)
+
+
+class Trial(NamedTuple):
+    """One play of one episode."""
+
+    episode: int
+    policy_seed: int
+
+
+class Counts(NamedTuple):
+    """Numbers of trials.
+
+    Attributes:
+        successes: trials that succeeded.
+        trials: trials with a verdict.
+        episodes: episodes with a verdict.
+        errors: trials that ended in an error and are in no rate.
+        missing: planned trials without a result.
+    """
+
+    successes: int = 0
+    trials: int = 0
+    episodes: int = 0
+    errors: int = 0
+    missing: int = 0
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every planned trial has a verdict."""
+        return self.trials > 0 and not self.errors and not self.missing
+
+
+@dataclass(slots=True)
+class Cell:
+    """Trials of one task.
+
+    Attributes:
+        verdicts: for each trial with a verdict, whether it succeeded.
+        errors: number of trials that ended in an error.
+        missing: number of planned trials without a result.
+    """
+
+    verdicts: dict[Trial, bool] = field(default_factory=dict)
+    errors: int = 0
+    missing: int = 0
+
+    def add(self, trial: Trial, outcome: str) -> None:
+        """Count a trial: ``success``, ``failure``, ``error``, or ``missing``.
+
+        Raises:
+            InvalidValueError: the outcome is none of these.
+        """
+        if outcome in ("success", "failure"):
+            self.verdicts[trial] = outcome == "success"
+        elif outcome == "error":
+            self.errors += 1
+        elif outcome == "missing":
+            self.missing += 1
+        else:
+            raise InvalidValueError(
+                f"The column 'outcome' has {outcome!r}; it must be success, failure, error or "
+                "missing."
+            )
+
+    @property
+    def counts(self) -> Counts:
+        """The numbers of trials."""
+        return Counts(
+            successes=sum(self.verdicts.values()),
+            trials=len(self.verdicts),
+            episodes=len({trial.episode for trial in self.verdicts}),
+            errors=self.errors,
+            missing=self.missing,
+        )
+
+    @property
+    def rate(self) -> Fraction | None:
+        """Success rate, the mean over policy seeds; None without a verdict."""
+        if not self.verdicts:
+            return None
+        return Fraction(sum(self.verdicts.values()), len(self.verdicts))
+
+    def by_episode(self) -> dict[int, dict[int, bool]]:
+        """Return for each episode whether it succeeded, by policy seed."""
+        episodes: dict[int, dict[int, bool]] = defaultdict(dict)
+        for (episode, policy_seed), has_succeeded in self.verdicts.items():
+            episodes[episode][policy_seed] = has_succeeded
+        return episodes
+
+    def rows(self) -> Rows:
+        """Return successes and trials of each episode, sorted by it, shape (episodes, 2)."""
+        rows = []
+        for _, verdicts in sorted(self.by_episode().items()):
+            row = (sum(verdicts.values()), len(verdicts))
+            rows.append(row)
+        return np.array(rows, dtype=np.int64).reshape(-1, 2)
+
+
+Columns = Mapping[str, Any]
+"""A frame, or the data frame that `roboirg.results` returns."""
+Key = tuple[Any, ...]
+"""What a group is about: the values of the columns that it is grouped by."""
+TRIAL = ("task", "episode", "policy_seed", "outcome")
+"""Columns that tell a trial and its end."""
+ByTask = Mapping[str, Cell]
+NOTHING: ByTask = {}
+
+
+def gather(frame: Columns, by: Sequence[str]) -> Mapping[Key, ByTask]:
+    """Group the rows of a frame by some columns, in the order in which their values occur.
+
+    Grouped by policy and setting, ``{("oracle", "direct"): {"StopCube": Cell(…)}}``. The frame has
+    the columns of `TRIAL`, too.
+    """
+    groups: dict[Key, dict[str, Cell]] = {}
+    for row in rows_of(frame, *by, *TRIAL):
+        *key, task, episode, policy_seed, outcome = row
+        cells = groups.setdefault(tuple(key), {})
+        if task not in cells:
+            cells[task] = Cell()
+        cells[task].add(Trial(episode, policy_seed), outcome)
+    return groups
+
+
+def rows_of(frame: Columns, *names: str) -> Iterator[Key]:
+    """Return the values of each row in some columns."""
+    columns = [frame[name] for name in names]
+    return zip(*columns, strict=True)
+
+
+def clustered_interval(
+    tasks: Sequence[Cell], rng: np.random.Generator, draws: int = DRAWS
+) -> Interval | None:
+    """Return the bootstrap interval, over episodes, of a success rate or its mean over tasks.
+
+    Used with several policy seeds and for averages over tasks. None with fewer than two episodes
+    per task on average, or if a task has none.
+    """
+    rows = [cell.rows() for cell in tasks]
+    sizes = [len(task_rows) for task_rows in rows]
+    if not sizes or 0 in sizes:
+        return None
+    rates = resampled_rates(rows, rng, draws)[:, 0]
+    return resampled_interval(rates, sizes)
+
+
+def cell_interval(cell: Cell, rng: np.random.Generator) -> Interval | None:
+    """Return the interval of a cell's rate: Wilson's, or clustered with several policy seeds."""
+    counts = cell.counts
+    if not counts.trials:
+        return None
+    if counts.episodes < counts.trials:
+        return clustered_interval([cell], rng)
+    return wilson_interval(counts.successes, counts.trials)

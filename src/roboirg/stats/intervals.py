@@ -1,0 +1,149 @@
+"""Wilson's interval of a rate, and the bootstrap over episodes behind all other intervals.
+
+Results of several policy seeds in the same episode are correlated: an episode that is hard for one
+seed is hard for the next. So the bootstrap resamples episodes, not trials.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.core.extras import extra_needed
+
+Z_95 = 1.959963984540054
+"""Two-sided 95 % quantile of the normal distribution."""
+ALPHA = 0.05
+"""Share of intervals that may miss the true value, and of tests that may raise a false alarm."""
+SEED = 20_240_607
+"""Of all bootstraps that are shown; the same records give the same numbers."""
+DRAWS = 4000
+"""Bootstrap resamples; the ends of an interval then vary by about 3 % of its length."""
+TOO_FEW = "too few episodes"
+"""Printed in place of an interval: it takes more episodes than tasks."""
+_ROUNDING = 1e-9
+"""Ends of an interval that are closer are equal."""
+
+Rows = NDArray[np.int64]
+"""A row for each episode with k pairs of successes and trials, shape (episodes, 2 k)."""
+
+
+Draws = NDArray[np.float64]
+"""A rate, a gap or several for each resample, shape (draws,) or (draws, k)."""
+
+
+class Interval(NamedTuple):
+    """A 95 % confidence interval."""
+
+    low: float
+    high: float
+
+    @property
+    def has_width(self) -> bool:
+        """Whether the ends differ by more than rounding."""
+        return self.high - self.low > _ROUNDING
+
+
+def wilson_interval(successes: int, trials: int) -> Interval:
+    """Return Wilson's score interval of a proportion, of one trial or more, all independent."""
+    rate = successes / trials
+    weight = Z_95 * Z_95 / trials
+    center = (rate + weight / 2) / (1 + weight)
+    deviation = math.sqrt(rate * (1 - rate) / trials + weight / (4 * trials))
+    half_width = Z_95 * deviation / (1 + weight)
+    # The formula gives exactly 0 and 1 at the ends; floating point may not.
+    low = 0.0 if successes == 0 else center - half_width
+    high = 1.0 if successes == trials else center + half_width
+    return Interval(low, high)
+
+
+def resampled_rates(tasks: Sequence[Rows], rng: np.random.Generator, draws: int = DRAWS) -> Draws:
+    """Return success rates over resampled episodes, as unweighted means over tasks.
+
+    Draws equal rows together, as multinomial counts. The distribution is that of drawing single
+    episodes, but the time does not depend on their number, nor the result on their order.
+
+    Args:
+        tasks: for each task its episodes, shape (episodes, 2 k): k pairs of successes and trials.
+            Each task is resampled by itself.
+        rng: source of the resamples.
+        draws: number of resamples.
+
+    Returns:
+        Shape (draws, k); nan where a resample has no trial.
+    """
+    rates = []
+    for rows in tasks:
+        # The distinct rows, and how many episodes have each.
+        kinds, counts = np.unique(rows, axis=0, return_counts=True)
+        drawn_counts = rng.multinomial(len(rows), counts / len(rows), size=draws)
+        sums = drawn_counts @ kinds
+        successes = sums[:, 0::2]
+        trials = sums[:, 1::2]
+        with np.errstate(invalid="ignore"):
+            rates.append(successes / trials)
+    return np.asarray(np.mean(rates, axis=0), dtype=np.float64)
+
+
+def percentile_interval(values: Draws, sizes: Sequence[int]) -> Interval | None:
+    """Return the middle 95 % of resampled values; None with too few episodes.
+
+    Args:
+        values: one for each resample; nan counts as the extreme value on either side.
+        sizes: number of episodes of each task.
+    """
+    if sum(sizes) <= len(sizes):
+        return None
+    level = _lower_level(sizes)
+    lows = np.where(np.isnan(values), -np.inf, values)
+    highs = np.where(np.isnan(values), np.inf, values)
+    return Interval(
+        float(np.quantile(lows, level, method="inverted_cdf")),
+        float(np.quantile(highs, 1 - level, method="inverted_cdf")),
+    )
+
+
+def resampled_interval(values: Draws, sizes: Sequence[int], least: float = 0.0) -> Interval | None:
+    """Return `percentile_interval`, or `without_spread` if all resamples have the same value.
+
+    None with too few episodes: also if so many resamples have no trial that an end is not bounded,
+    or if the others all have the same value.
+    """
+    interval = percentile_interval(values, sizes)
+    if interval is None or not np.isfinite(interval).all():
+        return None
+    if interval.has_width:
+        return interval
+    if np.isnan(values).any():
+        return None
+    return without_spread(interval.low, sum(sizes), least)
+
+
+def without_spread(value: float, episodes: int, least: float = 0.0) -> Interval:
+    """Return the interval if all episodes have the same value, so that resampling has no spread.
+
+    A share of all episodes up to Wilson's upper end for 0 of n may have other values, from `least`
+    to 1. For rates of 0 and 1 this is Wilson's interval on episodes.
+    """
+    other_share = wilson_interval(0, episodes).high
+    same_part = (1 - other_share) * value
+    return Interval(same_part + other_share * least, same_part + other_share)
+
+
+def _lower_level(sizes: Sequence[int]) -> float:
+    """Return the quantile level of lower ends that keeps intervals from being too short.
+
+    Resampled means have a variance too small by (n - 1) / n, and normal quantiles instead of
+    Student's; quantiles further out correct both (the expanded percentile interval of Hesterberg,
+    The American Statistician 69, 2015).
+    """
+    with extra_needed("Intervals of several seeds or tasks need SciPy", "report"):
+        from scipy import special  # SciPy's statistics take a second to import
+
+    freedom = sum(sizes) - len(sizes)
+    widening = math.sqrt(sum(sizes) / freedom)
+    return float(special.ndtr(widening * special.stdtrit(freedom, ALPHA / 2)))

@@ -1,0 +1,266 @@
+"""Paired comparison of two cells on the same episodes: gap, test, retention, overlap."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.stats.cells import Cell
+from roboirg.stats.intervals import (
+    DRAWS,
+    Draws,
+    Interval,
+    Rows,
+    percentile_interval,
+    resampled_interval,
+    resampled_rates,
+    without_spread,
+)
+
+
+class Overlap(NamedTuple):
+    """Outcomes of two cells in the trials (episode and policy seed) that they share.
+
+    Attributes:
+        both: trials that succeed in both cells.
+        only_first: trials that succeed in the first cell alone.
+        only_second: trials that succeed in the second cell alone.
+        neither: trials that succeed in neither cell.
+    """
+
+    both: int
+    only_first: int
+    only_second: int
+    neither: int
+
+    @property
+    def trials(self) -> int:
+        """Number of shared trials."""
+        return sum(self)
+
+    @property
+    def discordance(self) -> float | None:
+        """Share of the trials that succeed in exactly one cell; None without trials."""
+        if not self.trials:
+            return None
+        return (self.only_first + self.only_second) / self.trials
+
+
+@dataclass(frozen=True, slots=True)
+class Pairs:
+    """Two cells of one task, paired by episode.
+
+    Attributes:
+        rows: for each episode with verdicts in both cells, successes and trials of the first,
+            then of the second; shape (episodes, 4). Counts the policy seeds that both cells have,
+            or all seeds if they share none.
+        overlap: of the trials that both cells have.
+    """
+
+    rows: Rows
+    overlap: Overlap
+
+    @classmethod
+    def of(cls, first: Cell, second: Cell) -> Pairs:
+        """Pair two cells of the same task.
+
+        An episode in which the first succeeded with one of two seeds, and the second with both,
+        has the row ``(1, 2, 2, 2)``.
+        """
+        first_episodes = first.by_episode()
+        second_episodes = second.by_episode()
+        rows = []
+        for episode in sorted(first_episodes.keys() & second_episodes.keys()):
+            ours = first_episodes[episode]
+            theirs = second_episodes[episode]
+            shared_seeds = ours.keys() & theirs.keys()
+            if shared_seeds:
+                ours = {seed: ours[seed] for seed in shared_seeds}
+                theirs = {seed: theirs[seed] for seed in shared_seeds}
+            row = (sum(ours.values()), len(ours), sum(theirs.values()), len(theirs))
+            rows.append(row)
+        return cls(np.array(rows, dtype=np.int64).reshape(-1, 4), _overlap(first, second))
+
+    @property
+    def trials(self) -> int:
+        """Number of trials of both cells."""
+        return int(self.rows[:, 1::2].sum())
+
+    @property
+    def differences(self) -> NDArray[np.int64]:
+        """First less second in each episode, in whole numbers.
+
+        In trials if both cells have equally many in every episode, else in success rates times
+        both numbers of trials.
+        """
+        first, first_trials, second, second_trials = self.rows.T
+        if np.array_equal(first_trials, second_trials):
+            return np.asarray(first - second)
+        return np.asarray(first * second_trials - second * first_trials)
+
+
+def _overlap(first: Cell, second: Cell) -> Overlap:
+    """Return how the trials ended that two cells share."""
+    counts: Counter[tuple[bool, bool]] = Counter()
+    for trial, first_won in first.verdicts.items():
+        if trial in second.verdicts:
+            counts[first_won, second.verdicts[trial]] += 1
+    return Overlap(
+        both=counts[True, True],
+        only_first=counts[True, False],
+        only_second=counts[False, True],
+        neither=counts[False, False],
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Difference between two cells of a task, or the unweighted mean over several tasks.
+
+    Attributes:
+        value: success rate of the first less that of the second on the same episodes, -1 to 1.
+        interval: of the value, from the paired bootstrap over episodes.
+        p_value: of the null hypothesis of no difference; not corrected.
+        retention: success rate of the first by that of the second; None if the latter is 0.
+        retention_interval: of the retention; ends that the data do not bound are infinite.
+        tasks: number of tasks with pairs.
+        episodes: number of paired episodes.
+        trials: number of paired trials, of both.
+        overlap: of their trials.
+    """
+
+    value: float
+    interval: Interval | None
+    p_value: float
+    retention: float | None
+    retention_interval: Interval | None
+    tasks: int
+    episodes: int
+    trials: int
+    overlap: Overlap
+
+
+class PairedRates(NamedTuple):
+    """Success rates of two cells on the same episodes, as means over tasks, 0 to 1."""
+
+    first: float
+    second: float
+
+
+def paired_rates(tasks: Sequence[Pairs]) -> PairedRates | None:
+    """Return the rates over the tasks that have pairs; None if no task has any."""
+    sums = [pairs.rows.sum(axis=0) for pairs in tasks if len(pairs.rows)]
+    if not sums:
+        return None
+    counts = np.array(sums, dtype=np.float64)
+    successes = counts[:, 0::2]  # of both cells, a row for each task
+    trials = counts[:, 1::2]
+    return PairedRates._make(np.mean(successes / trials, axis=0).tolist())
+
+
+def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = DRAWS) -> Gap | None:
+    """Measure the gap over the tasks that have pairs; None if no task has any.
+
+    Args:
+        tasks: the pairs of each task.
+        rng: source of the resamples.
+        draws: number of resamples.
+    """
+    paired = [pairs for pairs in tasks if len(pairs.rows)]
+    rates = paired_rates(paired)
+    if rates is None:
+        return None
+    rows = [pairs.rows for pairs in paired]
+    sizes = list(map(len, rows))
+    drawn = resampled_rates(rows, rng, draws)
+    drawn_gaps = drawn[:, 0] - drawn[:, 1]
+    differences = np.concatenate([pairs.differences for pairs in paired])
+    overlaps = np.sum([pairs.overlap for pairs in paired], axis=0)
+
+    retention: float | None = None
+    retention_interval: Interval | None = None
+    if rates.second:
+        retention = rates.first / rates.second
+        retention_interval = _retention_interval(drawn, sizes, rates)
+    return Gap(
+        value=rates.first - rates.second,
+        interval=resampled_interval(drawn_gaps, sizes, least=-1.0),
+        p_value=sign_flip_test(differences),
+        retention=retention,
+        retention_interval=retention_interval,
+        tasks=len(paired),
+        episodes=sum(sizes),
+        trials=sum(pairs.trials for pairs in paired),
+        overlap=Overlap._make(overlaps.tolist()),
+    )
+
+
+def sign_flip_test(differences: NDArray[np.int64]) -> float:
+    """Return the two-sided p-value of the exact sign-flip test.
+
+    Compares the sum of the differences with the sums of all ways to swap the two cells within
+    episodes. With one policy seed the differences are -1, 0 and 1, and this is McNemar's exact
+    test; with several seeds it stays valid although the seeds of an episode are correlated.
+    """
+    nonzero = differences[differences != 0]
+    if not len(nonzero):
+        return 1.0
+    sizes = np.abs(nonzero)
+    sizes //= np.gcd.reduce(sizes)  # smaller numbers with the same chances, so fewer sums
+    total = int(sizes.sum())
+
+    # Probability of each sum of the sizes that get a positive sign, from 0 to all.
+    chances = np.zeros(total + 1)
+    chances[0] = 1.0
+    for size in sizes.tolist():
+        chances[size:] = (chances[size:] + chances[:-size]) / 2
+        chances[:size] /= 2
+
+    # With that sum positive, the others are negative: the signed sum is twice it less all.
+    signed_sums = 2 * np.arange(total + 1) - total
+    positive = int(sizes[nonzero > 0].sum())
+    is_as_far = np.abs(signed_sums) >= abs(2 * positive - total)
+    return min(1.0, float(chances[is_as_far].sum()))
+
+
+def _retention_interval(drawn: Draws, sizes: Sequence[int], rates: PairedRates) -> Interval | None:
+    """Return the interval of the first rate by the second, which is not 0.
+
+    Args:
+        drawn: both rates in each resample, shape (draws, 2).
+        sizes: number of episodes of each task.
+        rates: as measured.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        retentions = drawn[:, 0] / drawn[:, 1]
+    interval = percentile_interval(retentions, sizes)
+    if interval is None:
+        return None
+    if interval.has_width:
+        return Interval(max(0.0, interval.low), interval.high)
+    first = without_spread(rates.first, sum(sizes))
+    second = without_spread(rates.second, sum(sizes))
+    return Interval(first.low / second.high, first.high / second.low)
+
+
+def holm(p_values: Sequence[float]) -> tuple[float, ...]:
+    """Return p-values after Holm's correction, in the given order.
+
+    For example 0.01 and 0.04 become 0.02 and 0.04: the smallest is multiplied by the number of
+    tests, the next one by one less, and none is smaller than one before it.
+
+    Rejecting those of at most 0.05 keeps the probability of any false alarm at 0.05 or below,
+    whatever the dependence between the tests.
+    """
+    # Statsmodels has this too, but collects garbage in every call, which visits all records.
+    values = np.asarray(p_values, dtype=np.float64)
+    order = np.argsort(values)
+    factors = np.arange(len(values), 0, -1)  # the smallest p-value times the number of tests
+    adjusted = np.empty_like(values)
+    adjusted[order] = np.maximum.accumulate(values[order] * factors)
+    return tuple(np.minimum(adjusted, 1.0).tolist())

@@ -1,0 +1,120 @@
+"""Power of a paired comparison: the episodes it needs and the gaps it can detect.
+
+Exact for McNemar's exact test with one policy seed. More seeds on the same episodes add power, but
+less than the same number of new episodes, so these figures are conservative for them.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from roboirg.stats.intervals import ALPHA
+
+POWER = 0.8
+"""The usual choice of a wanted power."""
+MAX_EPISODES = 100_000
+"""Larger numbers of episodes are not reported."""
+_MAX_DEVIATIONS = 10.0
+"""Standard deviations beyond which probabilities are negligible."""
+_TOLERANCE = 1e-4
+"""Precision of a smallest gap: a hundredth of a point."""
+
+
+def mcnemar_power(episodes: int, gap: float, discordance: float) -> float:
+    """Return the probability that the exact test finds a difference.
+
+    Args:
+        episodes: played by both, at least one.
+        gap: difference of the two success rates, -1 to 1.
+        discordance: share of the episodes that exactly one of the two solves; at least the gap.
+    """
+    if discordance == 0:
+        return 0.0
+    from scipy import stats
+
+    rejections = _rejections(episodes, discordance)
+    counts = rejections.discordant
+    # Share of the discordant episodes that the better one solves.
+    share = (1 + abs(gap) / discordance) / 2
+    rejected = stats.binom.cdf(rejections.most_wins, counts, share)
+    rejected += stats.binom.cdf(rejections.most_wins, counts, 1 - share)
+    chances = stats.binom.pmf(counts, episodes, discordance)
+    return float(chances @ np.minimum(rejected, 1.0))
+
+
+def episodes_needed(gap: float, discordance: float) -> int | None:
+    """Return the episodes that detect a gap with the wanted power; None above `MAX_EPISODES`.
+
+    The power of an exact test rises in a sawtooth; the number has the wanted power and is at most
+    one tooth above the smallest such number.
+    """
+    if gap == 0:
+        return None
+    # Doubles an upper bound first, and then halves the distance to the lower one.
+    low = 1
+    high = 2
+    while mcnemar_power(high, gap, discordance) < POWER:
+        if high >= MAX_EPISODES:
+            return None
+        low = high
+        high = min(2 * high, MAX_EPISODES)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if mcnemar_power(middle, gap, discordance) >= POWER:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+def smallest_gap(episodes: int, discordance: float) -> float | None:
+    """Return the smallest gap that episodes detect with the wanted power, 0 to 1.
+
+    Returns:
+        None if even the largest gap, with all discordant episodes on one side, is not detected.
+    """
+    if mcnemar_power(episodes, discordance, discordance) < POWER:
+        return None
+    low = 0.0
+    high = discordance
+    while high - low > _TOLERANCE:
+        middle = (low + high) / 2
+        if mcnemar_power(episodes, middle, discordance) >= POWER:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+class _Rejections(NamedTuple):
+    """When the test rejects.
+
+    Attributes:
+        discordant: numbers of discordant episodes, but for those with a negligible probability.
+        most_wins: for each, the most wins of the rarer side with which the test rejects; -1 if it
+            never does.
+    """
+
+    discordant: NDArray[np.int64]
+    most_wins: NDArray[np.float64]
+
+
+@functools.lru_cache(maxsize=64)
+def _rejections(episodes: int, discordance: float) -> _Rejections:
+    """Return when the test rejects; numbers with a probability below 1e-20 are left out."""
+    from scipy import stats
+
+    center = episodes * discordance
+    reach = _MAX_DEVIATIONS * math.sqrt(center * (1 - discordance)) + _MAX_DEVIATIONS
+    least = max(0, math.floor(center - reach))
+    most = min(episodes, math.ceil(center + reach))
+    discordant = np.arange(least, most + 1)
+    most_wins = stats.binom.ppf(ALPHA / 2, discordant, 0.5)
+    # The quantile is the first number that is not below the level; the test must not exceed it.
+    most_wins -= stats.binom.cdf(most_wins, discordant, 0.5) > ALPHA / 2
+    return _Rejections(discordant, most_wins)

@@ -1,0 +1,103 @@
+"""Printed rates and gaps, and averages of printed rates.
+
+In tables of the paper a cell is rounded half up to two decimals, and an average is the mean of the
+rounded cells, again rounded half up. This rule gives every published average to the last digit;
+means of the unrounded rates differ in the last digit in six of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from decimal import ROUND_HALF_UP, Decimal
+from fractions import Fraction
+from typing import NamedTuple
+
+from roboirg.stats.intervals import TOO_FEW, Interval
+from roboirg.stats.paired_tests import Gap
+
+NOT_APPLICABLE = "–"
+DIGITS = Decimal("0.01")
+
+_SMALLEST_P = 0.001
+
+
+def percent(rate: Fraction) -> Decimal:
+    """Return a rate from 0 to 1 in percent with two decimals, rounded half up."""
+    return _rounded(100 * rate)
+
+
+def mean_percent(cells: Sequence[Decimal]) -> Decimal:
+    """Return the unweighted mean of printed rates, rounded by the same rule."""
+    total = sum((Fraction(cell) for cell in cells), Fraction(0))
+    return _rounded(total / len(cells))
+
+
+def change_text(change: Decimal) -> str:
+    """Return the difference of two printed rates with an arrow: ``↑1.33``, ``→0.00``."""
+    arrow = "→"
+    if change > 0:
+        arrow = "↑"
+    elif change < 0:
+        arrow = "↓"
+    return f"{arrow}{abs(change)}"
+
+
+def whole_percent(rate: float | Fraction) -> str:
+    """Return a rate from 0 to 1 as a whole percentage."""
+    return f"{100 * float(rate):.0f}"
+
+
+def percent_range(low: Fraction, high: Fraction) -> str:
+    """Return two rates as whole percentages, one if they are equal then: ``3–7``."""
+    low_text = whole_percent(low)
+    high_text = whole_percent(high)
+    return low_text if low_text == high_text else f"{low_text}–{high_text}"
+
+
+def points(gap: float, decimals: int = 0) -> str:
+    """Return a gap in signed percentage points, with a proper minus: ``−12``, ``+3``, ``±0``."""
+    text = f"{100 * gap:+.{decimals}f}".replace("-", "−")
+    is_zero = not text.strip("+−0.")
+    return f"±{text[1:]}" if is_zero else text
+
+
+def interval_note(interval: Interval | None) -> str:
+    """Return the ends of a gap's interval in brackets, after a blank, or why it has none."""
+    if interval is None:
+        return f" ({TOO_FEW})"
+    low = points(interval.low, 1)
+    high = points(interval.high, 1)
+    return f" (95 % interval {low} to {high})"
+
+
+def p_text(p_value: float) -> str:
+    """Return a p-value with its sign: ``p = 0.012``, ``p < 0.001``."""
+    return f"p < {_SMALLEST_P}" if p_value < _SMALLEST_P else f"p = {p_value:.3f}"
+
+
+class GapWords(NamedTuple):
+    """A gap in points, its interval, and its corrected p-value, as cells of a table."""
+
+    gap: str
+    interval: str
+    p_value: str
+
+
+def gap_words(gap: Gap | None, p_value: float | None) -> GapWords:
+    """Return a gap with its corrected p-value for a table; dashes without one."""
+    if gap is None:
+        return GapWords(NOT_APPLICABLE, NOT_APPLICABLE, NOT_APPLICABLE)
+    interval = TOO_FEW
+    if gap.interval is not None:
+        interval = f"{points(gap.interval.low, 1)} to {points(gap.interval.high, 1)}"
+    p_words = NOT_APPLICABLE
+    if p_value is not None:
+        p_words = p_text(p_value).removeprefix("p ").removeprefix("= ")
+    return GapWords(points(gap.value, 1), interval, p_words)
+
+
+def _rounded(value: Fraction) -> Decimal:
+    """Round half up to two decimals: 1/8 becomes 0.13."""
+    # In integers: rounding a decimal quotient would round twice.
+    hundredths = (200 * value.numerator + value.denominator) // (2 * value.denominator)
+    return (Decimal(hundredths) * DIGITS).quantize(DIGITS, ROUND_HALF_UP)

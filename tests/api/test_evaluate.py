@@ -1,0 +1,201 @@
+"""`roboirg.evaluate` and its results; the episodes are not played but for one test."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from made_records import make_record
+
+import roboirg
+from roboirg.analysis.run_results import Results
+from roboirg.api import python_run
+from roboirg.core.errors import InvalidValueError, MissingDependencyError, UnknownNameError
+from roboirg.records.record import Job, Record
+from roboirg.records.store import RECORDS_FILE, read_records
+from roboirg.runs.plan.stored_plans import read_plan
+
+
+class Still:
+    """A policy that stands still."""
+
+    cameras = ()
+    version = "1"
+
+    def __init__(self, reach: float = 1.0) -> None:
+        self.reach = reach
+        self.instructions: list[str] = []
+
+    def reset(self, instruction, demonstration) -> None:
+        self.instructions.append(instruction)
+
+    def act(self, observation):
+        return np.tile(np.append(observation["joint_positions"], 1.0), (16, 1))
+
+
+@pytest.fixture
+def unplayed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Episodes are decided by their setting."""
+
+    def play(job: Job) -> Record:
+        won = job.policy != "forgetful" or job.setting == "explicit"
+        return make_record(job, *(("success",) if won else ("failure", "wrong")))
+
+    monkeypatch.setattr(python_run, "episode_runner", lambda plan, folder: play)
+
+
+QUICK = {"tasks": "PickXtimes", "episodes": 3, "workers": 0, "progress": False}
+
+
+def test_results_are_those_of_the_records(unplayed: None, tmp_path: Path) -> None:
+    results = roboirg.evaluate(
+        ["listener", "forgetful"], settings=("explicit", "direct"), forms=["implicit", "resolved"],
+        out=tmp_path, **QUICK,
+    )  # fmt: skip
+    assert results.records == read_records(tmp_path)
+    assert (len(results.records), results.errors, results.missing) == (2 * 3 * 3, 0, 0)
+    assert results.rates() == {
+        (policy, setting): float(policy == "listener" or setting == "explicit")
+        for policy in ("listener", "forgetful")
+        for setting in ("explicit", "direct", "direct (resolved)")
+    }
+    assert results.frame.equals(roboirg.results(tmp_path))
+    assert "listener" in results.table(published=True)
+    assert results.table("main", "latex").startswith("% needs")
+    assert "direct: no clear difference, +100.0 points" in results.compare("listener", "forgetful")
+    assert results._repr_markdown_().startswith("### Success by task and setting")
+    assert "forgetful explicit: 100.0 %" in repr(results)
+    with pytest.raises(UnknownNameError):
+        results.compare("listener", "nobody")
+    *lines, _, _ = (tmp_path / RECORDS_FILE).read_text().splitlines(keepends=True)
+    (tmp_path / RECORDS_FILE).write_text("".join(lines))
+    cut = Results(tmp_path)
+    assert (len(cut.frame), cut.errors, cut.missing) == (2 * 3 * 3 - 2, 0, 2)
+
+
+def test_results_have_figures_and_a_page(unplayed: None, tmp_path: Path) -> None:
+    results = roboirg.evaluate(
+        "listener", settings="explicit,direct", forms="implicit,resolved", out=tmp_path, **QUICK
+    )
+    assert results.plot("gaps")._repr_png_().startswith(b"\x89PNG")
+    assert results.report().read_text().startswith("<!doctype html>")
+    results.plot("gaps", published=True).save(tmp_path / "a.svg")
+    assert "<!-- MemER -->" in (tmp_path / "a.svg").read_text()
+    with pytest.raises(InvalidValueError, match="nothing to draw for 'context'"):
+        results.plot("context")
+
+
+def test_the_same_folder_resumes_and_none_makes_a_new_one(
+    unplayed: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for settings in ("explicit", "all"):
+        roboirg.evaluate("oracle", settings=settings, out="kept", **QUICK)
+    assert len(read_records(tmp_path / "kept")) == 3 * 5
+    first, second = (roboirg.evaluate("oracle", settings="explicit", **QUICK) for _ in range(2))
+    assert first.folder.parent == second.folder.parent == tmp_path / "runs"
+    assert first.folder != second.folder
+
+
+def test_classes_and_objects_play_in_this_process(unplayed: None, tmp_path: Path, capsys) -> None:
+    given = Still(reach=0.5)
+    options = {**QUICK, "out": tmp_path, "progress": True}
+    results = roboirg.evaluate({"mine": given, "class": Still}, **options)
+    assert read_plan(tmp_path).hosting.policy_process == "shared"
+    assert {one.policy for one in results.records} == {"mine", "class"}
+    heard = capsys.readouterr().err
+    assert "No other process has mine: all episodes are played in this one" in heard
+    for policy, options, words in (
+        (given, {"workers": 2}, "exists in this process only"),
+        ([Still(), Still], {}, "same name"),
+        (object(), {}, "has no method"),
+    ):
+        with pytest.raises(InvalidValueError, match=words):
+            roboirg.evaluate(policy, out=tmp_path, **{**QUICK, **options})
+
+
+class Insider(Still):
+    def attach(self, env) -> None:
+        pass
+
+
+@pytest.mark.parametrize("policy", [Insider(), f"{__name__}:Insider"])
+def test_privilege_is_declared(unplayed: None, tmp_path: Path, policy) -> None:
+    options = {**QUICK, "out": tmp_path, "policy_process": "shared"}
+    with pytest.raises(InvalidValueError, match=r"has attach\(\).*roboirg\.Privileged\(policy\)"):
+        roboirg.evaluate(policy, **options)
+    both = [roboirg.Privileged(policy), Still()]
+    results = roboirg.evaluate(both, **options)
+    assert {(one.policy.split(":")[-1], one.privileged) for one in results.records} == {
+        ("Insider", True), ("Still", False),
+    }  # fmt: skip
+
+
+def test_what_can_be_imported_has_a_spec_as_on_the_command_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """No other process finds what a script defines, although it is there under its name."""
+    from roboirg.policies.builtin.random_policy import RandomPolicy
+    from roboirg.policies.by_name.finding import policy_of
+
+    assert policy_of(RandomPolicy).spec == "roboirg.policies.builtin.random_policy:RandomPolicy"
+    scripts = type("OfScript", (Still,), {"__module__": "__main__"})
+    monkeypatch.setattr(sys.modules["__main__"], "OfScript", scripts, raising=False)
+    given = (RandomPolicy, RandomPolicy(seed=1), type("Made", (Still,), {}), scripts)
+    assert [policy_of(one).place for one in given] == ["own", "python", "python", "python"]
+
+
+def test_options_are_those_of_a_plan(unplayed: None, tmp_path: Path) -> None:
+    plan = python_run.python_plan(
+        "oracle", tasks=["PickXtimes"], settings="contextual", episodes=[2],
+        policy_seeds=(7, 42), stages=[(1, 5), (1, 2, 5)], max_steps=600, wordings=None,
+    )  # fmt: skip
+    assert (plan.episodes, plan.policy_seeds, plan.environment.max_steps) == ((2,), (7, 42), 600)
+    assert plan.stages == ((1, 5), (1, 2, 5))
+    with pytest.raises(UnknownNameError, match="PickXtimes"):
+        roboirg.evaluate("oracle", **{**QUICK, "tasks": "PickXtime"})
+    with pytest.raises(UnknownNameError, match=r"max_stps.*mean 'max_steps'"):
+        roboirg.evaluate("oracle", max_stps=3, **QUICK)
+    for workers in ("2", True, 2.0, 10**22):
+        with pytest.raises(InvalidValueError, match=f"workers is {workers!r}; it must be a whole"):
+            roboirg.evaluate("oracle", **{**QUICK, "workers": workers})
+
+
+@pytest.mark.parametrize("name", [5, b"runs", True, "", " ", "runs/\0"])
+def test_a_folder_that_is_none_is_refused_and_nothing_is_written(
+    unplayed: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: Any
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for use in (lambda name: roboirg.evaluate("oracle", out=name, **QUICK), Results):
+        with pytest.raises(InvalidValueError, match=r"The run's folder is .*; it must be a path"):
+            use(name)
+    with pytest.raises(InvalidValueError, match="The run's folder is ''; it must be a path"):
+        roboirg.results("")
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_pandas_the_rest_works(
+    unplayed: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results = roboirg.evaluate("oracle", out=tmp_path, **QUICK)
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(MissingDependencyError, match="needs pandas"):
+        _ = results.frame
+    assert Results(str(tmp_path)).rates()["oracle", "explicit"] == 1.0
+    assert Results(str(tmp_path)) == Results(tmp_path)
+
+
+@pytest.mark.sim
+def test_an_object_plays_its_episodes_itself(tmp_path: Path) -> None:
+    given = Still()
+    results = roboirg.evaluate(
+        given, tasks="PickXtimes", settings="explicit,direct", episodes=1, max_steps=32,
+        out=tmp_path, progress=False,
+    )  # fmt: skip
+    assert [one.outcome for one in results.records] == ["failure", "failure"]
+    opened, *heard = given.instructions  # on an episode that is made up, before the run
+    assert opened == "Put the red cube on the target."
+    assert heard == [" ".join(turn.text for turn in one.instruction) for one in results.records]

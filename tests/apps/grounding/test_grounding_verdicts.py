@@ -1,0 +1,145 @@
+"""Inspect and our scores give the same verdict on the same answers."""
+
+import functools
+
+import numpy as np
+import pytest
+from made_items import items_of
+from msgspec.structs import replace
+from planning_fakes import fake_vlm, make_listener, stand_in, words_of
+
+from roboirg.apps.grounding.answer_scores import score_answers
+from roboirg.apps.grounding.items.answer_file import Answer
+from roboirg.apps.grounding.items.grounding_item import write_items
+from roboirg.apps.grounding.items.media_store import store_content
+from roboirg.apps.grounding.items.verdicts import right_reply
+from roboirg.policies.vlm.goal_schema import goal_schema
+from roboirg.shortcuts.command_chance import is_right
+from roboirg.tasks import all_tasks
+from roboirg.tasks.splits.splits import get_episode
+from roboirg.util.media import Picture, encode_png
+
+PICTURE = encode_png(Picture(np.zeros((256, 256, 3), np.uint8)))
+
+
+@functools.cache
+def items():
+    found = []
+    for task in all_tasks():
+        found += items_of(task, 0)[1]
+    return found
+
+
+@functools.cache
+def replies():
+    """By what is asked: right, wrong and unusable answers."""
+    found = {}
+    for number, item in enumerate(items()):
+        wrong = next(goal for goal in goal_schema(item.task).goals if goal not in item.answers)
+        found[asked(item)] = (f"I see. {item.answer}", wrong, "No idea.")[number % 3]
+    return found
+
+
+def asked(item):
+    return item.said, item.slots_question
+
+
+@functools.cache
+def own_verdicts():
+    answers = [Answer(item.id, "slots", replies()[asked(item)]) for item in items()]
+    (score,) = score_answers(items(), answers, "scripted")
+    return {item.id: verdict for item, verdict in score.judged}
+
+
+def test_the_listener_is_asked_what_the_dataset_asks_and_takes_its_answer():
+    item = next(one for one in items() if one.setting == "direct")
+    episode = get_episode(item.task, item.split, item.episode)
+    with fake_vlm([item.answer]) as server:
+        goal = make_listener(server).decide(stand_in(episode, item.setting), item.text)
+        assert is_right(goal, episode)
+        system, user = server.requests[0]["messages"]
+    texts = [part["text"] for part in user["content"] if part["type"] == "text"]
+    assert texts == [item.said, item.shown, item.now, item.slots_question]
+    assert item.slots_system in words_of({"messages": [system]})
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("inspect") / "set"
+    stored = store_content(folder, "pictures", PICTURE, ".png")
+    write_items([replace(item, picture=stored) for item in items()], folder)
+    return folder
+
+
+def run_inspect(data, replies_of, logs, question="slots", **options):
+    inspect_ai = pytest.importorskip("inspect_ai")
+    from inspect_ai.model import ModelOutput, ModelUsage, get_model
+
+    from roboirg.apps.grounding.inspect_grounding import roboirg_grounding
+
+    def reply(messages, tools, tool_choice, config):
+        found = ModelOutput.from_content("mockllm/model", replies_of(messages))
+        found.usage = ModelUsage(input_tokens=1, output_tokens=1, total_tokens=2)
+        return found
+
+    (log,) = inspect_ai.eval(
+        roboirg_grounding(data=str(data), question=question, **options),
+        model=get_model("mockllm/model", custom_outputs=reply),
+        display="none",
+        log_dir=str(logs),
+        log_format="json",
+    )
+    assert log.status == "success", log.error
+    return log
+
+
+def test_inspect_and_our_scores_agree(data, tmp_path):
+    pytest.importorskip("inspect_ai")
+    from roboirg.apps.grounding.inspect_grounding import log_answers
+
+    tries = []
+
+    def scripted(messages):
+        texts = [part.text for part in messages[1].content if part.type == "text"]
+        tries.append(len(messages))
+        return replies()[texts[0], texts[-1]]
+
+    log = run_inspect(data, scripted, tmp_path)
+    ours = {name: verdict.right for name, verdict in own_verdicts().items()}
+    assert {str(one.id): bool(one.scores["right"].value) for one in log.samples} == ours
+    wanted = {item.id: replies()[asked(item)] for item in items()}
+    assert {one.id: one.reply for one in log_answers(log)} == wanted
+    unusable = sum(verdict.understood is None for verdict in own_verdicts().values())
+    assert tries.count(4) == unusable > 0  # each of them was asked once more
+    metrics = log.results.scores[0].metrics
+    assert metrics["accuracy"].value == pytest.approx(sum(ours.values()) / len(ours))
+    assert metrics["direct"].value > 0
+
+
+@pytest.mark.parametrize("question", ["choice", "points"])
+def test_inspect_asks_the_other_questions(data, tmp_path, question):
+    pytest.importorskip("inspect_ai")
+    right = {item.question(question) + item.said: item for item in items()}
+
+    def scripted(messages):
+        content = messages[1].content
+        assert sum(part.type == "image" for part in content) == 1
+        item = right[content[-1].text + content[0].text]
+        return right_reply(item, question)
+
+    log = run_inspect(
+        data, scripted, tmp_path, question, settings="direct", tasks="PickXtimes,StopCube"
+    )
+    assert {one.metadata["setting"] for one in log.samples} == {"direct"}
+    assert log.results.scores[0].metrics["accuracy"].value == 1
+
+
+def test_inspect_says_what_is_wrong(data):
+    pytest.importorskip("inspect_ai")
+    from roboirg.apps.grounding.inspect_grounding import roboirg_grounding
+    from roboirg.core.errors import InvalidValueError
+
+    with pytest.raises(InvalidValueError, match="no question 'poem'"):
+        roboirg_grounding(data=str(data), question="poem")
+    with pytest.raises(InvalidValueError, match="has no items with the settings sung"):
+        roboirg_grounding(data=str(data), settings="sung")

@@ -1,0 +1,76 @@
+"""Places mean all things that they can mean: those that tie, and those that two measures choose."""
+
+import pytest
+
+from roboirg.core.episode import Point, Scene, SceneObject
+from roboirg.language.landmarks import FRAMES, selectors
+from roboirg.reader.command import read_command
+from roboirg.reader.referents import Referents
+from roboirg.reader.tokens import split_sentences
+from roboirg.tasks import every_task, get_task
+from roboirg.tasks.splits import get_episode
+
+
+def found_at(scene, noun, words):
+    """Return the names of the things that words can mean."""
+    (sentence,) = split_sentences(f"Take the {noun} {words}.")
+    (act,) = read_command(sentence).acts
+    (thing,) = act.values("thing")
+    assert not read_command(sentence).unread, words
+    return sorted(item.name for item in Referents(scene).things_at(thing, thing.place))
+
+
+def containers(places):
+    objects = [
+        SceneObject(f"container_{number}", "container", Point(x, y, 0.05))
+        for number, (x, y) in enumerate(places)
+    ]
+    return Scene(tuple(objects))
+
+
+@pytest.mark.parametrize(
+    ("words", "places"),
+    [
+        ("farthest to your left", [(0.1, 0.1), (-0.1, 0.105), (0.0, 0.0)]),
+        ("on the left", [(0.1, 0.2), (-0.1, 0.1), (0.0, -0.1)]),
+        ("closest to you", [(-0.1, 0.1), (-0.105, -0.1), (0.0, 0.0)]),
+        ("all the way in the back", [(0.1, 0.0), (0.09, 0.2), (0.0, 0.0)]),
+        ("second from your left", [(0.1, 0.1), (-0.1, 0.105), (0.0, 0.0)]),
+        ("in the near left corner", [(-0.1, 0.1), (-0.098, 0.1), (0.0, 0.0)]),
+        ("nearest to the container farthest to your left", [(0.1, 0.0), (-0.1, 0.0), (0.0, 0.1)]),
+    ],
+)
+def test_what_ties_may_be_meant(words, places):
+    assert found_at(containers(places), "container", words) == ["container_0", "container_1"]
+
+
+def test_a_member_of_an_unclear_group_is_unclear():
+    places = [(0.0, 0.1), (0.005, 0.15), (-0.1, 0.0)]
+    words = "farthest to your left among the two closest to you"
+    assert found_at(containers(places), "container", words) == [
+        "container_0",
+        "container_1",
+    ]
+    places[1] = (-0.05, 0.15)
+    assert found_at(containers(places), "container", words) == ["container_1"]
+
+
+def test_left_and_right_of_the_picture_are_mirrored():
+    scene = containers([(0.0, 0.2), (0.0, -0.2)])
+    assert found_at(scene, "container", "on the left") == ["container_0"]
+    assert found_at(scene, "container", "on the left of the picture") == ["container_1"]
+    assert found_at(scene, "container", "on the camera's right") == ["container_0"]
+
+
+@pytest.mark.parametrize("task", [name for name, task in every_task().items() if task.spatial])
+def test_every_landmark_can_mean_what_it_selects(task):
+    kind = get_task(task).things.pointed
+    for index in (3, 14):
+        scene = get_episode(task, "test", index).scene
+        for frame in FRAMES:
+            for selector in selectors(scene, kind, frame):
+                selected = selector.select()
+                words = selector.landmark.phrase
+                if selected is not None:
+                    names = found_at(scene, kind.removeprefix("hidden_"), words)
+                    assert selected.name in names, words

@@ -1,0 +1,132 @@
+"""Action logs: what is written is what is read, and nothing else is read."""
+
+from __future__ import annotations
+
+import io
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from roboirg.core.errors import InvalidValueError
+from roboirg.records.action_log import (
+    ActionLog,
+    action_path,
+    read_actions,
+    write_actions,
+)
+from roboirg.records.record_codec import StoreError
+
+finite = st.floats(-1e6, 1e6)
+
+
+@st.composite
+def logs(draw: st.DrawFn) -> ActionLog:
+    # Nothing may be executed of the last answer.
+    lengths = draw(st.lists(st.integers(1, 5), max_size=6)) + draw(st.sampled_from([[], [0]]))
+    rows = draw(arrays(np.float64, (sum(lengths), 8), elements=finite))
+    if draw(st.booleans()):
+        rows = rows.astype(np.float32).astype(np.float64)
+    starts = np.cumsum([0, *lengths], dtype=np.int32)[:-1]
+    end = draw(arrays(np.float64, st.integers(0, 9), elements=finite))
+    return ActionLog("joint_angle", rows, starts, end)
+
+
+@settings(max_examples=25)
+@given(log=logs())
+def test_what_is_written_is_read(log: ActionLog, tmp_path_factory: pytest.TempPathFactory) -> None:
+    folder = tmp_path_factory.mktemp("run")
+    digest = write_actions(log, folder)
+    assert write_actions(log, folder) == digest
+    read = read_actions(folder, digest)
+    assert (read.space, read.digest) == (log.space, digest)
+    assert np.array_equal(read.rows, log.rows)
+    assert np.array_equal(read.end_state, log.end_state)
+    assert np.array_equal(np.concatenate([*read.chunks(), np.empty((0, 8))]), log.rows)
+    assert len(log.requests) == 0 or len(read.chunks()) == len(log.requests)
+
+
+def a_log(rows: int = 4) -> ActionLog:
+    numbers = np.linspace(0.1, 1.7, rows * 8).reshape(rows, 8)
+    return ActionLog("joint_angle", numbers, np.array([0], np.int32), np.zeros(3))
+
+
+def test_a_file_in_place_of_the_folder_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "actions").touch()
+    with pytest.raises(InvalidValueError, match=r"Cannot write .*\.npz: Not a directory\."):
+        write_actions(a_log(), tmp_path)
+
+
+def test_a_changed_file_is_refused(tmp_path: Path) -> None:
+    digest = write_actions(a_log(), tmp_path)
+    other = write_actions(a_log(5), tmp_path)
+    action_path(tmp_path, digest).write_bytes(action_path(tmp_path, other).read_bytes())
+    with pytest.raises(StoreError, match="does not have the content"):
+        read_actions(tmp_path, digest)
+
+
+@pytest.mark.parametrize("digest", ["", "../../etc/passwd", "A" * 64, "0" * 63, "0" * 64 + "\n"])
+def test_what_is_no_digest_names_no_file(tmp_path: Path, digest: str) -> None:
+    with pytest.raises(StoreError, match="not a digest"):
+        action_path(tmp_path, digest)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=f"/actions/00/{'0' * 64}.* are missing"):
+        read_actions(tmp_path, "0" * 64)
+
+
+GOOD = {
+    "space": np.array("joint_angle"),
+    "rows": np.zeros((4, 8)),
+    "requests": np.array([0, 2]),
+    "end_state": np.zeros(3),
+}
+EMPTY_ZIP = b"PK\x05\x06" + bytes(18)
+
+
+def npz(**changes: np.ndarray) -> bytes:
+    """Return the content of a good log, but for some arrays."""
+    file = io.BytesIO()
+    np.savez_compressed(file, **GOOD | changes)  # type: ignore[arg-type]
+    return file.getvalue()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"no zip",
+        EMPTY_ZIP,
+        npz(space=np.array("teleport")),
+        npz(rows=np.zeros((4, 7))),
+        npz(rows=np.full((4, 8), np.nan)),
+        npz(requests=np.array([0, 3, 2])),
+        npz(requests=np.array([1, 2])),
+        npz(requests=np.array([0, 9])),
+        npz(rows=np.zeros((400_000, 8))),
+    ],
+)
+def test_what_is_no_log_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = action_path(tmp_path, "0" * 64)
+    path.parent.mkdir(parents=True)
+    path.write_bytes(content)
+    with pytest.raises(StoreError, match="is not an action log"):
+        read_actions(tmp_path, "0" * 64)
+
+
+def test_what_is_pickled_in_a_file_does_not_run(tmp_path: Path) -> None:
+    class Evil:
+        def __reduce__(self) -> tuple[object, ...]:
+            return os.mkdir, (str(tmp_path / "evil"),)
+
+    path = action_path(tmp_path, "0" * 64)
+    path.parent.mkdir(parents=True)
+    path.write_bytes(npz(requests=np.array([Evil()], dtype=object)))
+    with pytest.raises(StoreError, match="is not an action log"):
+        read_actions(tmp_path, "0" * 64)
+    assert not (tmp_path / "evil").exists()

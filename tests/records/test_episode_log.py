@@ -1,0 +1,135 @@
+"""What is printed in an episode goes to its log, from real processes with real descriptors."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from roboirg.records.episode_log import EpisodeLog, log_path, logged_output, logged_slugs
+
+LONG_WAIT_S = 300.0
+PRINTS = """
+import ctypes, logging, os, subprocess, sys, warnings
+from pathlib import Path
+from roboirg.records.episode_log import logged_output
+print("before")
+with logged_output(Path(sys.argv[1])):
+    print("by print")
+    print("on stderr", file=sys.stderr)
+    logging.getLogger("policy").warning("by logging")
+    warnings.warn("by warnings")
+    os.write(1, b"by descriptor\\n")
+    libc = ctypes.CDLL(None)
+    libc.puts(b"by C")
+    libc.fflush(None)
+    subprocess.run(["echo", "by a child"])
+    os.write(2, b"\\xff not text\\n")
+print("after")
+"""
+FLOODS = """
+import sys
+from pathlib import Path
+from roboirg.records.episode_log import logged_output
+with logged_output(Path(sys.argv[1]), 10_000):
+    print("first words")
+    for number in range(30_000):
+        print(f"line {number}")
+    print("last words")
+"""
+DIES = """
+import os, signal, sys
+from pathlib import Path
+from roboirg.records.episode_log import logged_output
+with logged_output(Path(sys.argv[1])):
+    print("my last words")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+CLOSES = """
+import os, sys
+from pathlib import Path
+from roboirg.records.episode_log import logged_output
+with logged_output(Path(sys.argv[1])):
+    print("hello")
+    os.close(1)
+    sys.stderr.close()
+print("after")
+"""
+
+
+def run(code: str, path: Path) -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run(
+        [sys.executable, "-c", code, str(path)],
+        capture_output=True,
+        timeout=LONG_WAIT_S,
+        check=False,
+    )
+
+
+def test_all_ways_to_print_end_in_the_log_and_not_on_the_terminal(tmp_path: Path) -> None:
+    done = run(PRINTS, tmp_path / "logs" / "a.txt")
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"before\nafter\n", b"")
+    printed = (tmp_path / "logs" / "a.txt").read_bytes()
+    for words in (b"by print", b"on stderr", b"by logging", b"by warnings", b"by descriptor",
+                  b"by C", b"by a child", b"\xff not text"):  # fmt: skip
+        assert words in printed
+    assert b"before" not in printed
+    assert b"after" not in printed
+
+
+def test_a_flood_is_cut_in_the_middle(tmp_path: Path) -> None:
+    assert run(FLOODS, tmp_path / "a.txt").returncode == 0
+    text = (tmp_path / "a.txt").read_text()
+    assert len(text) <= 10_000
+    assert text.startswith("first words\nline 0\n")
+    assert text.endswith("line 29999\nlast words\n")
+    assert text.count("\n[roboirg: the middle of this log is left out]\n") == 1
+
+
+def test_what_a_killed_process_printed_is_there(tmp_path: Path) -> None:
+    assert run(DIES, tmp_path / "a.txt").returncode == -signal.SIGKILL
+    assert (tmp_path / "a.txt").read_text() == "my last words\n"
+
+
+def test_closed_descriptors_do_not_matter(tmp_path: Path) -> None:
+    done = run(CLOSES, tmp_path / "a.txt")
+    assert (done.returncode, done.stdout) == (0, b"after\n")
+    assert (tmp_path / "a.txt").read_text() == "hello\n"
+
+
+def test_the_size_is_bounded_while_the_episode_goes_on(tmp_path: Path) -> None:
+    with EpisodeLog(tmp_path / "a.txt", 1_000) as log:
+        os.write(log.descriptor, b"x" * 1_000_000)
+        deadline = time.monotonic() + LONG_WAIT_S
+        # At 500 bytes the middle is gone, and the note and the end are about to be written.
+        while not 500 < (tmp_path / "a.txt").stat().st_size <= 1_000:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        os.write(log.descriptor, b"the end")
+    text = (tmp_path / "a.txt").read_text()
+    assert text.endswith("the end")
+    assert "[roboirg: the middle of this log is left out]" in text
+
+
+def test_an_episode_that_prints_nothing_has_no_log(tmp_path: Path) -> None:
+    assert logged_slugs(tmp_path) == frozenset()
+    with logged_output(log_path(tmp_path, "silent")):
+        pass
+    with EpisodeLog(log_path(tmp_path, "loud")) as log:
+        os.write(log.descriptor, b"words")
+    assert logged_slugs(tmp_path) == {"loud"}
+    # Played again, it prints nothing.
+    with EpisodeLog(log_path(tmp_path, "loud")):
+        assert logged_slugs(tmp_path) == frozenset()
+    assert logged_slugs(tmp_path) == frozenset()
+
+
+def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "logs").write_text("a file")
+    with pytest.raises(Exception, match=r"^Cannot write the log .*a\.txt: "):
+        EpisodeLog(log_path(tmp_path, "a"))

@@ -1,0 +1,84 @@
+"""A planner of the user's own has a process of its own; its scripted hands stay with the world."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import pytest
+
+from roboirg.core.environment_options import EnvironmentOptions
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.policies.by_name.finding import make_policy, read_policy
+from roboirg.records.record import Job, Record
+from roboirg.runs.hosting.host_pool import HostPool, HostSettings
+from roboirg.runs.hosting.policy_opening import open_policy
+from roboirg.runs.play.rollout import EpisodeRunner
+
+
+def job_of(spec: str) -> Job:
+    return Job(policy=spec, ref=read_policy(spec), task="VideoUnmask", split="test", episode=0,
+              environment=EnvironmentOptions(60),
+              options=InstructionOptions("explicit"))  # fmt: skip
+
+
+def play(spec: str) -> Record:
+    with HostPool(HostSettings()) as pool, pool.connect() as line:
+        return EpisodeRunner(Path(), hosts=line).play_once(job_of(spec))[0]
+
+
+@pytest.mark.sim
+def test_it_sees_pictures_and_words_only() -> None:
+    spec = "planner:own_planners:Pointer"
+    assert read_policy(spec).is_hosted
+    result = play(spec)
+    assert result.outcome == "failure", result.cause
+    assert [(one.text, one.ended) for one in result.subgoals] == [
+        ("remain static for 5 steps", "done"),
+        ("pick up the container", "refused"),
+    ]
+    spent = result.usage
+    assert spent["process"] != os.getpid()
+    # Each end is told once, the last one never.
+    assert (spent["refused"], spent["named"], spent["ends"]) == (5, 0, 1 + 4)
+    assert spent["pictures"] == 1 + 5  # one where it named the first, and five refusals
+    assert result.policy_metadata["planner"] == {"world": False}
+    # The whole is marked as it acts by the simulator's state, and described alike beforehand.
+    known = open_policy(read_policy(spec))
+    assert known.version == result.policy_version == "mine-1 + scripted hands"
+    assert (known.is_privileged, result.privileged) == (True, True)
+
+
+@pytest.mark.sim
+def test_what_it_breaks_ends_its_own_episode() -> None:
+    result = play("planner:own_planners:Quitter")
+    assert (result.outcome, result.error) == ("error", "policy")
+
+
+@pytest.mark.sim
+def test_one_that_is_declared_runs_next_to_the_world() -> None:
+    spec = "privileged:planner:own_planners:Insider"
+    assert not read_policy(spec).is_hosted
+    assert play(spec).usage["process"] == os.getpid()
+    # So does any in a run whose policies share the worker's process.
+    shared = EpisodeRunner(Path()).play_once(job_of("planner:own_planners:Pointer"))[0]
+    assert (shared.usage["process"], len(shared.subgoals)) == (os.getpid(), 2)
+    assert shared.policy_version == "mine-1 + scripted hands"
+    with pytest.raises(InvalidValueError, match="has attach"):
+        make_policy("planner:own_planners:Insider", 0)
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        ("planner:own_planners:Insider", "has attach()"),
+        ("planner:own_planners:Nothing", "has no class 'Nothing'"),
+        ("planner:own_planners:NoPlanner", "class NoPlanner has no method plan()"),
+        ("planner:own_planners:Pointer?keep=2", "no option of planner:own_planners:Pointer"),
+    ],
+)
+def test_wrong_ones_are_one_sentence(spec: str, words: str) -> None:
+    with pytest.raises(InvalidValueError, match=re.escape(words)):
+        open_policy(read_policy(spec))

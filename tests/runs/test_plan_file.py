@@ -1,0 +1,195 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+import yaml
+
+from roboirg.cli import run_commands
+from roboirg.core.errors import InvalidValueError, UnknownNameError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.language import STAGE_SETS
+from roboirg.language.settings import all_settings
+from roboirg.runs.plan.plan_file import named_plans, read_plan_file
+from roboirg.runs.plan.plan_maker import make_plan
+from roboirg.runs.plan.plan_sections import WorkerNeeds
+from roboirg.runs.plan.stored_plans import write_plan
+from roboirg.tasks import all_tasks
+
+PINNED = ("challenge", "paper", "paper-context", "paper-small", "standard")
+"""Named plans with a test of their own, or of the package that brings them."""
+
+
+def write(folder: Path, text: str) -> str:
+    path = folder / "plan.yaml"
+    path.write_text(text)
+    return str(path)
+
+
+def test_robommes_plan_needs_its_words() -> None:
+    options = read_plan_file("robomme")
+    with pytest.raises(InvalidValueError, match=r"import-robomme PATH --out .* --wordings"):
+        make_plan(["random"], **options)
+
+
+@pytest.mark.parametrize("name", sorted({*named_plans()} - {"robomme", *PINNED}))
+def test_every_other_named_plan_can_be_played(name: str) -> None:
+    assert make_plan(**{"policies": ["random"], **read_plan_file(name)}).jobs()
+
+
+def test_the_challenge_has_its_own_limit() -> None:
+    plan = make_plan(["random"], **read_plan_file("challenge"))
+    assert (plan.environment.max_steps, len(plan.episodes), plan.split) == (1500, 10, "test")
+    assert {job.setting for job in plan.jobs()} == {"explicit"}
+    assert len(plan.jobs()) == 10 * len(all_tasks())
+
+
+def test_the_papers_protocol_is_the_papers() -> None:
+    plan = make_plan(["random"], **read_plan_file("paper"))
+    assert plan.tasks == tuple(all_tasks())
+    assert (plan.settings, plan.forms) == (("all",), ("implicit", "resolved"))
+    assert plan.policy_seeds == (7, 42, 0)
+    assert plan.episodes == tuple(range(50))
+    assert plan.environment.max_steps == 1300
+    told = {(job.task, job.setting, job.form) for job in plan.jobs()}
+    # 40 implicit variants and their resolved forms, and the explicit setting once.
+    assert len(told) == 40 + 40 + 11
+    context = make_plan(["random"], **read_plan_file("paper-context"))
+    assert {job.options.stages for job in context.jobs()} == set(STAGE_SETS)
+    assert len(context.jobs()) == 3 * 4 * 50 * 3
+
+
+def test_the_standard_protocol_has_every_setting_and_direct_in_turns() -> None:
+    options = read_plan_file("standard")
+    plan = make_plan(["random"], **options)
+    assert plan.tasks == tuple(all_tasks())
+    assert (plan.episodes, plan.policy_seeds) == (tuple(range(50)), (0,))
+    assert (plan.split, plan.forms) == ("test", ("implicit",))
+    assert plan.environment.max_steps == 1300
+    few = make_plan(["random"], **options | {"episodes": "4"}).jobs()
+    found = {(job.task, job.setting, job.options.delivery) for job in few}
+    assert {setting for _, setting, _ in found} == set(all_settings())
+    assert {(task, setting) for task, setting, way in found if way == "turns"} == {
+        (task, "direct") for task in all_tasks()
+    }
+    for job in few:
+        reference = msgspec.structs.replace(job, options=InstructionOptions())
+        assert reference in few, "without explicit there is no gap"
+
+
+@pytest.mark.parametrize(
+    ("text", "typed"),
+    [
+        ("episodes: 4", {"episodes": "4"}),
+        ("episodes: [7]", {"episodes": "7,"}),
+        ("episodes: [easy, hard]", {"episodes": "easy,hard"}),
+        ("policies: [oracle, random]", {"policies": ["oracle,random"]}),
+        ("stages: [1, 5]", {"stages": "1,5"}),
+        ("stages: [[1, 5], [1, 2, 5]]", {"stages": "1,5;1,2,5"}),
+        ("video: off", {"video": "off"}),
+        ("max_steps: 20", {"environment": {"max_steps": "20"}}),
+        ("{max_steps: 20, environment: {meshes: light}}",
+         {"max_steps": 20, "meshes": "light"}),
+        ("actions: null", {}),
+        ("retry_on: []", {"retry_on": "none"}),
+        ("devices: 0", {"devices": ["0"]}),
+        ("max_cost: 5e-1", {"max_cost": 0.5}),
+        ("cluster: {labels: {spot: yes}}", {"cluster": {"labels": {"spot": "yes"}}}),
+    ],
+)  # fmt: skip
+def test_values_are_those_that_would_be_typed(
+    tmp_path: Path, text: str, typed: dict[str, Any]
+) -> None:
+    few: dict[str, Any] = {"policies": "random", "tasks": "PickXtimes"}
+    read = read_plan_file(write(tmp_path, text))
+    assert make_plan(**few | read) == make_plan(**few | typed)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("episode: 4", r"no plan key .* 'episode'; .*Did you mean 'episodes'\?"),
+        ("- oracle", r"is of type list; it must be a mapping"),
+        ("", r"is of type NoneType"),
+        ("tasks: [", r"is not valid YAML"),
+        ("settings: &same direct\nforms: *same", r"line 2 has an alias"),
+        ("policies: [mine: oracle]", r"has \{'mine': 'oracle'\} as a policy; write NAME=SPEC"),
+        ("tasks: all\nsplit: val\ntasks:\n  - real", r"line 3 has the key 'tasks' again"),
+    ],
+)
+def test_what_is_no_plan_is_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+    with pytest.raises(InvalidValueError, match=sentence) as caught:
+        read_plan_file(write(tmp_path, text))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "episodes: 010", "episodes: 0x10", "episodes: 1_000", "policy_timeout_s: 1:30",
+        "max_cost: .inf", "max_cost: 1_0.5", "split: 2026-01-31", "episodes: [0, 010]",
+        "tasks:", "tasks:\n  - ", "max_steps: !!int '010'", "training: {seed:}",
+    ],
+)  # fmt: skip
+def test_what_yaml_takes_for_something_else_than_it_looks_is_refused(
+    tmp_path: Path, text: str
+) -> None:
+    with pytest.raises(InvalidValueError, match=r"line \d ") as caught:
+        read_plan_file(write(tmp_path, text), "training")
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_typed_replaces_the_option_in_a_section_of_the_file(tmp_path: Path) -> None:
+    path = write(tmp_path, "environment: {max_steps: 100, meshes: light}\nepisodes: 1")
+    typed = {"policies": ["random"], "max_steps": "200", "max_cost": "0.5"}
+    plan = run_commands._plan(path, typed, ())
+    options = plan.environment
+    assert (options.max_steps, options.meshes, plan.models.max_cost) == (200, "light", 0.5)
+
+
+def test_an_unknown_plan_is_told_with_the_nearest() -> None:
+    with pytest.raises(UnknownNameError, match="Did you mean 'paper-context'"):
+        read_plan_file("paper-contxt")
+    with pytest.raises(InvalidValueError, match="cannot be read"):
+        read_plan_file("nowhere/plan.yaml")
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"tasks": "BinFill", "episodes": "0,2", "stages": "1,5;1-5", "tries": 3},
+        {"episodes": "3,", "policy_seeds": "7,42,0", "retry_on": "none"},
+        {"settings": "contextual", "stages": "1,5", "policy_seeds": "3"},
+        {"demonstration_frames": 4, "observe_every": 2, "devices": "0,1", "video": "failures"},
+        {"demonstration_frames": "none", "meshes": "light", "actions": "waypoint"},
+        {"settings": "direct-rival", "delivery": "turns", "frame": "camera"},
+        {"wordings": "train", "split": "random", "episodes": "5,99999", "max_steps": 60},
+    ],
+)
+def test_a_plan_and_its_files_are_the_same_plan(tmp_path: Path, options: dict[str, Any]) -> None:
+    """Both as YAML and as the plan.json that a run writes."""
+    plan = make_plan(["random", "mine=oracle"], **{"tasks": "PickXtimes", **options})
+    write_plan(plan, tmp_path)
+    typed = write(tmp_path, yaml.safe_dump(plan.model_dump(mode="json")))
+    for path in (typed, str(tmp_path / "plan.json")):
+        found = read_plan_file(path)
+        again = make_plan(found.pop("policies"), **found)
+        assert again == plan
+        assert again.fingerprint == plan.fingerprint
+
+
+def test_workers_are_placed_only_where_their_labels_are() -> None:
+    needs = WorkerNeeds(cpus=1.5, gpus=0.25, memory_gb=2.0, labels={"rack": "b"})
+    usual = {"CPU": 9.0, "GPU": 1.0, "memory": 7e9}  # for 6, 4 and 3
+    for rack, changes, slots in (
+        ("a", {}, 0),
+        ("b", {}, 3),
+        ("b", {"CPU": 3.0}, 2),
+        ("b", {"GPU": 0.3}, 1),
+        ("b", {"memory": 1e9}, 0),
+    ):
+        machine = {"Labels": {"rack": rack}, "Resources": {**usual, **changes}}
+        assert needs.slots(machine) == slots
+    assert needs.options() == {"num_cpus": 1.5, "num_gpus": 0.25, "memory": 2_000_000_000}

@@ -1,0 +1,658 @@
+"""Policies in a process of their own: same records, whoever shares the host, whatever dies."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import hosting_fakes
+import numpy as np
+import pytest
+from hosting_fakes import PaperRunner, paper_plan, paper_runner
+from run_fakes import changed, comparable, is_alive, worker_pids
+from selection import slow_but
+
+from roboirg.core.errors import InvalidValueError, MissingDependencyError
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.policies.by_name.finding import read_policy
+from roboirg.records.record import Job
+from roboirg.records.store import read_records
+from roboirg.runs.episode_errors import EpisodeError, EpisodeLostError
+from roboirg.runs.hosting import host_pool
+from roboirg.runs.hosting.host_pool import HostPool, HostSettings
+from roboirg.runs.hosting.hosted_policy import HostedPolicy
+from roboirg.runs.hosting.messages import Call, HostRequest, Loss, ask, receive_call, send
+from roboirg.runs.hosting.policy_child import PolicyChild
+from roboirg.runs.hosting.policy_opening import open_policy
+from roboirg.runs.plan.plan import Plan
+from roboirg.runs.plan.plan_sections import Hosting
+from roboirg.runs.run.executor import Executor, InProcess, LocalProcesses
+from roboirg.runs.run.runner import run_plan
+from roboirg.util.process_guard import descendants
+
+Write = Callable[[str, str], str]
+Host = Callable[[str, str], HostedPolicy]
+KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "8"))
+PLAYERS = tuple(f"hosting_fakes:{name}" for name in ("Dice", "BatchedDice", "Picky"))
+
+
+@pytest.fixture
+def pool() -> Iterator[HostPool]:
+    with HostPool(HostSettings()) as opened:
+        yield opened
+
+
+@pytest.fixture
+def write_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
+    """Return what writes a module of a name with a class ``It``, and returns its spec."""
+
+    def write(name: str, text: str) -> str:
+        (tmp_path / f"{name}.py").write_text(
+            "import os, pathlib, sys, time\nimport hostile_policies\nimport numpy as np\n" + text
+        )
+        monkeypatch.syspath_prepend(tmp_path)
+        return f"{name}:It"
+
+    return write
+
+
+@pytest.fixture
+def host(pool: HostPool, write_policy: Write) -> Host:
+    """Return what writes a policy and begins an episode of it in a process of its own."""
+    return lambda name, text: HostedPolicy(pool.connect(), read_policy(write_policy(name, text)), 0)
+
+
+def play(plan: Plan, folder: Path, executor: Executor) -> dict[Job, dict[str, Any]]:
+    folder.mkdir(exist_ok=True)
+    run_plan(plan, folder, paper_runner(plan, folder), executor)
+    return {record.identity: comparable(record) for record in read_records(folder)}
+
+
+# Arrays
+
+
+def relayed(call: Call) -> Call:
+    """Return a call as it arrives at the other end of a line."""
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        threading.Thread(target=send, args=(ours, call)).start()
+        return receive_call(theirs)
+
+
+def test_arrays_of_every_kind_travel_through_the_supervisor() -> None:
+    value = {
+        "history": [{"a": np.arange(6, dtype=np.int16).reshape(2, 3)}, {"a": np.float32(2.5)}],
+        "none": np.zeros((0, 256, 256, 3), np.uint8),
+        "turned": np.arange(12.0).reshape(3, 4).T,
+        "large": np.arange(10**6),
+        "text": "pick",
+    }
+    found = relayed(relayed(Call("act", value=value))).value
+    np.testing.assert_equal(found, value)
+    found["turned"][0, 0] = 7.0  # a policy may write into what it gets
+
+
+@pytest.mark.parametrize("value", [object(), np.array([object()]), {"world": PaperRunner}])
+def test_nothing_but_plain_data_and_arrays_is_sent(value: object) -> None:
+    with pytest.raises(TypeError):
+        send(socket.socket(), Call("act", value=value))
+
+
+def test_a_hosted_policy_gets_what_a_policy_gets(pool: HostPool, write_policy: Write) -> None:
+    spec = write_policy(
+        "curious",
+        """
+class It:
+    observe_every = 4
+    depth = grounded = True  # pixels of subgoals are for privileged policies only
+    prompt_tokens = property(lambda self: 7)
+    def __init__(self, seed=0):
+        self.metadata = {"seed": seed}
+    def reset(self, instruction, demonstration):
+        self.metadata["instruction"] = instruction
+        self.metadata["fields"] = list(demonstration)
+        self.video = demonstration["front_rgb"]
+        self.metadata["sum"] = self.video.sum(dtype=np.int64)
+        self.metadata["shape"] = np.array(self.video.shape)
+    def hear(self, text, step):
+        self.metadata["heard"] = [text, step]
+    def act(self, observation):
+        assert isinstance(observation["history"], tuple)
+        first, *_ = observation["history"]
+        rows = np.full((2, 8), first["front_rgb"].mean())
+        observation["front_rgb"][:] = 0
+        return rows
+    def usage(self):
+        return {"calls": 2, "cost": float("nan")}
+""",
+    )
+    policy = HostedPolicy(pool.connect(), read_policy(spec), 5)
+    assert PolicyNeeds.of(policy) == PolicyNeeds(observe_every=4, depth=True, prompt_tokens=7)
+    frames = np.random.default_rng(0).integers(0, 255, (30, 256, 256, 3), np.uint8)
+    policy.reset("Pick it.", {"front_rgb": frames, "joint_positions": np.zeros((30, 7))})
+    assert policy.metadata == {
+        "seed": 5,
+        "instruction": "Pick it.",
+        "fields": ["front_rgb", "joint_positions"],
+        "sum": int(frames.sum(dtype=np.int64)),
+        "shape": [30, 256, 256, 3],
+    }
+    picture = np.full((256, 256, 3), 9, np.uint8)
+    observation: Any = {"front_rgb": picture, "history": ({"front_rgb": picture},)}
+    assert np.array_equal(policy.act(observation), np.full((2, 8), 9.0))
+    assert picture.all()  # the world's own is untouched
+    policy.hear("The blue one.", 3)
+    assert policy.metadata["heard"] == ["The blue one.", 3]
+    assert policy.usage() == {"calls": 2.0}
+    policy.close()
+    policy.close()
+
+
+def test_pictures_of_a_video_are_drawn_when_they_are_read_and_then_sent_at_once(
+    pool: HostPool,
+    write_policy: Write,
+) -> None:
+    spec = write_policy(
+        "choosy",
+        """
+class It:
+    def reset(self, instruction, demonstration):
+        demonstration["front_rgb"]
+        self.video = demonstration
+        self.metadata = {}
+    def act(self, observation):
+        self.video.draw()
+        return np.zeros((1, 8))
+""",
+    )
+
+    class Video(dict[str, Any]):
+        drawn: list[str]
+
+        def __getitem__(self, field: str) -> Any:
+            self.drawn.append(field)
+            return super().__getitem__(field)
+
+    drawn = []
+    for _ in range(2):
+        video = Video(front_rgb=np.zeros((2, 4, 4, 3), np.uint8), joint_positions=np.zeros((2, 7)))
+        video["wrist_rgb"] = video["wrist_depth"] = np.zeros((2, 4, 4, 3), np.uint8)
+        video.drawn = []
+        policy = HostedPolicy(pool.connect(), read_policy(spec), 0)
+        policy.reset("Pick it.", video)
+        drawn.append(list(video.drawn))
+        policy.act({})  # type: ignore[typeddict-item]
+        policy.close()
+        assert sorted(video.drawn) == sorted(video)
+    assert drawn[0] == ["joint_positions", "front_rgb"]
+    # The second episode knows what the first one read.
+    assert sorted(drawn[1]) == sorted(video)
+
+
+# Records
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[Job, dict[str, Any]]:
+    """Records of worlds that share no host: the policies are in their process."""
+    plan = changed(paper_plan("Dice", policy_process="shared"), policies=PLAYERS)
+    return play(plan, tmp_path_factory.mktemp("alone"), InProcess())
+
+
+@pytest.mark.parametrize(("workers", "batch"), slow_but([(3, 3)], [(3, 3), (0, 16), (5, 16)]))
+def test_records_do_not_depend_on_workers_or_batches(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, alone: Any, workers: int, batch: int
+) -> None:
+    monkeypatch.setenv("ROBOIRG_TEST_SIZES", str(tmp_path / "sizes"))
+    plan = changed(paper_plan("Dice", batch=batch), policies=PLAYERS)
+    executor = LocalProcesses(workers) if workers else InProcess()
+    found = play(plan, tmp_path / "run", executor)
+    assert found == alone
+    assert {record["outcome"] for record in found.values()} == {"success", "failure", "error"}
+    # What fails for one episode of a batch costs only that one.
+    causes = [record["cause"] for record in found.values() if record["outcome"] == "error"]
+    assert set(causes) == {"policy: ValueError: one of them is bad (hosting_fakes.py, line 185)"}
+    sizes = [int(line) for line in (tmp_path / "sizes").read_text().split()]
+    assert sum(sizes) == 8 * hosting_fakes.LENGTH / 4
+    assert max(sizes) <= min(batch, max(workers, 1))
+    if workers > 2:  # of three, two wait while one is asked about
+        assert max(sizes) > 1
+    # One object, however many worlds there are.
+    records = read_records(tmp_path / "run")
+    made = {one.policy_metadata["made"] for one in records if "Batched" in one.policy}
+    assert made == {1}
+
+
+def test_a_privileged_policy_stays_beside_the_world(tmp_path: Path, write_policy: Write) -> None:
+    spec = write_policy(
+        "insider",
+        """
+class It:
+    cameras = ()
+    def attach(self, env):
+        self.env = env
+    def reset(self, instruction, demonstration):
+        self.metadata = {"secret": self.env.secret, "process": os.getpid() == os.getppid()}
+    def act(self, observation):
+        return np.ones((24, 8))
+""",
+    )
+    play(paper_plan(f"privileged:{spec}", 1).checked(), tmp_path / "run", InProcess())
+    (record,) = read_records(tmp_path / "run")
+    assert record.privileged
+    assert record.policy == "privileged:insider:It"
+    assert "token" in str(record.policy_metadata["secret"])
+
+
+def test_each_device_has_a_process(write_policy: Write) -> None:
+    ref = read_policy(
+        write_policy(
+            "located",
+            """
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        self.metadata = {"device": os.environ["CUDA_VISIBLE_DEVICES"], "process": os.getpid()}
+""",
+        )
+    )
+    with HostPool(Hosting(devices=("0", "3")).settings or HostSettings()) as pool:
+        worlds = [HostedPolicy(pool.connect(), ref, 0) for _ in range(4)]
+        for world in worlds:
+            world.reset("Pick it.", {})
+        found = [(world.metadata["device"], world.metadata["process"]) for world in worlds]
+    assert sorted(device for device, _ in found) == ["0", "0", "3", "3"]
+    assert len(set(found)) == 2
+
+
+# What a policy is
+
+
+def test_which_policies_get_a_process(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text('name = "mine"\npolicy = "somewhere:Mine"\n')
+    foreign = ["somewhere:Mine", f"system:{tmp_path}/mine.toml"]
+    ours = ["oracle", "random", "openpi://localhost:1", "system:GroundSG-QwenVL"]
+    assert [read_policy(one).is_foreign for one in foreign] == [True, True]
+    assert [read_policy(one).is_hosted for one in foreign] == [True, True]
+    assert not any(read_policy(one).is_hosted for one in ours)
+    assert read_policy("lerobot://some/checkpoint").is_hosted
+    assert not read_policy("lerobot://some/checkpoint").is_foreign
+
+
+def test_an_import_that_never_ends_is_ended(write_policy: Write) -> None:
+    with pytest.raises(InvalidValueError, match=r"not opened within 0[.]5 s"):
+        open_policy(read_policy(write_policy("endless", "time.sleep(3600)")), 0.5)
+
+
+def test_a_policy_is_described_without_being_imported(write_policy: Write) -> None:
+    spec = write_policy(
+        "versioned",
+        """
+class It:
+    version = "\\x1b[2J\\u202e\\n-\\ud800" + "7" * 500
+    prompt_tokens = 9
+    cameras = property(lambda self: ("front",))
+    def reset(self, instruction, demonstration): pass
+    def act(self, observation): pass
+""",
+    )
+    found = open_policy(read_policy(spec))
+    assert found.version.startswith(r"\x1b[2J\u202e\n-?77")  # never controls a terminal
+    assert len(found.version) < 220
+    assert found.needs == PolicyNeeds(prompt_tokens=9, cameras=("front",))
+    assert not found.is_privileged
+    assert "versioned" not in sys.modules
+    assert open_policy(read_policy("oracle")).is_privileged
+
+
+@pytest.mark.parametrize(
+    ("text", "error", "words"),
+    [
+        ("os._exit(3)", InvalidValueError, "ended with exit code 3"),
+        (
+            "from roboirg.core import errors; raise errors.MissingDependencyError('pip it')",
+            MissingDependencyError,
+            "pip it",
+        ),
+    ],
+)
+def test_a_policy_that_cannot_be_loaded_is_reported_before_the_run(
+    text: str, error: type, words: str, write_policy: Write
+) -> None:
+    with pytest.raises(error, match=words):
+        paper_plan(write_policy("broken", text), 1).checked()
+
+
+# Deaths
+
+
+def child_of(pool: HostPool) -> PolicyChild:
+    (child,) = pool._children.values()
+    return child
+
+
+def test_only_the_episode_to_blame_learns_of_a_crash(pool: HostPool, write_policy: Write) -> None:
+    spec = write_policy(
+        "fragile",
+        """
+class It:
+    def reset(self, instruction, demonstration):
+        self.word = instruction
+    def act(self, observation):
+        if self.word == "die":
+            print("last words")
+            os._exit(7)
+        return np.zeros((1, 8))
+""",
+    )
+    good, bad, over, late = (HostedPolicy(pool.connect(), read_policy(spec), 0) for _ in range(4))
+    good.reset("live", {})
+    bad.reset("die", {})
+    assert good.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
+    with pytest.raises(EpisodeError) as guilty:
+        bad.act({})  # type: ignore[typeddict-item]
+    assert guilty.value.kind == "policy"
+    assert str(guilty.value) == "the process ended with exit code 7 in the policy's act()"
+    child = child_of(pool)
+    child.check(0.1)
+    # All who ask are told alike, even after a check.
+    expected = Loss("policy", "the process ended with exit code 7", b"last words\n")
+    assert child.loss() == child.loss() == expected
+    with pytest.raises(EpisodeLostError):
+        good.act({})  # type: ignore[typeddict-item]
+    with pytest.raises(EpisodeLostError):
+        over.usage()  # what it has cost is lost
+    for one in (good, bad, over, late):
+        one.close()
+    again = HostedPolicy(pool.connect(), read_policy(spec), 0)  # in a new process
+    again.reset("live", {})
+    assert again.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
+    again.close()
+
+
+def test_those_who_were_asked_together_are_played_again_alone(
+    host: Host,
+) -> None:
+    """Would catch that each of them is to blame for a process that ends in their call."""
+    text = """
+from roboirg.runs.hosting import host_process
+from roboirg.runs.hosting.messages import Begun
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        host_process.Begun = lambda together: Begun(True)
+    def act(self, observation):
+        os._exit(5)
+"""
+    world = host("joint", text)
+    world.reset("Pick it.", {})
+    with pytest.raises(EpisodeLostError, match="exit code 5") as lost:
+        world.act({})  # type: ignore[typeddict-item]
+    assert lost.value.alone
+
+
+def test_a_host_goes_on_after_worlds_that_die_or_are_interrupted(
+    pool: HostPool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Would catch an interrupt that is forgotten, and a worker to whom nobody listens any more."""
+
+    class Video(dict[str, Any]):
+        def __getitem__(self, field: str) -> Any:
+            raise KeyboardInterrupt
+
+    hosts, ref = pool.connect(), read_policy("hosting_fakes:Dice")
+    with monkeypatch.context() as without:
+        without.setattr(host_pool, "PolicyChild", lambda _environment: os.open("/nonexistent", 0))
+        with pytest.raises(EpisodeLostError, match="could not be started"):
+            HostedPolicy(hosts, ref, 0)
+    world = HostedPolicy(hosts, ref, 0)
+    with pytest.raises(KeyboardInterrupt):
+        world.reset("Pick it.", Video(front_rgb=None))
+    assert world.usage() == {}
+    world.close()
+    line = pool.connect()
+    HostedPolicy(line, ref, 0)
+    line.sendall((1000).to_bytes(8, "big") + b"half a message")
+    line.close()
+    HostedPolicy(pool.connect(), ref, 1).close()
+
+
+def test_time_in_the_queue_is_not_the_calls_and_what_hangs_between_calls_is_ended(
+    pool: HostPool,
+    write_policy: Write,
+) -> None:
+    """Would catch a limit that begins when a call is sent, and a wait without any limit."""
+    spec = write_policy(
+        "stopping",
+        """
+import signal, threading
+class It:
+    def reset(self, instruction, demonstration):
+        time.sleep(1.5)
+    def hear(self, text, step):
+        threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGSTOP)).start()
+    def act(self, observation):
+        return np.zeros((1, 8))
+""",
+    )
+    worlds = [HostedPolicy(pool.connect(), read_policy(spec), 0, 4.0) for _ in range(4)]
+    with ThreadPoolExecutor() as threads:
+        list(threads.map(lambda world: world.reset("wait", {}), worlds))  # the last for 6 s
+    worlds[0].hear("stop", 0)
+    time.sleep(1)
+    with pytest.raises(EpisodeLostError, match="began no call within 4 s"):
+        worlds[1].act({})  # type: ignore[typeddict-item]
+    for world in worlds:
+        world.close()
+
+
+def test_a_call_is_not_to_blame_for_a_process_that_another_world_has_ended(
+    pool: HostPool, tmp_path: Path, write_policy: Write
+) -> None:
+    """Would catch a call that begins when an earlier one returns just after its limit."""
+    text = """
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        pathlib.Path(__file__).with_name("begun").touch()
+        time.sleep(3600)
+"""
+    ref = read_policy(write_policy("sleepy", text))
+    hosts = pool.connect()
+    late, world = HostedPolicy(hosts, ref, 0), HostedPolicy(pool.connect(), ref, 0)
+    with ThreadPoolExecutor() as threads:
+        call = threads.submit(world.reset, "Pick it.", {})
+        while not (tmp_path / "begun").exists():
+            time.sleep(0.01)
+        ask(hosts, HostRequest("kill"))
+        with pytest.raises(EpisodeLostError, match="another episode broke the process"):
+            call.result()
+    late.close()
+
+
+def test_a_process_is_no_hanging_one_while_it_starts_or_its_world_draws(
+    pool: HostPool,
+    host: Host,
+) -> None:
+    starting = PolicyChild(os.environ)
+    starting.check(0.01)
+    assert not starting.is_over
+    starting.end()
+    text = """
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        self.metadata = {"sum": int(demonstration["front_rgb"].sum())}
+"""
+    world = host("viewer", text)
+
+    class Video(dict[str, Any]):
+        def __getitem__(self, field: str) -> Any:
+            child_of(pool).check(10.0)  # of a world that waits
+            return super().__getitem__(field)
+
+    world.reset("Pick it.", Video(front_rgb=np.ones((2, 4, 4, 3), np.uint8)))
+    assert world.metadata == {"sum": 96}
+    world.close()
+
+
+def test_answers_that_nobody_asked_for_hide_no_process_that_hangs(
+    pool: HostPool,
+    host: Host,
+) -> None:
+    text = """
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        hostile_policies.host_of(sys._getframe())._supervisor.send(b"!" * 1000)
+"""
+    world = host("eager", text)
+    world.reset("Pick it.", {})
+    *_, pid = descendants(os.getpid())
+    os.kill(pid, signal.SIGSTOP)
+    child_of(pool).check(0.1)
+    assert child_of(pool).is_over
+    world.close()
+
+
+@pytest.mark.parametrize("answer", ["nothing", "half a message", "to take in half a call"])
+def test_a_call_that_is_never_begun_ends_in_an_error_although_its_process_answers_checks(
+    pool: HostPool, write_policy: Write, monkeypatch: pytest.MonkeyPatch, answer: str
+) -> None:
+    text = """
+def answer_checks(supervisor, line, way):
+    if way == "half a message":
+        line.sendall((64).to_bytes(8, "big"))
+    while True:
+        time.sleep(0.05)
+        supervisor.recv(4096)
+        supervisor.send(b"!")
+        if way == "half a message":
+            line.sendall(b"0")
+        if way == "to take in half a call":
+            line.recv(1)
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        host = hostile_policies.host_of(sys._getframe())
+        line = hostile_policies.line_of(host)
+        host._collect = lambda _seconds: answer_checks(host._supervisor, line, instruction)
+"""
+    world = HostedPolicy(pool.connect(), read_policy(write_policy("silent", text)), 0)
+    world.reset(answer, {})
+    world._line._limit_s = 0.5
+    for name, seconds in (("DRAW_S", 1.0), ("MARGIN_S", 60.0)):
+        monkeypatch.setattr(f"roboirg.runs.hosting.policy_child.{name}", seconds)
+    picture: Any = {"front_rgb": np.zeros((2000, 2000, 3), np.uint8)}
+    with pytest.raises(EpisodeError, match=r"did not begin the policy's act.., though"):
+        world.act(picture)
+
+
+def test_messages_in_pieces_take_no_longer_than_a_call_may(
+    pool: HostPool, write_policy: Write
+) -> None:
+    text = """
+from roboirg.runs.hosting import host_process
+from roboirg.runs.hosting.messages import Outcome, send
+head = (1000).to_bytes(8, "big")
+class It(hostile_policies.Hostile):
+    def reset(self, instruction, demonstration):
+        if instruction == "slowly":
+            line = hostile_policies.line_of(hostile_policies.host_of(sys._getframe()))
+            line.sendall(head)
+            while True:
+                time.sleep(0.1)
+                line.sendall(b"0")
+        def reply(line, message):
+            send(line, message)
+            if isinstance(message, Outcome):
+                line.sendall(head)
+        host_process.send = reply
+"""
+    ref = read_policy(write_policy("piecemeal", text))
+    early, world = HostedPolicy(pool.connect(), ref, 0), HostedPolicy(pool.connect(), ref, 0)
+    early.reset("too early", {})
+    with pytest.raises(EpisodeLostError, match="a message of 1,000 bytes"):
+        early.reset("again", {})
+    world._line._limit_s = 0.5
+    with pytest.raises(EpisodeError, match=r"did not return within 0[.]5 s"):
+        world.reset("slowly", {})
+
+
+def host_pids(supervisor: int) -> list[int]:
+    """Return the processes that a supervisor started for policies."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            status, line = (path / "stat").read_text(), (path / "cmdline").read_bytes()
+        except OSError:
+            continue
+        if int(status.rpartition(")")[2].split()[1]) == supervisor and b"host_process" in line:
+            found.append(int(path.name))
+    return found
+
+
+@pytest.mark.slow
+def test_killed_hosts_worlds_and_supervisors_lose_and_double_nothing(tmp_path: Path) -> None:
+    folder, undisturbed = tmp_path / "killed", tmp_path / "undisturbed"
+    folder.mkdir()
+    expected = play(hosting_fakes.KILLED_PLAN, undisturbed, InProcess())
+    command = [sys.executable, hosting_fakes.__file__, str(folder)]
+    rng, struck = random.Random(0), 0
+    child = subprocess.Popen(command)
+    for _ in range(KILLS):
+        time.sleep(rng.uniform(0.1, 1.5))
+        if child.poll() is not None:
+            child = subprocess.Popen(command)
+            continue
+        worlds = [pid for pid in worker_pids(folder) if is_alive(pid)]
+        victims = rng.choice([host_pids(child.pid), worlds, [child.pid]])
+        for victim in victims[:1]:
+            with contextlib.suppress(ProcessLookupError):  # it has just ended
+                os.kill(victim, signal.SIGKILL)
+                struck += 1
+    child.wait()
+    for _ in range(5):  # what ended in an error is played again
+        done = subprocess.run(command, check=False)
+        outcomes = {record.outcome for record in read_records(folder)}
+        if done.returncode == 0 and "error" not in outcomes:
+            break
+    found = {record.identity: comparable(record) for record in read_records(folder)}
+    assert found == expected
+    assert struck
+    assert not any(map(is_alive, worker_pids(folder)))
+
+
+def test_an_episode_that_is_lost_again_and_again_ends_in_an_error(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    write_policy: Write,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    spec = write_policy(
+        "deserter",
+        """
+import threading
+class It:
+    cameras = ()
+    def reset(self, instruction, demonstration):
+        print("last words")
+        threading.Timer(0.6, lambda: os._exit(5)).start()  # between two calls
+        self.metadata = {}
+    def act(self, observation):
+        return np.ones((1, 8))
+""",
+    )
+    monkeypatch.setattr("roboirg.runs.play.rollout.MAX_LOSSES", 2)
+    plan = paper_plan(spec, 1)
+    runner: PaperRunner = paper_runner(plan, tmp_path, seconds=2.0)
+    (record,) = InProcess().run(deque(plan.jobs()), runner)
+    assert (record.outcome, record.error, record.attempt) == ("error", "policy", 2)
+    assert "the process ended with exit code 5" in str(record.cause)
+    assert "last words" in capfd.readouterr().err  # in a worker, of the episode's log

@@ -1,0 +1,154 @@
+"""A real Ray cluster of several nodes on this machine."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import hosting_fakes
+import pytest
+from hosting_fakes import PatientRunner, paper_plan, paper_runner
+from run_fakes import (
+    FakePlayer,
+    all_comparable,
+    changed,
+    is_alive,
+    line_count,
+    small_plan,
+    worker_pids,
+)
+
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.policies.by_name.finding import read_policy
+from roboirg.records.store import read_records
+from roboirg.runs.hosting.host_pool import HostSettings
+from roboirg.runs.hosting.hosted_policy import HostedPolicy
+from roboirg.runs.run.executor import InProcess, LocalProcesses
+from roboirg.runs.run.ray_cluster import RayCluster
+from roboirg.runs.run.ray_machines import MachineAgent, MachineVersions
+from roboirg.runs.run.runner import run_plan
+
+pytestmark = pytest.mark.slow
+
+ray = pytest.importorskip("ray")
+
+PLAN = small_plan(5).model_copy(update={"arms": ("told", "silent")})
+
+
+@pytest.fixture(scope="module")
+def here(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, object]]:
+    folder = tmp_path_factory.mktemp("here")
+    run_plan(PLAN, folder, FakePlayer(folder), InProcess())
+    return all_comparable(folder)
+
+
+@pytest.fixture
+def cluster() -> Iterator[Any]:
+    from ray.cluster_utils import Cluster
+
+    nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    yield nodes
+    ray.shutdown()
+    nodes.shutdown()
+
+
+def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
+    cluster: Any, tmp_path: Path, here: list[dict[str, object]]
+) -> None:
+    doomed = cluster.add_node(num_cpus=1)
+    cluster.add_node(num_cpus=1)
+    ray.init(address=cluster.address, log_to_driver=False)
+    killed = threading.Event()
+
+    def kill() -> None:
+        # Until each of the three machines has one of the endless episodes in hand.
+        while line_count(tmp_path) < 8 or len(players := worker_pids(tmp_path, "waiting")) < 3:
+            time.sleep(0.05)
+        cluster.remove_node(doomed, allow_graceful=False)
+        while all(map(is_alive, players)):  # they outlive their node for a moment
+            time.sleep(0.05)
+        (tmp_path / "gate").touch()
+        killed.set()
+
+    killer = threading.Thread(target=kill, daemon=True)
+    killer.start()
+    summary = run_plan(
+        changed(PLAN, tries=3),
+        tmp_path,
+        FakePlayer(tmp_path, gate=tmp_path / "gate", closed=2),
+        RayCluster(),
+    )
+    killer.join(300)
+    assert killed.is_set()
+    assert (summary.errors, summary.missing) == ((), 0)
+    # The episode that it had in hand was tried again.
+    assert line_count(tmp_path) > len(here)
+    assert all_comparable(tmp_path) == here
+    for record in read_records(tmp_path):
+        assert (tmp_path / str(record.video)).read_text() == record.slug
+
+    # What would end every episode ends the run if all machines say so.
+    with pytest.raises(RoboIRGError, match=r"No machine of the Ray cluster.*No Vulkan device"):
+        run_plan(PLAN, tmp_path / "b", FakePlayer(tmp_path, fatal=0), RayCluster(1))
+
+
+def test_the_workers_of_a_machine_share_its_policy_hosts(
+    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(Path(hosting_fakes.__file__).parent)
+    plan = paper_plan("Resident", 12)
+    local, far = tmp_path / "local", tmp_path / "far"
+    for folder in (local, far):
+        folder.mkdir()
+    run_plan(plan, local, paper_runner(plan, local), LocalProcesses(2))
+    cluster.add_node(num_cpus=2)
+    ray.init(address=cluster.address, log_to_driver=False)
+    run_plan(
+        plan,
+        far,
+        PatientRunner(far, hosting=plan.hosting.settings, notes=far, wanted=3),
+        RayCluster(),
+    )
+
+    assert [one | {"usage": None} for one in all_comparable(far)] == [
+        one | {"usage": None} for one in all_comparable(local)
+    ]
+    assert len(worker_pids(far)) == 3
+    hosts = {int(record.usage["process"]) for record in read_records(far)}
+    assert len(hosts) == 2  # one on each of the two machines
+    for _ in range(600):
+        if not any(map(is_alive, hosts)):
+            return
+        time.sleep(0.1)
+    pytest.fail("a policy's process is left")
+
+
+def test_a_cluster_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
+    with pytest.raises(RoboIRGError, match=r"cluster '127\.0\.0\.1:1' cannot be joined") as caught:
+        run_plan(PLAN, tmp_path, FakePlayer(tmp_path), RayCluster(address="127.0.0.1:1"))
+    assert "\n" not in str(caught.value)
+
+
+def test_no_workers_is_one_sentence() -> None:
+    with pytest.raises(InvalidValueError, match="workers is 0"):
+        RayCluster(0)
+
+
+def test_only_who_has_the_key_reaches_the_hosts_of_a_machine(tmp_path: Path) -> None:
+    hosts = MachineAgent(tmp_path / "agent", HostSettings())
+    address = hosts.check(MachineVersions.expected(())).hosts
+    try:
+        with address._replace(key=b"x" * 32).connect() as stranger:
+            assert stranger.recv(1) == b""
+        with socket.socket(socket.AF_UNIX) as idle:
+            idle.connect(address.path)
+            assert idle.recv(1) == b""
+        with address.connect() as line:
+            HostedPolicy(line, read_policy("hosting_fakes:Dice"), 0).close()
+    finally:
+        hosts.close()
+    assert not Path(address.path).exists()

@@ -1,0 +1,201 @@
+"""One bad machine of a Ray cluster costs no record, and is named once."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import pytest
+import ray_fakes
+from ray_fakes import BAD_MACHINE, NotingPlace, WithoutModule, WithoutVulkan
+from run_fakes import FakePlayer, changed, line_count, small_plan
+
+from roboirg.core.errors import InvalidValueError, RoboIRGError
+from roboirg.records.store import RECORDS_FILE, read_records
+from roboirg.runs.plan.plan_sections import WorkerNeeds
+from roboirg.runs.run import ray_pool
+from roboirg.runs.run.progress import Reporter
+from roboirg.runs.run.ray_cluster import RayCluster
+from roboirg.runs.run.runner import run_plan
+
+pytestmark = pytest.mark.slow
+
+ray = pytest.importorskip("ray")
+
+PLAN = changed(small_plan(8), tries=3)
+
+
+@pytest.fixture
+def cluster(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    from ray.cluster_utils import Cluster
+
+    monkeypatch.syspath_prepend(Path(ray_fakes.__file__).parent)
+    nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    yield nodes
+    ray.shutdown()
+    nodes.shutdown()
+
+
+def actors(cluster: Any, name: str) -> list[int]:
+    """Return the processes of this cluster's actors, as other tests may have clusters, too."""
+    raylets = [node.all_processes["raylet"][0].process.pid for node in cluster.list_all_nodes()]
+    command = ["pgrep", "-P", ",".join(map(str, raylets)), "-f", f"ray::{name}"]
+    found = subprocess.run(command, capture_output=True, check=False)
+    return list(map(int, found.stdout.split()))
+
+
+def after(
+    folder: Path, count: int, act: Callable[[], object], run_ended: Callable[[], bool] | None = None
+) -> threading.Thread:
+    """Act in a thread as soon as that many records are stored; never, if the run ends before."""
+
+    def run() -> None:
+        while line_count(folder) < count:
+            if run_ended is not None and run_ended():
+                return
+            time.sleep(0.05)
+        act()
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    return thread
+
+
+FAULTS = (
+    (WithoutVulkan, "random", "No Vulkan device can render; install one."),
+    (WithoutModule, "random", "No module named 'needed_here'"),
+    (FakePlayer, "local_policy:Local", "No module named 'their_model'"),
+)
+
+
+def test_a_bad_machine_is_left_out_and_named_once(cluster: Any, tmp_path: Path) -> None:
+    cluster.add_node(num_cpus=1, env_vars={BAD_MACHINE: "1"})
+    for number, (play, policy, fault) in enumerate(FAULTS):
+        warnings, folder = mock.Mock(spec=Reporter), tmp_path / str(number)
+        gate = tmp_path / f"left-out-{number}"
+        warnings.warn.side_effect = lambda text, gate=gate: "left out" in text and gate.touch()
+        plan = changed(small_plan(8, (policy,)), tries=3)
+        executor = RayCluster(address=cluster.address)
+        player = play(folder, gate=gate, closed=7)  # Ray may start the bad machine's worker late
+        summary = run_plan(plan, folder, player, executor, reporter=warnings)
+        assert (summary.errors, summary.missing) == ((), 0)
+        assert line_count(folder) == len(plan.jobs())  # nothing that it played was stored
+        (named,) = [text for ((text,), _) in warnings.warn.call_args_list if "left out" in text]
+        assert fault.rstrip(".") in named
+
+
+@pytest.mark.parametrize("actor", ["RemoteWorker", "MachineAgent"])
+def test_what_is_frozen_is_noticed_and_its_episode_played_elsewhere(
+    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, actor: str
+) -> None:
+    monkeypatch.setattr(ray_pool, "BEAT_S", 1.0)
+    monkeypatch.setattr(ray_pool, "SILENCE_S", 300.0)
+    cluster.add_node(num_cpus=1)
+    frozen: list[int] = []
+
+    def freeze() -> None:
+        frozen.append(actors(cluster, actor)[0])
+        # Not before: Ray may take longer to start an actor.
+        monkeypatch.setattr(ray_pool, "SILENCE_S", 20.0)
+        os.kill(frozen[0], signal.SIGSTOP)
+
+    play = FakePlayer(tmp_path, 0.5, gate=tmp_path / "gate", closed=7)
+    run = threading.Thread(
+        target=run_plan, args=(PLAN, tmp_path, play, RayCluster(address=cluster.address))
+    )
+    run.start()
+    after(tmp_path, 4, freeze, lambda: not run.is_alive()).join()
+    deadline = time.monotonic() + 300
+    while frozen and Path(f"/proc/{frozen[0]}").exists() and run.is_alive():
+        if time.monotonic() > deadline:
+            break
+        time.sleep(0.1)
+    (tmp_path / "gate").touch()
+    run.join()
+    assert frozen, "the run ended before anything was frozen"
+    assert not Path(f"/proc/{frozen[0]}").exists()
+    kept = list(read_records(tmp_path))
+    assert (len(kept), [one.error for one in kept if one.error]) == (len(PLAN.jobs()), [])
+    assert "has not answered" in (tmp_path / RECORDS_FILE).read_text()
+
+
+def test_a_machine_that_joins_is_used_and_a_head_without_cpus_is_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from ray.cluster_utils import Cluster
+
+    nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
+    warnings = mock.Mock(spec=Reporter)
+    monkeypatch.setattr(ray_pool, "WAIT_S", 2.0)
+    play, executor = FakePlayer(tmp_path), RayCluster(address=nodes.address)
+    run = threading.Thread(
+        target=run_plan, args=(PLAN, tmp_path, play, executor), kwargs={"reporter": warnings}
+    )
+    try:
+        run.start()
+        while not warnings.warn.called and run.is_alive():
+            time.sleep(0.1)
+        nodes.add_node(num_cpus=1)
+        run.join()
+    finally:
+        ray.shutdown()
+        nodes.shutdown()
+    assert "Waiting for a free CPU" in warnings.warn.call_args_list[0].args[0]
+    assert line_count(tmp_path) == len(PLAN.jobs())
+
+
+def test_a_worker_gets_what_the_plan_asks_for(
+    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, out = tmp_path / "policies", tmp_path / "run"
+    folder.mkdir()
+    (folder / "note.txt").write_text("copied")
+    here = Path(ray_fakes.__file__).parent
+    for module in ("ray_fakes.py", "run_fakes.py", "made_records.py"):
+        shutil.copy(here / module, folder)
+    for rack in ("a", "b"):
+        cluster.add_node(num_cpus=2, num_gpus=1, labels={"rack": rack}, env_vars={"RACK": rack})
+    monkeypatch.setenv("A_KEY", "secret")
+    needs = WorkerNeeds(
+        gpus=0.5, labels={"rack": "b"}, variables=("A_KEY",), working_dir=str(folder)
+    )
+    executor = RayCluster(address=cluster.address, needs=needs)
+    summary = run_plan(PLAN, out, NotingPlace(out), executor)
+    assert (summary.errors, summary.missing) == ((), 0)
+    assert {(out / str(one.video)).read_text() for one in read_records(out)} == {"secret copied b"}
+
+    needs = WorkerNeeds(variables=("NOT_SET_HERE",))
+    with pytest.raises(InvalidValueError, match="NOT_SET_HERE is not set here"):
+        run_plan(
+            small_plan(9), out, NotingPlace(out), RayCluster(address=cluster.address, needs=needs)
+        )
+
+
+def test_the_loss_of_the_head_is_one_sentence(
+    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ray_pool, "HEAD_LOST_S", 5.0)
+    gcs = cluster.head_node.all_processes["gcs_server"][0].process.pid
+
+    def kill() -> None:
+        # A call under way for the machines would wait until Ray ends this process.
+        monkeypatch.setattr(ray_pool, "LOOK_S", 3600.0)
+        # The one that is under way has ended when two more episodes are stored.
+        deadline, known = time.monotonic() + 60, line_count(tmp_path)
+        while line_count(tmp_path) < known + 2 and time.monotonic() < deadline:
+            time.sleep(0.05)
+        os.kill(gcs, signal.SIGKILL)
+
+    after(tmp_path, 4, kill)
+    play = FakePlayer(tmp_path, 0.5, gate=tmp_path / "gate", closed=4)
+    with pytest.raises(RoboIRGError, match=r"head of the Ray cluster .* same command again"):
+        run_plan(PLAN, tmp_path, play, RayCluster(address=cluster.address))
+    assert 4 <= line_count(tmp_path) == len(list(read_records(tmp_path)))

@@ -1,0 +1,287 @@
+"""Real processes, real signals."""
+
+from __future__ import annotations
+
+import dataclasses
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from unittest import mock
+
+import pytest
+import run_fakes
+from flat_jobs import with_version
+from made_records import fill
+from msgspec.structs import replace
+from run_fakes import (
+    FakePlay,
+    all_comparable,
+    changed,
+    fake_run,
+    is_alive,
+    line_count,
+    small_plan,
+    starts,
+    worker_pids,
+)
+
+from roboirg.core.errors import InvalidValueError, RenderDeviceError
+from roboirg.core.policy_needs import PolicyNeeds
+from roboirg.core.policy_ref import unknown_policy
+from roboirg.policies.by_name.finding import read_policy
+from roboirg.records.record import ErrorKind, Job, Record
+from roboirg.records.record_codec import StoreError
+from roboirg.records.run_files import earlier_plans
+from roboirg.records.store import (
+    RECORDS_FILE,
+    TORN_FILE,
+    read_records,
+)
+from roboirg.runs.plan.stored_plans import read_plan, read_plans
+from roboirg.runs.play import episode_record
+from roboirg.runs.run.executor import InProcess, LocalProcesses, choose_executor
+from roboirg.runs.run.progress import Reporter
+from roboirg.runs.run.runner import RunSummary, run_plan
+
+Comparable = list[dict[str, object]]
+WAIT_S = 300.0
+OTHER_WORDS = "PickXtimes/test@0a0a0a0a0a0a"
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + WAIT_S
+    while not condition():
+        assert time.monotonic() < deadline, "it takes too long"
+        time.sleep(0.02)
+
+
+def begin(folder: Path, workers: int = 1) -> subprocess.Popen[bytes]:
+    """The run of `run_fakes` in a process of its own, until three episodes have ended."""
+    child = subprocess.Popen([sys.executable, run_fakes.__file__, folder, str(workers)])
+    wait_until(lambda: line_count(folder) >= 3 or child.poll() is not None)
+    assert child.poll() is None
+    return child
+
+
+def finish(folder: Path) -> RunSummary:
+    return fake_run(folder, small_plan(8))
+
+
+@pytest.fixture(scope="module")
+def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> Comparable:
+    folder = tmp_path_factory.mktemp("uninterrupted")
+    fake_run(folder, small_plan(8))
+    return all_comparable(folder)
+
+
+def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(
+    tmp_path: Path, uninterrupted: Comparable
+) -> None:
+    child = begin(tmp_path, workers=2)
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    wait_until(lambda: not any(map(is_alive, worker_pids(tmp_path))))
+    stored = len(read_records(tmp_path))
+    assert 3 <= stored < 16
+    # The worst that a kill can leave behind:
+    with (tmp_path / RECORDS_FILE).open("ab") as file:
+        file.write(b'{"policy":"random","ta')
+
+    summary = finish(tmp_path)
+
+    assert summary.played == 16 - stored
+    assert len((tmp_path / TORN_FILE).read_bytes().rstrip()) == 22
+    assert all_comparable(tmp_path) == uninterrupted
+    assert line_count(tmp_path) == 16
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stopped_run_ends_its_workers_and_keeps_what_ended(
+    tmp_path: Path, number: signal.Signals, uninterrupted: Comparable
+) -> None:
+    child = begin(tmp_path)
+    child.send_signal(number)
+    assert child.wait(WAIT_S) != 0
+    assert not any(map(is_alive, worker_pids(tmp_path)))
+    assert 3 <= len(read_records(tmp_path)) < 16
+    finish(tmp_path)
+    assert all_comparable(tmp_path) == uninterrupted
+
+
+def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path: Path) -> None:
+    plan = changed(small_plan(), settings="direct")
+    summary = run_plan(plan, tmp_path, FakePlay(tmp_path, deadly=2), LocalProcesses(1))
+    (error,) = (record for record in read_records(tmp_path) if record.outcome == "error")
+    assert (error.episode, error.error, error.attempt) == (2, "infrastructure", 2)
+    assert error.cause == "infrastructure: the process died of signal 9 (Killed) in the environment"
+    assert (summary.total, summary.played, len(summary.errors), summary.missing) == (4, 4, 1, 0)
+    assert len(starts(tmp_path, error.identity)) == 2
+    # Errors are played again unless asked not to.
+    same = fake_run(tmp_path, plan, retry_errors=False)
+    assert (same.played, len(same.errors)) == (0, 1)
+    mended = fake_run(tmp_path, plan)
+    assert (mended.played, max(one.attempt for one in read_records(tmp_path))) == (1, 3)
+    assert fake_run(tmp_path, plan).played == 0
+    assert not earlier_plans(tmp_path)  # it was the same one each time
+
+
+def test_missing_graphics_stop_the_run_and_lose_nothing(tmp_path: Path) -> None:
+    with pytest.raises(RenderDeviceError, match="No Vulkan device can render; install one"):
+        run_plan(small_plan(), tmp_path, FakePlay(fatal=2), LocalProcesses(1))
+    assert {record.episode for record in read_records(tmp_path)} == {0, 1}
+
+
+def test_a_folder_may_get_more_and_fewer_jobs(tmp_path: Path) -> None:
+    fake_run(tmp_path, small_plan(2))
+    more = fake_run(tmp_path, small_plan(4))
+    assert (more.played, more.total) == (4, 8)
+    fewer = fake_run(tmp_path, small_plan(1))
+    assert (fewer.played, fewer.total, fewer.missing) == (0, 2, 0)
+    assert len(read_records(tmp_path)) == 8
+    # What the larger one lacks is not missing any more.
+    assert (read_plan(tmp_path), *read_plans(tmp_path)) == (small_plan(1), small_plan(1))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "sentence"),
+    [
+        ("seed", 7, r"PickXtimes test/0 with scene seed 7, but .* has \d+; choose another"),
+        ("environment_version", 99, "of environment version 99, but this roboirg has version 1;"),
+        ("language_version", "99.0", r"language version 99\.0, but this roboirg has version \d"),
+        ("task", "Gone", "of words version .*, but this roboirg has version Gone/test@none;"),
+        (
+            "words",
+            OTHER_WORDS,
+            f"of words version {OTHER_WORDS}, but this roboirg has version Pick",
+        ),
+        ("policy_version", "old", r"random whose policy version is old, but now it is built-in"),
+    ],
+)
+def test_worlds_of_two_versions_are_not_mixed(
+    tmp_path: Path, name: str, value: object, sentence: str
+) -> None:
+    played, fine = map(FakePlay(), small_plan(1).jobs())
+    is_policy = name == "policy_version"
+    record = with_version(played, "old") if is_policy else replace(played, **{name: value})
+    lost = replace(fine, outcome="error", error="connection", cause="connection: x")
+    fill(tmp_path, lost, record)  # not the first
+    with pytest.raises(StoreError, match=sentence):
+        fake_run(tmp_path, small_plan(2))
+    assert len(read_records(tmp_path)) == 2
+    assert read_plan(tmp_path) is None
+
+
+def test_a_torn_line_is_told_before_anything_is_played(tmp_path: Path) -> None:
+    (tmp_path / RECORDS_FILE).write_bytes(b'{"policy":"random","ta')
+    ears = mock.Mock(spec=Reporter)
+    fake_run(tmp_path, small_plan(1), reporter=ears)
+    heard = [name for name, *_ in ears.method_calls if name in ("warn", "advance")]
+    assert heard == ["warn", "advance", "advance"]
+    ((notice,), _) = ears.warn.call_args
+    assert "(22 bytes) to" in notice
+    assert "again" not in notice
+
+
+@pytest.mark.parametrize(
+    ("trained", "warned"),
+    [
+        (None, []),
+        (("PickXtimes", "BinFill"), []),
+        (
+            ("BinFill",),
+            ["random plays PickXtimes, which it was not trained on: it was trained on BinFill."],
+        ),
+    ],
+)
+def test_tasks_that_a_policy_was_not_trained_on_are_named_once(
+    tmp_path: Path, trained: tuple[str, ...] | None, warned: list[str]
+) -> None:
+    ears = mock.Mock(spec=Reporter)
+    needs = PolicyNeeds(trained_tasks=trained)
+    plan = changed(
+        small_plan(2), policies=(dataclasses.replace(read_policy("random"), needs=needs),)
+    )
+    fake_run(tmp_path, plan, reporter=ears)
+    assert [one.args[0] for one in ears.warn.call_args_list] == warned
+
+
+def test_workers_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert isinstance(choose_executor(None), LocalProcesses)
+    monkeypatch.setenv("ROBOIRG_WORKERS", "5")
+    assert choose_executor(None) == LocalProcesses(5)
+    assert choose_executor(0) == InProcess()
+    assert choose_executor(3) == LocalProcesses(3)
+    with pytest.raises(InvalidValueError, match="workers is -1"):
+        choose_executor(-1)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "what"),
+    [
+        ("language_version", "7", "language"),
+        ("environment_version", 7, "environment"),
+        ("words", OTHER_WORDS, "words"),
+    ],
+)
+def test_a_record_of_another_version_is_not_stored(
+    tmp_path: Path, field: str, value: object, what: str
+) -> None:
+    plan = small_plan(1).checked()
+
+    def elsewhere(job: Job) -> Record:
+        return replace(FakePlay()(job), **{field: value})
+
+    with pytest.raises(StoreError, match=f"with {what} version {value}, .* was not stored"):
+        run_plan(plan, tmp_path, elsewhere, InProcess())
+    assert not (tmp_path / RECORDS_FILE).read_bytes()
+
+
+def test_the_fingerprint_of_the_code_sees_data_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "roboirg"
+    monkeypatch.setattr(episode_record, "__file__", str(folder / "a" / "b" / "module.py"))
+    folder.mkdir()
+    found = set()
+    for name, text in (("a.py", "1"), ("words.toml", "1"), ("words.toml", "2")):
+        (folder / name).write_text(text)
+        found.add(episode_record.code_fingerprint.__wrapped__())
+    assert len(found) == 3
+    (folder / "__pycache__").mkdir()
+    (folder / "__pycache__" / "a.pyc").write_text("1")
+    assert episode_record.code_fingerprint.__wrapped__() in found
+
+
+@pytest.mark.parametrize(("error", "place"), [("infrastructure", 1), ("environment", -1)])
+def test_what_was_lost_is_retried_at_once_and_errors_after_all_others(
+    tmp_path: Path, error: ErrorKind, place: int
+) -> None:
+    played: list[str] = []
+
+    def play(job: Job) -> Record:
+        played.append(job.slug)
+        record = FakePlay()(job)
+        if len(played) > 1:
+            return record
+        return replace(record, outcome="error", error=error, cause=f"{error}: x")
+
+    run_plan(small_plan(4), tmp_path, play, InProcess())
+    assert played[place] == played[0]
+    assert len(played) == len(small_plan(4).jobs()) + 1
+
+
+def test_machines_of_other_versions_are_named() -> None:
+    from roboirg.runs.run.ray_machines import MachineVersions
+
+    random = read_policy("random")
+    here = MachineVersions.expected((unknown_policy("x"), random))
+    assert here.difference(MachineVersions.expected((read_policy("oracle"), random))) is None
+    there = here._replace(language="2.0.1")
+    assert (
+        here.difference(there) == f"its language has version 2.0.1 there and {here.language} here"
+    )
+    other = here._replace(policies=(here.policies[0], dataclasses.replace(random, version="old")))
+    assert str(here.difference(other)).startswith("the policy version of random is old there")

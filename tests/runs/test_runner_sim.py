@@ -1,0 +1,105 @@
+"""The runner with the real world: what the fakes cannot show."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import Result
+from run_fakes import all_comparable
+from typer.testing import CliRunner
+
+from roboirg.main import app
+from roboirg.records.episode_log import log_path
+from roboirg.records.store import read_records
+from roboirg.runs.plan.stored_plans import read_plan
+
+pytestmark = pytest.mark.sim
+
+LOUD = """
+import os
+import numpy as np
+
+class Loud:
+    cameras = ()
+    def __init__(self, seed=0):
+        print("made")
+        self.calls = 0
+    def reset(self, instruction, demonstration): print("told:", instruction)
+    def act(self, observation):
+        os.write(2, b"asked\\n")
+        self.calls += 1
+        if observation["joint_positions"].sum() > 1e9: return None
+        return np.zeros((3, 8)) if self.calls == 1 else np.full((1, 8), np.nan)
+"""
+
+
+def command(*words: object, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "roboirg", *map(str, words)],
+        cwd=cwd,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def run_here(*words: object) -> Result:
+    return CliRunner().invoke(app, ["run", *map(str, words)])
+
+
+def test_an_invalid_action_is_told_and_what_a_policy_prints_goes_to_its_log(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(LOUD)
+    words = ("--policy", "mine:Loud", "--tasks", "PickXtimes", "--settings", "direct")
+    said = command("run", *words, "--episodes", "1", "--out", "o", "--workers", "1", cwd=tmp_path)
+    assert said.returncode == 2
+    assert said.stderr.count("\n") == 1
+    assert "invalid action: " in said.stderr
+    (record,) = read_records(tmp_path / "o")
+    assert (record.outcome, record.steps) == ("error", 3)
+    told = " ".join(one.text for one in record.instruction)
+    log = log_path(tmp_path / "o", record.slug).read_text()
+    assert log == f"made\ntold: {told}\nasked\nasked\n"
+    assert not {"told:", "asked"} & {*said.stdout.split(), *said.stderr.split()}
+
+
+def test_missing_vulkan_loses_no_record_and_no_video(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = ("--policy", "random", "--tasks", "PickXtimes", "--settings", "explicit",
+             "--max-steps", "9", "--video", "all", "--out", tmp_path / "o",
+             "--episodes")  # fmt: skip
+    done = run_here(*words, "1", "--workers", "0")
+    assert done.exit_code == 0, done.output
+    (record,) = read_records(tmp_path / "o")
+    assert record.render_device
+    assert (tmp_path / "o" / str(record.video)).stat().st_size > 2_000
+    monkeypatch.setenv("ROBOIRG_RENDER_DEVICE", "cuda:63")
+    said = run_here(*words, "2", "--workers", "1")
+    assert str(said.exception).startswith("The render device 'cuda:63'")
+    assert read_records(tmp_path / "o") == (record,)
+    assert read_plan(tmp_path / "o") is not None
+
+
+@pytest.mark.usefixtures("without_cache")
+def test_equal_commands_give_equal_records(tmp_path: Path) -> None:
+    played = []
+    for workers in (0, 1):
+        folder = tmp_path / f"by {workers}"
+        done = run_here(
+            "--policy", "random,forgetful", "--tasks", "VideoUnmask", "--settings", "direct",
+            "--episodes", "1", "--max-steps", "40", "--workers", workers, "--out", folder,
+        )  # fmt: skip
+        assert done.exit_code == 0, done.output
+        played.append((read_plan(folder), all_comparable(folder)))
+    assert played[0] == played[1]
+    records = read_records(folder)
+    assert {record.policy for record in records} == {"random", "forgetful"}
+    for record in records:
+        assert record.end_state
+        assert record.demonstration_steps > 0
+        assert all(event.step <= record.steps for event in record.events)

@@ -1,0 +1,93 @@
+"""Verdicts of two versions of a policy's server do not get into one folder, table or merge."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from made_records import make_record
+from wire_servers import ChallengeServer
+
+from roboirg.policies import make_policy
+from roboirg.policies.contract.policy_calls import server_version
+from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
+from roboirg.records.record import Job, Record
+from roboirg.records.record_codec import StoreError
+from roboirg.records.store import read_records
+from roboirg.runs.plan.plan import Plan
+from roboirg.runs.plan.plan_maker import make_plan
+from roboirg.runs.run.executor import InProcess
+from roboirg.runs.run.runner import run_plan
+
+
+def plan_of(episodes: int, **options: object) -> Plan:
+    few = {"tasks": "PickXtimes", "settings": "explicit", "episodes": episodes}
+    return make_plan("random", **few, **options)
+
+
+class Told:
+    """Plays jobs with a server that tells these versions, one for each episode."""
+
+    def __init__(self, *versions: str | None) -> None:
+        self.versions = list(versions)
+
+    def __call__(self, job: Job) -> Record:
+        version = self.versions.pop(0)
+        if version == "refused":
+            return make_record(job, cause="connection: refused", error="connection")
+        metadata = {"server": "localhost:1"} | ({} if version is None else {"version": version})
+        told = server_version(metadata)
+        return make_record(job, "success", policy_metadata=metadata, server_version=told)
+
+
+def versions(folder: Path) -> list[str | None]:
+    return [one.server_version for one in read_records(folder)]
+
+
+def test_a_run_stops_when_the_server_is_another_version(tmp_path: Path) -> None:
+    plan = plan_of(4)
+    with pytest.raises(StoreError, match=r"whose server version is a, but in random-.* it is b"):
+        run_plan(plan, tmp_path, Told("a", "a", "b", "a"), InProcess())
+    assert versions(tmp_path) == ["a", "a"]
+    # Nor does it go on later with another one, or with one that tells none; with the same it does.
+    for other, words in (("b", "b"), (None, "none")):
+        with pytest.raises(
+            StoreError, match=f"server version is a, but in .* it is {words}; choose another"
+        ):
+            run_plan(plan, tmp_path, Told(other, other), InProcess())
+    run_plan(plan, tmp_path, Told("a", "a"), InProcess())
+    assert versions(tmp_path) == ["a"] * 4
+
+
+def test_a_version_that_controls_a_terminal_stops_no_run(tmp_path: Path) -> None:
+    run_plan(plan_of(2), tmp_path, Told(*["\x1b[2J\u202e" + "9" * 5000] * 2), InProcess())
+    assert {one[:12] for one in map(str, versions(tmp_path))} == {r"\x1b[2J\u202e"[:12]}
+
+
+def test_errors_before_the_server_told_its_version_do_not_count(tmp_path: Path) -> None:
+    plan = plan_of(3, tries=1)
+    run_plan(plan, tmp_path, Told("refused", "a", "refused"), InProcess())
+    assert versions(tmp_path) == ["a"] * 3
+
+
+class Guide:
+    """A planner of this process."""
+
+    version = "7"
+    metadata = {"version": "7"}  # noqa: RUF012
+
+    def reset(self, instruction: str, demonstration: object) -> None:
+        pass
+
+
+def test_the_version_comes_from_the_server_also_behind_a_planner() -> None:
+    with ChallengeServer() as server:
+        client = make_policy(f"challenge://{server.place}?version=mine", 0)
+        client.reset("go", {})  # type: ignore[typeddict-item]
+        assert server_version(client.metadata) == "phase-1"  # type: ignore[attr-defined]
+        client.follow = print  # type: ignore[attr-defined]
+        system = HierarchicalPolicy(Guide(), client)  # type: ignore[arg-type]
+        assert server_version(system.metadata) == "phase-1"
+        client.close()  # type: ignore[attr-defined]
+    for told in ({}, {"version": "1"}, {"server": "x"}, {"server": "x", "version": "unknown"}):
+        assert server_version(told) is None

@@ -1,0 +1,121 @@
+"""What a policy names as its subgoal: checked, in the record, on the page and in the table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from made_records import fill, make_record
+from msgspec.structs import replace
+from page_text import call, render
+
+import roboirg
+from roboirg.core.environment_options import EnvironmentOptions
+from roboirg.core.errors import InvalidValueError
+from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.subgoal_text import split_point
+from roboirg.policies.by_name.finding import read_policy
+from roboirg.policies.contract.policy_calls import policy_subgoal
+from roboirg.records.record import Job, SubgoalRecord
+from roboirg.records.record_codec import StoreError, encode, read_record
+from roboirg.runs.play.rollout import EpisodeRunner
+
+TABLE = ("tables", "--which", "subgoals", "--format", "markdown")
+JOB = Job(
+    policy="random",
+    ref=read_policy("random"),
+    task="PickXtimes",
+    split="test",
+    episode=0,
+    options=InstructionOptions("direct"),
+    environment=EnvironmentOptions(max_steps=30),
+)
+SAID = (
+    SubgoalRecord(
+        step=0, text="pick up the cube at <3, 4>", point=(3, 4), due="pick it up",
+        verdict="wrong_thing",
+    ),
+    SubgoalRecord(step=16, text="pick it up", due="pick it up", verdict="right"),
+    SubgoalRecord(step=32, text="sing", verdict="lost"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("subgoal", [3, b"pick", ["pick"], "x" * 301, "a\nb", "\x1b[2J", "\ud800"])
+def test_a_subgoal_is_a_short_text(subgoal: object) -> None:
+    with pytest.raises(InvalidValueError, match="The policy's subgoal"):
+        policy_subgoal(SimpleNamespace(subgoal=subgoal))
+
+
+def test_a_subgoal_is_optional() -> None:
+    assert policy_subgoal(SimpleNamespace()) is policy_subgoal(SimpleNamespace(subgoal="")) is None
+    assert policy_subgoal(SimpleNamespace(subgoal="x" * 300)) == "x" * 300
+
+
+def test_records_keep_them_and_refuse_others() -> None:
+    record = make_record(JOB, "failure", "no", subgoals=SAID)
+    assert read_record(encode(record), Path("r"), 1).subgoals == SAID
+    long = replace(record, subgoals=(replace(SAID[0], text="x" * 301),))
+    with pytest.raises(StoreError, match="text"):
+        read_record(encode(long), Path("r"), 1)
+
+
+def test_the_page_and_the_table_show_them(tmp_path: Path) -> None:
+    spent = {"calls": 3.0, "answered_s": 6.5, "waited_s": 2.25}
+    record = make_record(JOB, "failure", "no", subgoals=SAID, usage=spent)
+    page = render([record])
+    assert "(wrong thing; due: pick it up)" in page
+    assert "sing (lost; due: nothing)" in page
+    # Costs are per episode: in another one of the cell the planner named nothing.
+    other = make_record(replace(JOB, episode=1), "failure", "no", usage={"calls": 1.0})
+    fill(tmp_path, record, other)
+    counts = "| 3 | 1 (33 %) | 1 (33 %) | 0 (0 %) | 0 (0 %) | 1 (33 %) |"
+    assert f"{counts} 2 | 3.25 | 1.12 |" in call(*TABLE, tmp_path)
+
+
+def test_the_table_says_unknown_where_a_service_did_not_report_all_tokens(tmp_path: Path) -> None:
+    known = {"calls": 1.0, "input_tokens": 8.0, "output_tokens": 2.0, "cost_usd": 0.5}
+    partly = {"calls": 1.0, "input_tokens": 4.0}
+    played = (("direct", 0, known), ("contextual", 0, known), ("contextual", 1, partly))
+    for setting, episode, usage in played:
+        job = replace(JOB, episode=episode, options=InstructionOptions(setting))
+        fill(tmp_path, make_record(job, "failure", "no", subgoals=SAID, usage=usage))
+    printed = call(*TABLE, tmp_path)
+    assert "| 1 | 8 | 2 | 0.5 |" in printed
+    assert "| 1 | 6 | unknown | unknown |" in printed
+
+
+class Planning:
+    """Points into a corner, then says nothing new, then points at the thing."""
+
+    cameras = ("front",)
+    point = (0, 0)
+
+    def reset(self, instruction: str, demonstration: object) -> None:
+        self.calls, self.subgoal = 0, None
+
+    def act(self, observation: dict) -> np.ndarray:
+        row, column = (0, 0) if self.calls < 2 else self.point
+        self.subgoal = f"pick up the green cube at <{row}, {column}> for the first time"
+        self.calls += 1
+        return np.tile([*observation["joint_positions"], 1.0], (10, 1))
+
+
+@pytest.mark.sim
+def test_a_played_episode_notes_what_is_new_with_the_stage_that_is_due(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("roboirg.runs.play.rollout.load_policy", lambda prepared: Planning())
+    env = roboirg.make(JOB.task, episode=0, cameras=(), grounded=True)
+    _, info = env.reset()
+    _, point = split_point(info["grounded_subgoal"])
+    env.close()
+    monkeypatch.setattr(Planning, "point", point)
+    result, _ = EpisodeRunner(Path()).play_once(JOB)
+    assert result.outcome == "failure", result.cause
+    words = "pick up the green cube for the first time"
+    assert [(one.step, one.point, one.due, one.verdict) for one in result.subgoals] == [
+        (0, (0, 0), words, "wrong_thing"),
+        (20, point, words, "right"),
+    ]
