@@ -40,7 +40,8 @@ def facts(folder: Path, *records: Record) -> Facts:
 def test_a_run_has_its_facts(tmp_path: Path) -> None:
     failed = {"error": "policy", "steps": 50, "calls": 1, "executed": 20}
     again = record(0, "error", **failed), record(0, attempt=2, steps=30, calls=3, executed=10)
-    later = record(2, "error", error="timeout"), record(3, setting="direct")
+    code = {"code": "0a", "verdict_code": None}
+    later = record(2, "error", error="timeout", **code), record(3, setting="direct")
     write_plan(make_plan(["mine=random"], tasks="PickXtimes", settings="direct"), tmp_path)
     expected = {
         "tasks": "PickXtimes",
@@ -54,6 +55,8 @@ def test_a_run_has_its_facts(tmp_path: Path) -> None:
         "trials planned and not played": "3",
         "trials begun again": "1",
         "render device": NOT_REPORTED,
+        "package code": f"{again[0].code}; 0a",
+        "verdict code": again[0].verdict_code,
     }
     found = facts(tmp_path, *again, *later)
     assert found[RUN].items() >= expected.items()

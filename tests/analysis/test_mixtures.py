@@ -32,7 +32,8 @@ APART = [
 ]
 AVERAGED = [
     ({"render_device": "H100"}, "Mixed render devices: H100, llvmpipe."),
-    ({"code": "ab"}, "Mixed states of the package's code: ab, unknown."),
+    ({"verdict_code": "ab"}, "Mixed states of the code that decides verdicts: 0a, ab."),
+    ({"package_version": "1"}, "Mixed versions of roboirg: 0, 1."),
 ]
 
 
@@ -40,13 +41,13 @@ AVERAGED = [
 @pytest.mark.parametrize(("fields", "sentence"), [*UNFAIR, *APART, *AVERAGED])
 def test_each_difference_is_one_sentence(policy, fields, sentence) -> None:
     """With the same policy or another."""
-    usual = {"render_device": "llvmpipe"}
+    usual = {"render_device": "llvmpipe", "verdict_code": "0a"}
     first = [make_result(episode=episode, **usual) for episode in range(2)]
     second = [make_result(episode=episode, policy=policy, **usual | fields) for episode in range(2)]
     runs = [
         ("a", [*first, make_result(episode=2)]),
         ("b", second),
-    ]  # nothing was rendered: fits all
+    ]  # nothing was rendered, and what decides verdicts is not known: fits all
     is_of_policy, is_same = "{}" in sentence, policy == "listener"
     expected = [] if is_of_policy and not is_same else [sentence.format(policy)]
     found = mixtures([one for _, results in runs for one in results])
@@ -63,6 +64,18 @@ def test_each_difference_is_one_sentence(policy, fields, sentence) -> None:
             assert str(refused.value) == found[0]
         else:
             compare(*sides)
+
+
+@pytest.mark.parametrize(
+    ("fields", "other_fields"),
+    [
+        ({"verdict_code": "0a"}, {"verdict_code": "0a", "package_version": "1"}),
+        ({"verdict_code": "0a"}, {"verdict_code": None}),
+    ],
+)
+def test_other_code_is_no_mixture_if_verdicts_are_decided_alike(fields, other_fields) -> None:
+    """Known to be, or of the same version of the package, in earlier records."""
+    assert not mixtures([make_result(code="0", **fields), make_result(code="1", **other_fields)])
 
 
 def test_other_words_are_refused_where_task_and_pool_are_the_same_and_split_no_rows() -> None:

@@ -257,11 +257,12 @@ def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
     found = records()
     runs = (
         store(tmp_path / "ours", found, PICKS),
-        store(theirs, [replace(found[0], video=film(theirs)), *found[1:-4]], PICKS),
+        store(theirs, [replace(found[0], video=film(theirs), code="0"), *found[1:-4]], PICKS),
     )
     with EpisodeLog(log_path(theirs, found[0].slug)) as log:
         os.write(log.descriptor, b"words")
-    page = Page(write_report(runs[0], against=runs[1]).read_text())
+    text = write_report(runs[0], against=runs[1]).read_text()
+    page = Page(text)
     assert page.data["matrix"]["policies"] == [
         "listener, ours (privileged)", "forgetful, ours (privileged)",
         "listener, our theirs (privileged)", "forgetful, our theirs (privileged)",
@@ -273,5 +274,8 @@ def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
     (link,) = [details["log"] for details in page.details if "log" in details]
     assert link == f"../our%20theirs/{log_path(Path(), found[0].slug)}"
     assert "Incomplete: 4 of" in page.notes
+    # Other code that decides verdicts in the same way is a fact.
+    assert f"<dd>0, {found[0].code}</dd>" in text
+    assert "Mixed" not in page.notes
     words = next(one for one in page.data["comparisons"] if (one["left"], one["right"]) == (0, 2))
     assert "listener, ours (privileged) against listener, our theirs" in words["sentences"][0]

@@ -20,6 +20,7 @@ from run_fakes import FakePlay, fake_record, fake_run, small_plan
 
 from roboirg.core.environment_options import EnvironmentOptions
 from roboirg.core.errors import RoboIRGError
+from roboirg.core.versions import Versions
 from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.server_lock import lock_server
 from roboirg.records.line_file import LOCK_FILE
@@ -29,6 +30,7 @@ from roboirg.records.store import (
     RECORDS_FILE,
     TORN_FILE,
     RecordStore,
+    check_same,
     iterate_records,
     read_index,
     read_records,
@@ -37,6 +39,16 @@ from roboirg.records.store import (
 from roboirg.runs.run.executor import InProcess
 from roboirg.runs.run.runner import check_run, run_plan
 from roboirg.util.atomic_write import locked, write_atomically
+
+
+@pytest.mark.parametrize("field", Versions._fields[1:])
+def test_each_version_that_differs_is_refused_in_one_sentence(field: str) -> None:
+    """What a policy is has tests of its own; an unknown version is no other one."""
+    first = Versions(**{field: "a"})
+    words = f"^x whose {field.replace('_', ' ')} is a, but now it is b; choose another --out.$"
+    with pytest.raises(StoreError, match=words):
+        check_same("x", first.differences(Versions(**{field: "b"})))
+    assert not first.differences(Versions())
 
 
 @functools.cache

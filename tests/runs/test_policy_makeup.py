@@ -162,7 +162,7 @@ def test_a_checkpoint_with_other_bytes_is_another(tmp_path: Path) -> None:
 def test_a_machine_with_other_bytes_at_the_path_is_named(tmp_path: Path) -> None:
     file = tmp_path / "config.json"
     file.write_text("{}")
-    versions = MachineVersions.expected((read_policy(f"lerobot://{tmp_path}"),))
+    versions = MachineVersions((read_policy(f"lerobot://{tmp_path}"),))
     agent = MachineAgent(tmp_path / "agent", None)
     assert agent.check(versions).fault is None
     file.write_text('{"n_action_steps": 1}')

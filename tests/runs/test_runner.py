@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import operator
 import signal
 import subprocess
 import sys
@@ -148,15 +149,20 @@ def test_a_folder_may_get_more_and_fewer_jobs(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "value", "sentence"),
     [
-        ("seed", 7, r"PickXtimes test/0 with scene seed 7, but .* has \d+; choose another"),
-        ("environment_version", 99, "of environment version 99, but this roboirg has version 1;"),
-        ("language_version", "99.0", r"language version 99\.0, but this roboirg has version \d"),
-        ("task", "Gone", "of words version .*, but this roboirg has version Gone/test@none;"),
         (
-            "words",
-            OTHER_WORDS,
-            f"of words version {OTHER_WORDS}, but this roboirg has version Pick",
+            "seed",
+            7,
+            r"PickXtimes test/0 whose scene seed is 7, but in .* it is \d+; choose another",
         ),
+        ("episode", 99, r"PickXtimes test/99 whose scene seed is \d+, but in .* it is none;"),
+        (
+            "environment_version",
+            99,
+            "whose environment version is 99, but in this roboirg it is 1;",
+        ),
+        ("language_version", "99.0", r"language version is 99\.0, but in this roboirg it is \d"),
+        ("task", "Gone", "whose words version is .*, but in this roboirg it is Gone/test@none;"),
+        ("words", OTHER_WORDS, f"version is {OTHER_WORDS}, but in this roboirg it is Pick"),
         ("policy_version", "old", r"random whose policy version is old, but now it is built-in"),
     ],
 )
@@ -234,25 +240,30 @@ def test_a_record_of_another_version_is_not_stored(
     def elsewhere(job: Job) -> Record:
         return replace(FakePlay()(job), **{field: value})
 
-    with pytest.raises(StoreError, match=f"with {what} version {value}, .* was not stored"):
+    with pytest.raises(StoreError, match=f"whose {what} version is {value}, .* was not stored"):
         run_plan(plan, tmp_path, elsewhere, InProcess())
     assert not (tmp_path / RECORDS_FILE).read_bytes()
 
 
-def test_the_fingerprint_of_the_code_sees_data_files(
+def test_fingerprints_of_the_code_see_data_files_and_one_only_what_decides_verdicts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = tmp_path / "roboirg"
     monkeypatch.setattr(episode_record, "__file__", str(folder / "a" / "b" / "module.py"))
     folder.mkdir()
-    found = set()
-    for name, text in (("a.py", "1"), ("words.toml", "1"), ("words.toml", "2")):
-        (folder / name).write_text(text)
-        found.add(episode_record.code_fingerprint.__wrapped__())
-    assert len(found) == 3
-    (folder / "__pycache__").mkdir()
-    (folder / "__pycache__" / "a.pyc").write_text("1")
-    assert episode_record.code_fingerprint.__wrapped__() in found
+    found = [episode_record.code_fingerprints.__wrapped__()]
+    for name, changes in (
+        ("cli/a.py", (True, False)),
+        ("language/words.toml", (True, True)),
+        ("language/words.toml", (True, True)),
+        ("core/version.py", (True, False)),
+        ("tasks/__pycache__/a.pyc", (False, False)),
+    ):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(str(len(found)))
+        found.append(episode_record.code_fingerprints.__wrapped__())
+        before, now = found[-2:]
+        assert tuple(map(operator.ne, before, now)) == changes
 
 
 @pytest.mark.parametrize(("error", "place"), [("infrastructure", 1), ("environment", -1)])
@@ -277,11 +288,10 @@ def test_machines_of_other_versions_are_named() -> None:
     from roboirg.runs.run.ray_machines import MachineVersions
 
     random = read_policy("random")
-    here = MachineVersions.expected((unknown_policy("x"), random))
-    assert here.difference(MachineVersions.expected((read_policy("oracle"), random))) is None
-    there = here._replace(language="2.0.1")
-    assert (
-        here.difference(there) == f"its language has version 2.0.1 there and {here.language} here"
-    )
+    here = MachineVersions((unknown_policy("x"), random))
+    assert here.difference(MachineVersions((read_policy("oracle"), random))) is None
+    there = here._replace(installed=here.installed._replace(package_version="9"))
+    own = here.installed.package_version
+    assert here.difference(there) == f"the package version is 9 there and {own} here"
     other = here._replace(policies=(here.policies[0], dataclasses.replace(random, version="old")))
     assert str(here.difference(other)).startswith("the policy version of random is old there")

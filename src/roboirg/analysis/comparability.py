@@ -16,6 +16,7 @@ from roboirg.core.arms import TOLD
 from roboirg.core.environment_options import DEFAULT_MESHES
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.plain_text import counted
+from roboirg.core.versions import Versions
 from roboirg.core.word_pools import ROBOMME_NAME, words_label
 from roboirg.language.settings import EXPLICIT
 from roboirg.stats.cells import Cell
@@ -32,6 +33,7 @@ COMPARABLE_SIGN = "="
 DIFFERENT_SIGN = "≠"
 
 _SPLIT = "test"
+_COMPARABLE = Versions(environment_version=ENVIRONMENT_VERSION)  # of others nothing is published
 
 
 def differences_of(key: CellKey, cell: Cell) -> Differences | None:
@@ -132,7 +134,6 @@ def _text(tasks: Mapping[str, Differences]) -> str:
 def _explicit_differences(policy_run: PolicyRun, cell: Cell) -> Iterator[str]:
     """Yield what differs from the conditions under which the paper's policies were played."""
     conditions = policy_run.conditions
-    versions = policy_run.versions
     environment = conditions.environment
     # Behind the @ stands a hash of the file's words. Only a file with exactly RoboMME's sentences
     # can be opened under its name, so the name is enough.
@@ -152,8 +153,8 @@ def _explicit_differences(policy_run: PolicyRun, cell: Cell) -> Iterator[str]:
         yield f"{environment.meshes} meshes"
     if environment.demonstration_frames not in (None, "all"):
         yield f"frames of the video: {environment.demonstration_frames}"
-    if versions.environment_version not in (None, ENVIRONMENT_VERSION):
-        yield f"environment version {versions.environment_version}"
+    for mismatch in policy_run.versions.differences(_COMPARABLE):
+        yield f"{mismatch.what} {mismatch.first}"
     if cell.errors:
         yield counted(cell.errors, "error")
     if cell.missing:

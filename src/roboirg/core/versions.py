@@ -39,6 +39,7 @@ class Versions(NamedTuple):
 
     Attributes:
         makeup: what the policy is.
+        package_version: of roboirg.
         environment_version: of scenes, rules and physics.
         language_version: of the words.
         policy_version: distinguishes it from an earlier policy of the same name.
@@ -48,6 +49,7 @@ class Versions(NamedTuple):
     """
 
     makeup: Makeup = ()
+    package_version: str | None = None
     environment_version: int | None = None
     language_version: str | None = None
     policy_version: str | None = None

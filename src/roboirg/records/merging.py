@@ -33,7 +33,7 @@ from roboirg.records.run_files import (
     plan_names,
     run_file,
 )
-from roboirg.records.store import RecordStore, StoredRun
+from roboirg.records.store import RecordStore, StoredRun, check_same
 from roboirg.util.regular_file import read_regular
 
 
@@ -154,7 +154,7 @@ def _check_versions(runs: Iterable[tuple[Path, Iterable[Summary]]]) -> None:
     known: dict[str, _Expected] = {}
     for folder, results in runs:
         for result in results:
-            owners = {  # in the words of the error; "" is everything
+            owners = {  # as the error names them; "" is everything
                 "": Versions(
                     environment_version=result.environment_version,
                     language_version=result.language_version,
@@ -166,10 +166,12 @@ def _check_versions(runs: Iterable[tuple[Path, Iterable[Summary]]]) -> None:
             for owner, versions in owners.items():
                 found = _Expected(folder, versions)
                 expected = known.setdefault(owner, found)
-                for what, value, other in versions.differences(expected.versions):
-                    raise StoreError(
-                        f"{folder} and {expected.folder} cannot be merged: the {what}{owner} is "
-                        f"{value} in the first and {other} in the second."
+                if versions != expected.versions:
+                    check_same(
+                        f"{folder} holds episodes{owner}",
+                        versions.differences(expected.versions),
+                        f"in {expected.folder}",
+                        "they cannot be merged",
                     )
                 if expected.versions.server_version is None:
                     # An error may come before the server's version is known: take it from here.

@@ -57,8 +57,19 @@ _COMMON = (
         "Their pictures differ in some pixels by a brightness level, and rates average over them.",
         lambda device: device,  # results for which nothing was rendered fit every device
     ),
-    Trait("code", "states of the package's code", "Rates do not tell them apart."),
+    Trait(
+        "verdict_code",
+        "states of the code that decides verdicts",
+        "Rates average over them.",
+        lambda fingerprint: fingerprint,  # earlier records lack it and fit every state
+    ),
 )
+_PACKAGE = Trait(
+    "package_version",
+    "versions of roboirg",
+    "Other code may decide verdicts, and rates average over them.",
+)
+"""What must be equal as well if some results lack the fingerprint of what decides verdicts."""
 
 
 def _environment_traits() -> list[Trait]:
@@ -86,6 +97,8 @@ def mixtures(results: Collection[Summary]) -> list[str]:
     Some traits should be the same in all results, others only in those of one policy.
     """
     sentences = [*differing(results, FAIRNESS), *differing(results, _COMMON)]
+    if any(result.verdict_code is None for result in results):
+        sentences += differing(results, [_PACKAGE])
     for policy in sorted({result.policy for result in results}):
         of_policy = [result for result in results if result.policy == policy]
         sentences += differing(of_policy, _OF_POLICY, f" of {policy}")

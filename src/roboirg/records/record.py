@@ -63,6 +63,7 @@ NON_DETERMINISTIC_FIELDS = frozenset(
         "started_at",
         "timings",
         "usage",
+        "verdict_code",
         "video",
         "video_error",
         "wordings_file",
@@ -321,6 +322,7 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
         environment_version: version of scenes, rules and physics.
         package_version: version of roboirg.
         code: fingerprint of the package's files.
+        verdict_code: fingerprint of those that can change a verdict; None in earlier records.
         plan: fingerprint of the plan.
         attempt: number of the attempt, from 1.
         prompt_verdict: whether all that was said reached the policy's language model.
@@ -355,6 +357,7 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
     environment_version: Whole
     package_version: Name
     code: Name = "unknown"
+    verdict_code: Name | None = None
     plan: Name | None = None
     attempt: Whole = 1
     prompt_verdict: PromptVerdict = "unknown"

@@ -91,7 +91,8 @@ class RecordStore:
                 if result.outcome != "error":
                     earlier = verdicts.get(result.policy, result)
                     found = earlier.policy_versions.differences(result.policy_versions)
-                    check_same(self.folder, result.policy, found, f"in {result.slug}")
+                    what = f"{self.folder} holds episodes of {result.policy}"
+                    check_same(what, found, f"in {result.slug}")
                     verdicts[result.policy] = result
                 added[identity_key(result)] = result
                 yield line
@@ -225,23 +226,25 @@ def _last_verdicts(results: Iterable[Stored]) -> dict[str, Stored]:
     return {result.policy: result for result in results if result.outcome != "error"}
 
 
-def check_same(folder: Path, policy: str, found: Iterable[Mismatch], where: str = "now") -> None:
-    """Refuse another policy of a name of which a folder holds episodes, or another version of it.
+def check_same(
+    what: str, found: Iterable[Mismatch], where: str = "now", end: str = "choose another --out"
+) -> None:
+    """Refuse records that are not of the same versions as others, or not of the same policy.
+
+    For example ``runs/a holds episodes of mine whose policy version is 1, but now it is 2; choose
+    another --out.``
 
     Args:
-        folder: for the message, as `policy`.
-        policy: its name.
-        found: the differences, the folder's values first.
+        what: has the first values; the message begins with it.
+        found: the differences.
         where: the second values are found.
+        end: of the message.
 
     Raises:
         StoreError: there is a difference; the message has the first.
     """
-    for what, first, second in found:
-        raise StoreError(
-            f"{folder} holds episodes of {policy} whose {what} is {first}, but {where} it is "
-            f"{second}; choose another --out."
-        )
+    for name, first, second in found:
+        raise StoreError(f"{what} whose {name} is {first}, but {where} it is {second}; {end}.")
 
 
 def _with_server_versions(results: Collection[Stored]) -> tuple[Stored, ...]:

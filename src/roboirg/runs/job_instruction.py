@@ -18,6 +18,9 @@ from roboirg.language.scenarios.wording_store import open_wordings
 from roboirg.records.record import Job, Summary
 from roboirg.tasks.splits import splits
 
+INSTALLED = Versions(environment_version=ENVIRONMENT_VERSION, language_version=LANGUAGE_VERSION)
+"""Of which versions new records are; which words they have depends on task and pool."""
+
 
 @dataclass(frozen=True)
 class PreparedJob:
@@ -70,12 +73,7 @@ def other_versions(record: Summary) -> list[Mismatch]:
         language_version=record.language_version,
         words_version=record.words,
     )
-    installed = Versions(
-        environment_version=ENVIRONMENT_VERSION,
-        language_version=LANGUAGE_VERSION,
-        words_version=words,
-    )
-    return recorded.differences(installed)
+    return recorded.differences(INSTALLED._replace(words_version=words))
 
 
 def installed_words(job: Job) -> str | None:

@@ -34,6 +34,8 @@ _FACTS = {
     "language": "language_version",
     "environment": "environment_version",
     "rendered on": "render_device",
+    "code": "code",
+    "verdict code": "verdict_code",
 }
 """Facts in the head of the page, and the fields of records that hold them."""
 

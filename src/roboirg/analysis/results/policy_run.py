@@ -78,9 +78,9 @@ class PolicyRun(NamedTuple):
     def of(cls, result: Summary, run: str = "") -> PolicyRun:
         versions = Versions(
             result.ref.makeup,
-            result.environment_version,
-            result.language_version,
-            result.played_version,
+            environment_version=result.environment_version,
+            language_version=result.language_version,
+            policy_version=result.played_version,
         )
         conditions = EvalConditions.of(result)
         return cls(result.policy, conditions, versions, run, result.privileged, result.robot)

@@ -30,6 +30,8 @@ _OF_RUN = {
     "environment version": "environment_version",
     "language version": "language_version",
     "package version": "package_version",
+    "package code": "code",
+    "verdict code": "verdict_code",
     "tasks": "task",
     "split": "split",
     "control arms": "arm",

@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 
@@ -35,6 +36,23 @@ from roboirg.runs.play.prompt_shares import audit_job, audit_prompt
 from roboirg.util.processor import processor_family
 from roboirg.util.short_hash import DIGITS
 
+_VERDICT_FOLDERS = ("core/", "envs/", "judging/", "language/", "simulation/", "tasks/")
+"""What decides a verdict on given actions: tasks, words, the simulation and the judge."""
+_VERSION_FILE = "core/version.py"
+"""Changes with every release, even if no verdict can."""
+
+
+class CodeFingerprints(NamedTuple):
+    """Shortened SHA-256 of the names and bytes of the package's files, data included.
+
+    Attributes:
+        package: of all files.
+        verdict: of those that can change a verdict.
+    """
+
+    package: str
+    verdict: str
+
 
 def begin_record(prepared: PreparedJob) -> Record:
     """Return the record of an episode that has not begun; needs no simulator.
@@ -44,6 +62,7 @@ def begin_record(prepared: PreparedJob) -> Record:
     """
     job = prepared.job
     words = prepared.words
+    code = code_fingerprints()
     policy = job.ref or unknown_policy(job.policy)
     job_fields = msgspec.structs.asdict(job)
     job_fields["ref"] = replace(policy, needs=None, problem=None)
@@ -65,7 +84,8 @@ def begin_record(prepared: PreparedJob) -> Record:
         words=metadata["words"],
         environment_version=ENVIRONMENT_VERSION,
         package_version=__version__,
-        code=code_fingerprint(),
+        code=code.package,
+        verdict_code=code.verdict,
         processor=processor_family(),
         started_at=utc_now(),
         duration_s=0.0,
@@ -198,12 +218,16 @@ def utc_now() -> str:
 
 
 @functools.cache
-def code_fingerprint() -> str:
-    """Return a shortened SHA-256 of the names and bytes of the package's files, data included."""
-    digest = hashlib.sha256()
+def code_fingerprints() -> CodeFingerprints:
+    """Return the fingerprints of the code that this process runs."""
+    package = hashlib.sha256()
+    verdict = hashlib.sha256()
     root = Path(__file__).parents[2]
     for path in sorted(root.rglob("*")):
         if path.is_file() and "__pycache__" not in path.parts:
-            digest.update(f"{path.relative_to(root).as_posix()}\0".encode())
-            digest.update(path.read_bytes() + b"\0")
-    return digest.hexdigest()[:DIGITS]
+            name = path.relative_to(root).as_posix()
+            content = f"{name}\0".encode() + path.read_bytes() + b"\0"
+            package.update(content)
+            if name.startswith(_VERDICT_FOLDERS) and name != _VERSION_FILE:
+                verdict.update(content)
+    return CodeFingerprints(package.hexdigest()[:DIGITS], verdict.hexdigest()[:DIGITS])

@@ -22,16 +22,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import RoboIRGError
 from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
 from roboirg.core.version import __version__
-from roboirg.language import LANGUAGE_VERSION
+from roboirg.core.versions import Versions
 from roboirg.policies.by_name.finding import read_policy
 from roboirg.records.record import Job, Record
 from roboirg.runs.hosting.host_pool import HostPool, HostSettings
 from roboirg.runs.hosting.policy_opening import open_policy
+from roboirg.runs.job_instruction import INSTALLED
 from roboirg.runs.play.rollout import PlayJob
 from roboirg.runs.run.workers import POLL_S, Worker
 from roboirg.tasks.splits.private_splits import use_salt
@@ -47,32 +47,17 @@ class MachineVersions(NamedTuple):
     """What must be the same on every machine, or records of one run would differ.
 
     Attributes:
-        roboirg: version of the package.
-        language: version of the instructions.
-        environment: version of the environment.
-        policies: of the run, with their versions.
+        policies: of the run, as they were opened on the machine.
+        installed: of the package there, its environment and its language.
     """
 
-    roboirg: str
-    language: str
-    environment: int
-    policies: tuple[PolicyRef, ...] = ()
-
-    @classmethod
-    def expected(cls, policies: tuple[PolicyRef, ...]) -> MachineVersions:
-        """Return those of this machine, with policies as they were opened where the run began."""
-        return cls(__version__, LANGUAGE_VERSION, ENVIRONMENT_VERSION, policies)
+    policies: tuple[PolicyRef, ...]
+    installed: Versions = INSTALLED._replace(package_version=__version__)
 
     def difference(self, there: MachineVersions) -> str | None:
         """Return the first difference of another machine, in words; None if there is none."""
-        pairs = [
-            ("roboirg", self.roboirg, there.roboirg),
-            ("its language", self.language, there.language),
-            ("its environment", self.environment, there.environment),
-        ]
-        for what, mine, theirs in pairs:
-            if mine != theirs:
-                return f"{what} has version {theirs} there and {mine} here"
+        for what, mine, theirs in self.installed.differences(there.installed):
+            return f"the {what} is {theirs} there and {mine} here"
         for policy, other in zip(self.policies, there.policies, strict=True):
             for what, mine, theirs in policy.versions.differences(other.versions):
                 if mine != UNKNOWN_VERSION:
@@ -148,7 +133,7 @@ class MachineAgent:
             for policy in versions.policies:
                 named = read_policy(policy.spec, policy.name)
                 policies.append(open_policy(named, settings=self._settings))
-            fault = versions.difference(MachineVersions.expected(tuple(policies)))
+            fault = versions.difference(MachineVersions(tuple(policies)))
         except RoboIRGError as error:
             fault = one_line(error)
         return CheckedMachine(fault, self._folder, self._address)

@@ -167,7 +167,7 @@ class RayPool:
         While the head of the cluster does not answer, all of that waits: calls would block.
         """
         policies = dict.fromkeys(job.ref for job in jobs if job.ref is not None)
-        versions = MachineVersions.expected(tuple(policies))
+        versions = MachineVersions(tuple(policies))
         while jobs or self._busy():
             if time.monotonic() - self._reached_at > POLL_S and not self._is_reachable():
                 self._check_head(len(jobs))

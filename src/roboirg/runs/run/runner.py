@@ -15,6 +15,7 @@ from typing import NamedTuple
 from roboirg.core.error_words import MAX_CAUSE_LENGTH
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.plain_text import counted
+from roboirg.core.versions import NO_VERSION, Mismatch
 from roboirg.policies.vlm.models.reply_store import ReplySettings
 from roboirg.records.film import VIDEO_FOLDER
 from roboirg.records.record import Job, Record, Summary
@@ -39,6 +40,8 @@ from roboirg.tasks.splits.splits import get_episode
 
 UNREACHABLE_AFTER = 20
 """After this many consecutive connection errors, skip the rest of this policy."""
+
+_HERE = "in this roboirg"
 
 
 class RunSummary(NamedTuple):
@@ -213,8 +216,11 @@ class _RunLoop:
 
     def _store_record(self, job: Job, record: Record) -> None:
         """Store a record, and count and report it; raises if it is of other versions than ours."""
-        _refuse_other_versions(
-            record, f"A worker returned {record.slug} with", "the record was not stored"
+        check_same(
+            f"A worker returned {record.slug}",
+            other_versions(record),
+            _HERE,
+            "the record was not stored",
         )
         # Only code in the world's process can write this, such as a policy that patches the judge.
         if record.outcome == "success" and record.cause is not None:
@@ -256,18 +262,6 @@ class _RunLoop:
         return True
 
 
-def _refuse_other_versions(record: Summary, found: str, end: str) -> None:
-    """Refuse a record of another language, of other words or of another environment.
-
-    Args:
-        record: that was found.
-        found: how the sentence begins, up to what differs.
-        end: how it ends.
-    """
-    for what, version, ours in other_versions(record):
-        raise StoreError(f"{found} {what} {version}, but this roboirg has version {ours}; {end}.")
-
-
 def _report_torn_line(store: RecordStore, reporter: Reporter) -> None:
     """Warn of a line that an earlier run did not finish, if there was one."""
     if store.torn:
@@ -296,18 +290,17 @@ def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> N
 
     Compared are the versions of this package and of words, the seeds of scenes, and the policies.
     """
+    what = f"{folder} holds episodes"
     for record in records:
-        _refuse_other_versions(record, f"{folder} holds episodes of", "choose another --out")
+        check_same(what, other_versions(record), _HERE)
     scenes = {(record.task, record.split, record.episode, record.seed) for record in records}
     for task, split, episode, seed in scenes:
-        expected: str | int = "no such episode"
+        expected: str | int = NO_VERSION
         with contextlib.suppress(InvalidValueError):
             expected = get_episode(task, split, episode).seed
         if seed != expected:
-            raise StoreError(
-                f"{folder} holds {task} {split}/{episode} with scene seed {seed}, but this roboirg "
-                f"has {expected}; choose another --out."
-            )
+            of_scene = f"{what} of {task} {split}/{episode}"
+            check_same(of_scene, [Mismatch("scene seed", seed, expected)], _HERE)
     _check_policies(plan, records, folder)
 
 
@@ -328,7 +321,8 @@ def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> Non
                 f"policy cannot be opened to read its version now ({policy.problem}); choose "
                 "another --out."
             )
-        check_same(folder, name, versions.differences(policy.versions))
+        what = f"{folder} holds episodes of {name}"
+        check_same(what, versions.differences(policy.versions))
 
 
 @contextlib.contextmanager
