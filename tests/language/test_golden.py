@@ -10,12 +10,12 @@ from roboirg.language.variants import expressible_options
 
 GOLDEN_VERSION = "4.7.0"
 GOLDEN: dict[str, str] = {
-    "PickXtimes": "3fd057992084b184",
+    "PickXtimes": "8ce8590c3b9bf936",
     "StopCube": "ecbc7dfbb52a7d08",
-    "SwingXtimes": "83a36984fd662f82",
+    "SwingXtimes": "1af48e284c7ff049",
     "BinFill": "529cf8b4a4fe291d",
-    "VideoUnmaskSwap": "67b16257139a9dc2",
-    "VideoUnmask": "0a89c5f59f64af4e",
+    "VideoUnmaskSwap": "7c30400270a03b55",
+    "VideoUnmask": "29b2d29095d9c5d0",
     "ButtonUnmaskSwap": "af0d828cdf13c083",
     "ButtonUnmask": "e430a23e3ded9383",
     "VideoRepick": "1dfffc63ead9bc75",
