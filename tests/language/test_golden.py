@@ -10,16 +10,16 @@ from roboirg.language.variants import expressible_options
 
 GOLDEN_VERSION = "4.7.0"
 GOLDEN: dict[str, str] = {
-    "PickXtimes": "0913f31ea2e7861e",
+    "PickXtimes": "8ce8590c3b9bf936",
     "StopCube": "ecbc7dfbb52a7d08",
-    "SwingXtimes": "4b6cf18cc4b76311",
+    "SwingXtimes": "1af48e284c7ff049",
     "BinFill": "529cf8b4a4fe291d",
-    "VideoUnmaskSwap": "dadee1419e836a4c",
-    "VideoUnmask": "c101c1db6547f424",
+    "VideoUnmaskSwap": "8f0873e023d8c4b9",
+    "VideoUnmask": "a4831bcbb803e7e5",
     "ButtonUnmaskSwap": "af0d828cdf13c083",
-    "ButtonUnmask": "5ba5d1ee9368012d",
+    "ButtonUnmask": "e430a23e3ded9383",
     "VideoRepick": "1dfffc63ead9bc75",
-    "VideoPlaceButton": "11032de44ee8f9a6",
+    "VideoPlaceButton": "2d4080cdff4551a0",
     "VideoPlaceOrder": "0c4a85d9c7b0bb3a",
     "PutInBox": "f14b96c7dae2578e",
     "PickByCount": "828bdc9006bf5157",

@@ -200,10 +200,13 @@ def _past(center: SceneObject, ranking: Ranking) -> Ranking:
 
 
 def _is_past_work_center(thing: SceneObject | None, *rankings: Ranking) -> bool:
-    """Return whether a thing is past the center of the work area in all of some directions."""
+    """Return whether a thing is a margin past the work area's center in all of some directions."""
     if thing is None:
         return False
-    return all(ranking.quantity(thing) >= ranking.quantity(_CENTER) for ranking in rankings)
+    for ranking in rankings:
+        if ranking.quantity(thing) < ranking.quantity(_CENTER) + MARGIN:
+            return False
+    return True
 
 
 class _Words(NamedTuple):
