@@ -70,16 +70,17 @@ def export_demonstrations(
 
     Example: roboirg export demonstrations --tasks PickXtimes --out data
     """
+    from roboirg.apps.demonstrations.export_format import find_format
     from roboirg.apps.demonstrations.export_plan import ExportPlan, training_words
     from roboirg.policies import find_policy
     from roboirg.runs.plan.option_parsing import parse_episodes
 
     add_working_directory(last=True)
     words = PlanWords(context, plan, "demonstrations", OWN_OPTIONS)
-    chosen = {"video": format == "robomme-hdf5", **words.choices(ExportPlan)}
+    chosen = {"video": find_format(format).begins_with_video, **words.choices(ExportPlan)}
     find_policy(chosen.get("policy", ExportPlan.policy))
     split = words.given("split", split)
-    # `validated` checks the names that are cast.
+    # `validated` checks what is cast.
     names = words.tasks(tasks)
     export_plan = ExportPlan(
         tasks=names,
@@ -88,7 +89,7 @@ def export_demonstrations(
         settings=words.settings(settings),
         forms=words.forms(),
         options=training_words(split, words.options()),
-        format=cast("Any", format),
+        format=format,
         pictures=cast("Any", pictures),
         **chosen,
     ).validated()

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.demonstrations.dataset_reading import ReplayableTrajectory, read_dataset
+from roboirg.apps.demonstrations.dataset_reading import read_dataset
+from roboirg.apps.demonstrations.replayable_trajectory import ReplayableTrajectory
 from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.envs.factory import make

@@ -16,8 +16,10 @@ from roboirg.apps.demonstrations.dataset_part import (
     episode_row,
     read_episodes,
 )
+from roboirg.apps.demonstrations.export_format import ExportFormat
+from roboirg.apps.demonstrations.export_plan import ExportPlan
+from roboirg.apps.demonstrations.formats.lerobot_tables import INFO, read_tables
 from roboirg.apps.demonstrations.formats.lerobot_v3 import (
-    INFO,
     StatsCollector,
     common_info,
     frame_columns,
@@ -31,11 +33,77 @@ from roboirg.apps.demonstrations.parquet_tables import write_frames, write_rows
 from roboirg.apps.demonstrations.trajectory import Trajectory, load_trajectory
 from roboirg.util.atomic_write import write_atomically
 
-__all__ = ["finish", "make_parts", "write_part"]
-
 _DATA = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
 _VIDEO = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"
 _ARM_JOINTS = 7
+_OPENPI = """\
+openpi reads this dataset with the LeRobot that it pins. Save the following as
+`roboirg_config.py` next to openpi's `scripts/`, and start training through it:
+
+```python
+import dataclasses
+import pathlib
+import runpy
+import sys
+
+import openpi.models.pi0_config as pi0_config
+import openpi.policies.libero_policy as libero_policy
+import openpi.training.config as configs
+import openpi.training.optimizer as optimizer
+import openpi.training.weight_loaders as weight_loaders
+import openpi.transforms as transforms
+
+
+@dataclasses.dataclass(frozen=True)
+class RoboIRGData(configs.DataConfigFactory):
+    def create(self, assets_dirs: pathlib.Path, model_config):
+        repack = transforms.Group(inputs=[transforms.RepackTransform({{
+            "observation/image": "{front}", "observation/wrist_image": "{wrist}",
+            "observation/state": "{state}", "actions": "{action}", "prompt": "prompt"}})])
+        data = transforms.Group(
+            inputs=[libero_policy.LiberoInputs(model_type=model_config.model_type)],
+            outputs=[FirstEight()])
+        mask = transforms.make_bool_mask(7, -1)
+        data = data.push(inputs=[transforms.DeltaActions(mask)],
+                         outputs=[transforms.AbsoluteActions(mask)])
+        return dataclasses.replace(
+            self.create_base_config(assets_dirs, model_config), repack_transforms=repack,
+            data_transforms=data,
+            model_transforms=configs.ModelTransformFactory()(model_config),
+            action_sequence_keys=("{action}",))
+
+
+@dataclasses.dataclass(frozen=True)
+class FirstEight(transforms.DataTransformFn):
+    def __call__(self, data):
+        return {{"actions": data["actions"][..., :8]}}
+
+
+configs._CONFIGS_DICT["pi05_roboirg"] = configs.TrainConfig(
+    name="pi05_roboirg",
+    model=pi0_config.Pi0Config(pi05=True, action_horizon=20, max_token_len=160),
+    data=RoboIRGData(repo_id="roboirg", base_config=configs.DataConfig(prompt_from_task=True)),
+    weight_loader=weight_loaders.CheckpointWeightLoader(
+        "gs://openpi-assets/checkpoints/pi05_base/params"),
+    num_train_steps=80000, batch_size=64,
+    lr_schedule=optimizer.CosineDecaySchedule(
+        warmup_steps=10000, peak_lr=5e-05, decay_steps=80000,
+        decay_lr=5e-05))
+runpy.run_path(sys.argv.pop(1), run_name="__main__")
+```
+
+```sh
+export HF_LEROBOT_HOME={parent}   # the folder above this one, which must be named `roboirg`
+python roboirg_config.py scripts/compute_norm_stats.py --config-name pi05_roboirg
+python roboirg_config.py scripts/train.py pi05_roboirg --exp-name first
+```
+
+The configuration follows the shape of openpi's own; it has not been run here, because openpi needs
+a GPU and packages from git. """
+_GROOT = """\
+GR00T reads `meta/modality.json`; it needs videos, so export with `--pictures lossless-video` or
+`lossy-video`.
+"""
 
 
 def write_part(part: DatasetPart) -> None:
@@ -135,3 +203,22 @@ def _write_lines(path: Path, lines: Iterable[object]) -> None:
     """Write a line of JSON for each object."""
     texts = [json.dumps(line) + "\n" for line in lines]
     write_atomically(path, "".join(texts))
+
+
+def training_text(plan: ExportPlan, root: Path) -> str:
+    """Return how to train openpi, if it can read a dataset, and GR00T, as Markdown."""
+    if not plan.is_for_openpi:
+        return _GROOT
+    return _OPENPI.format(parent=root.parent, **FrameColumns(plan).keys) + _GROOT
+
+
+FORMAT = ExportFormat(
+    name="lerobot-v2.1",
+    order=1,
+    is_for_openpi=True,
+    make_parts=make_parts,
+    write_part=write_part,
+    finish=finish,
+    training_text=training_text,
+    read=read_tables,
+)
