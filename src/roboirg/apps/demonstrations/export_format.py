@@ -7,7 +7,6 @@ entry points of the group ``roboirg.export_formats``.
 from __future__ import annotations
 
 import functools
-import importlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +33,6 @@ class ExportFormat:
         read: yields each trajectory of the dataset at a path as a `ReplayableTrajectory`; None if
             the path holds none of this format.
         check_support: raises a `MissingDependencyError` if a library is missing that it needs.
-        order: place among all formats; those of packages come last.
         begins_with_video: whether the task's video is exported unless a plan says otherwise.
         has_depth: whether it holds depth and calibration, and therefore always the pictures of both
             cameras, in full size and without loss.
@@ -52,7 +50,6 @@ class ExportFormat:
     training_text: Callable[..., str]
     read: Callable[[Path], Iterator[Any] | None]
     check_support: Callable[[], None] = lambda: None
-    order: int = 9
     begins_with_video: bool = False
     has_depth: bool = False
     has_frame_tables: bool = True
@@ -64,10 +61,7 @@ class ExportFormat:
 @functools.cache
 def export_formats() -> Mapping[str, ExportFormat]:
     """Return every format by name."""
-    formats = importlib.import_module(f"{__package__}.formats")
-    found = discover(formats, "FORMAT", ExportFormat, "roboirg.export_formats")
-    found.sort(key=lambda of_dataset: of_dataset.order)
-    return {of_dataset.name: of_dataset for of_dataset in found}
+    return discover(f"{__package__}.formats", "FORMAT", ExportFormat, "roboirg.export_formats")
 
 
 def find_format(name: str) -> ExportFormat:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from roboirg.apps.demonstrations.dataset_part import EPISODE_TABLE
 from roboirg.apps.demonstrations.frame_columns import EXECUTED
@@ -37,14 +36,19 @@ def read_tables(root: Path) -> Iterator[ReplayableTrajectory] | None:
 
 def _trajectories(root: Path, info: Mapping[str, Any]) -> Iterator[ReplayableTrajectory]:
     """Yield the trajectories of an export, with the frames of the first instruction."""
-    files = _data_files(root, info)
+    from pyarrow import parquet
+
     state, action = _columns(info)
+    files = sorted((root / "data").rglob("*.parquet"))
+    frames = parquet.ParquetDataset(files).read(columns=[state, action])
     rows: dict[str, dict[str, Any]] = {}
     for row in read_rows(root / EPISODE_TABLE):
         rows.setdefault(row["trajectory"], row)  # that of its first instruction
     for name, row in rows.items():
-        number = row["episode_index"]
-        frames = _own_frames(files[number], number, (state, action))
+        after_video = row["from_index"] + row["video_length"]
+        own = frames.slice(after_video, row["length"] - row["video_length"])
+        states = np.array(own[state].to_pylist())
+        actions = np.array(own[action].to_pylist())
         final = np.array(row["final_state"])
         yield ReplayableTrajectory(
             name=name,
@@ -52,8 +56,8 @@ def _trajectories(root: Path, info: Mapping[str, Any]) -> Iterator[ReplayableTra
             seed=row["seed"],
             split=row["split"],
             index=row["episode"],
-            actions=frames[action].astype(np.float64),
-            states=np.concatenate([frames[state][1:], final[None, : _JOINTS + 1]]),
+            actions=actions.astype(np.float64),
+            states=np.concatenate([states[1:], final[None, : _JOINTS + 1]]),
             final_state=final,
             status=row["status"],
             space=row.get("actions", JOINT_ANGLE.name),
@@ -65,32 +69,3 @@ def _columns(info: Mapping[str, Any]) -> tuple[str, str]:
     state = next(name for name in _STATES if name in info["features"])
     action = next(name for name in _ACTIONS if name in info["features"])
     return state, action
-
-
-def _own_frames(path: Path, number: int, names: Sequence[str]) -> dict[str, NDArray[Any]]:
-    """Return columns of the frames of an episode, without those of its video."""
-    from pyarrow import parquet
-
-    table = parquet.read_table(path, columns=[*names, "episode_index", "is_video_demo"])
-    is_own = np.asarray(table["episode_index"]) == number
-    is_own &= ~np.asarray(table["is_video_demo"])
-    return {name: np.array(table[name].to_pylist())[is_own] for name in names}
-
-
-def _data_files(root: Path, info: Mapping[str, Any]) -> Mapping[int, Path]:
-    """Return the file of frames of each episode."""
-    pattern = info["data_path"]
-    files = {}
-    if info["codebase_version"] != "v3.0":
-        size = info["chunks_size"]
-        for number in range(info["total_episodes"]):
-            name = pattern.format(episode_chunk=number // size, episode_index=number)
-            files[number] = root / name
-        return files
-    for path in sorted((root / "meta/episodes").glob("*/*.parquet")):
-        for row in read_rows(path):
-            name = pattern.format(
-                chunk_index=row["data/chunk_index"], file_index=row["data/file_index"]
-            )
-            files[row["episode_index"]] = root / name
-    return files

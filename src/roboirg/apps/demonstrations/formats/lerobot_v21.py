@@ -18,8 +18,7 @@ from roboirg.apps.demonstrations.dataset_part import (
 )
 from roboirg.apps.demonstrations.export_format import ExportFormat
 from roboirg.apps.demonstrations.export_plan import ExportPlan
-from roboirg.apps.demonstrations.formats.lerobot_tables import INFO, read_tables
-from roboirg.apps.demonstrations.formats.lerobot_v3 import (
+from roboirg.apps.demonstrations.formats.lerobot import (
     StatsCollector,
     common_info,
     frame_columns,
@@ -28,6 +27,7 @@ from roboirg.apps.demonstrations.formats.lerobot_v3 import (
     write_json,
     write_videos,
 )
+from roboirg.apps.demonstrations.formats.lerobot_tables import INFO, read_tables
 from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
 from roboirg.apps.demonstrations.parquet_tables import write_frames, write_rows
 from roboirg.apps.demonstrations.trajectory import Trajectory, load_trajectory
@@ -214,7 +214,6 @@ def training_text(plan: ExportPlan, root: Path) -> str:
 
 FORMAT = ExportFormat(
     name="lerobot-v2.1",
-    order=1,
     is_for_openpi=True,
     make_parts=make_parts,
     write_part=write_part,

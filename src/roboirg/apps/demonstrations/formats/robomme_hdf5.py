@@ -303,7 +303,6 @@ def _number(name: str) -> int:
 
 FORMAT = ExportFormat(
     name="robomme-hdf5",
-    order=2,
     begins_with_video=True,
     has_depth=True,
     has_frame_tables=False,

@@ -7,7 +7,6 @@ imports a network library before a server is named.
 from __future__ import annotations
 
 import functools
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -36,5 +35,4 @@ class Protocol:
 @functools.cache
 def protocols_by_scheme() -> Mapping[str, Protocol]:
     """Return all protocols by name: ours by file, then those of installed packages."""
-    found = discover(sys.modules[__name__], "PROTOCOL", Protocol, "roboirg.protocols")
-    return {protocol.name: protocol for protocol in found}
+    return discover(__name__, "PROTOCOL", Protocol, "roboirg.protocols")

@@ -7,7 +7,6 @@ through entry points of the group ``roboirg.model_providers``.
 from __future__ import annotations
 
 import functools
-import importlib
 import json
 import math
 import os
@@ -79,9 +78,8 @@ class ModelProvider(NamedTuple):
 @functools.cache
 def model_providers() -> Mapping[str, ModelProvider]:
     """Return every provider by name."""
-    ours = importlib.import_module(f"{__package__}.providers")
-    found = discover(ours, "PROVIDER", ModelProvider, "roboirg.model_providers")
-    return {provider.name: provider for provider in found}
+    ours = f"{__package__}.providers"
+    return discover(ours, "PROVIDER", ModelProvider, "roboirg.model_providers")
 
 
 class ModelOptions(BaseModel):

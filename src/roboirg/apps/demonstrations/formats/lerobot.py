@@ -304,7 +304,6 @@ def training_text(plan: ExportPlan, root: Path) -> str:
 
 FORMAT = ExportFormat(
     name="lerobot-v3",
-    order=0,
     has_waypoints=True,
     make_parts=make_parts,
     write_part=write_part,
