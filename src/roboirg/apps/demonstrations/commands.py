@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from roboirg.cli.export_commands import export_app
+from roboirg.cli.listed_names import ListingCommand
 from roboirg.cli.options import (
     PlanName,
     PlanWords,
@@ -42,7 +43,8 @@ def export_demonstrations(
     context: typer.Context,
     out: Annotated[Path, typer.Option(help="Folder of the dataset.")],
     format: Annotated[  # noqa: A002
-        str, typer.Option(help="lerobot-v3, lerobot-v2.1 or robomme-hdf5.")
+        str,
+        typer.Option(help="One of {roboirg.apps.demonstrations.export_format:export_formats}."),
     ] = "lerobot-v3",
     split: Split = "train",
     tasks: Tasks = "all",
@@ -173,5 +175,5 @@ def _difference_text(result: ReplayResult) -> str:
 
 
 def add_commands(app: typer.Typer) -> None:
-    export_app.command("demonstrations")(export_demonstrations)
+    export_app.command("demonstrations", cls=ListingCommand)(export_demonstrations)
     app.command()(replay)

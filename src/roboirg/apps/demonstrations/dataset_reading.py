@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 from roboirg.apps.demonstrations.export_format import export_formats
@@ -10,7 +9,7 @@ from roboirg.apps.demonstrations.replayable_trajectory import ReplayableTrajecto
 from roboirg.core.errors import InvalidValueError
 
 
-def read_dataset(path: Path) -> Iterator[ReplayableTrajectory]:
+def read_dataset(path: Path) -> list[ReplayableTrajectory]:
     """Return every trajectory of a dataset once, whatever the number of its instructions.
 
     Args:
@@ -21,8 +20,8 @@ def read_dataset(path: Path) -> Iterator[ReplayableTrajectory]:
         MissingDependencyError: a package is not installed.
     """
     for of_format in export_formats().values():
-        trajectories = of_format.read(path)
-        if trajectories is not None:
+        trajectories = list(of_format.read(path))
+        if trajectories:
             return trajectories
     raise InvalidValueError(
         f"{str(path)!r} holds no dataset: neither a complete export of ours nor RoboMME's "

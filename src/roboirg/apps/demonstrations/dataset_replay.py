@@ -62,7 +62,7 @@ def replay_dataset(path: Path, workers: int) -> Iterator[ReplayResult]:
         InvalidValueError: the path holds no dataset, or one of episodes that do not exist here.
         MissingDependencyError: a package is not installed.
     """
-    for _, result in parallel_map(replay, list(read_dataset(path)), workers):
+    for _, result in parallel_map(replay, read_dataset(path), workers):
         yield result
 
 

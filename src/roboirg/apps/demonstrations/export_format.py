@@ -7,7 +7,7 @@ entry points of the group ``roboirg.export_formats``.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -30,8 +30,8 @@ class ExportFormat:
             with the folder and all parts.
         training_text: returns what to do with a dataset, as Markdown. It is called with the plan
             and the absolute path of the folder.
-        read: yields each trajectory of the dataset at a path as a `ReplayableTrajectory`; None if
-            the path holds none of this format.
+        read: yields each trajectory of the dataset at a path as a `ReplayableTrajectory`; none if
+            the path holds no dataset of this format.
         check_support: raises a `MissingDependencyError` if a library is missing that it needs.
         begins_with_video: whether the task's video is exported unless a plan says otherwise.
         has_depth: whether it holds depth and calibration, and therefore always the pictures of both
@@ -48,7 +48,7 @@ class ExportFormat:
     write_part: Callable[[Any], None]
     finish: Callable[..., None]
     training_text: Callable[..., str]
-    read: Callable[[Path], Iterator[Any] | None]
+    read: Callable[[Path], Iterable[Any]]
     check_support: Callable[[], None] = lambda: None
     begins_with_video: bool = False
     has_depth: bool = False
@@ -62,6 +62,11 @@ class ExportFormat:
 def export_formats() -> Mapping[str, ExportFormat]:
     """Return every format by name."""
     return discover(f"{__package__}.formats", "FORMAT", ExportFormat, "roboirg.export_formats")
+
+
+def names_where(has: Callable[[ExportFormat], bool]) -> str:
+    """Return the names of the formats that have a trait: ``'robomme-hdf5'``, or ``'a' or 'b'``."""
+    return " or ".join(repr(known.name) for known in export_formats().values() if has(known))
 
 
 def find_format(name: str) -> ExportFormat:

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
-from roboirg.apps.demonstrations.export_format import ExportFormat, export_formats, find_format
+from roboirg.apps.demonstrations.export_format import ExportFormat, find_format, names_where
 from roboirg.apps.demonstrations.picture_coding import PictureCoding
 from roboirg.apps.demonstrations.trajectory import SUFFIX, TRAJECTORY_VERSION
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
@@ -95,18 +95,17 @@ class ExportPlan:
         return self
 
     def _check_disturbed(self) -> None:
-        formats = export_formats().values()
         if self.disturbed and (self.policy != ORACLE or not self.file_format.has_labels):
-            unlabeled = [repr(known.name) for known in formats if not known.has_labels]
+            unlabeled = names_where(lambda known: not known.has_labels)
             raise InvalidValueError(
                 f"disturbed is true, the policy {self.policy!r} and the format {self.format!r}: "
-                f"only the oracle is disturbed, and a time step of {' or '.join(unlabeled)} is the "
+                f"only the oracle is disturbed, and a time step of {unlabeled} is the "
                 "result of its action, so it has no place for one that was not executed."
             )
         if self.actions == "waypoint" and (self.video or not self.file_format.has_waypoints):
-            able = [repr(known.name) for known in formats if known.has_waypoints]
+            able = names_where(lambda known: known.has_waypoints)
             raise InvalidValueError(
-                f"actions is 'waypoint': such frames have the format {' or '.join(able)}, and "
+                f"actions is 'waypoint': such frames have the format {able}, and "
                 "none is of the video."
             )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,20 +25,20 @@ _ACTIONS = (EXECUTED, "action", "actions")
 _JOINTS = 7
 
 
-def read_tables(root: Path) -> Iterator[ReplayableTrajectory] | None:
-    """Return the trajectories of an export, each once; None if the folder holds none."""
-    info = root / INFO
-    if not info.is_file() or not (root / EPISODE_TABLE).is_file():
-        return None
+def read_tables(root: Path) -> Iterator[ReplayableTrajectory]:
+    """Yield the trajectories of an export, each with the frames of its first instruction.
+
+    A folder that holds no export has none.
+    """
+    path = root / INFO
+    if not path.is_file() or not (root / EPISODE_TABLE).is_file():
+        return
     check_parquet_support()
-    return _trajectories(root, json.loads(info.read_text(encoding="utf-8")))
-
-
-def _trajectories(root: Path, info: Mapping[str, Any]) -> Iterator[ReplayableTrajectory]:
-    """Yield the trajectories of an export, with the frames of the first instruction."""
     from pyarrow import parquet
 
-    state, action = _columns(info)
+    info = json.loads(path.read_text(encoding="utf-8"))
+    state = _present(_STATES, info)
+    action = _present(_ACTIONS, info)
     files = sorted((root / "data").rglob("*.parquet"))
     frames = parquet.ParquetDataset(files).read(columns=[state, action])
     rows: dict[str, dict[str, Any]] = {}
@@ -64,8 +64,6 @@ def _trajectories(root: Path, info: Mapping[str, Any]) -> Iterator[ReplayableTra
         )
 
 
-def _columns(info: Mapping[str, Any]) -> tuple[str, str]:
-    """Return the names of the columns of states and of executed actions."""
-    state = next(name for name in _STATES if name in info["features"])
-    action = next(name for name in _ACTIONS if name in info["features"])
-    return state, action
+def _present(names: Iterable[str], info: Mapping[str, Any]) -> str:
+    """Return the first name that is one of a column."""
+    return next(name for name in names if name in info["features"])

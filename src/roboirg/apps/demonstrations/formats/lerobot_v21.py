@@ -28,9 +28,9 @@ from roboirg.apps.demonstrations.formats.lerobot import (
     write_videos,
 )
 from roboirg.apps.demonstrations.formats.lerobot_tables import INFO, read_tables
-from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
+from roboirg.apps.demonstrations.frame_columns import FrameColumns
 from roboirg.apps.demonstrations.parquet_tables import write_frames, write_rows
-from roboirg.apps.demonstrations.trajectory import Trajectory, load_trajectory
+from roboirg.apps.demonstrations.trajectory import load_trajectory
 from roboirg.util.atomic_write import write_atomically
 
 _DATA = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
@@ -113,7 +113,8 @@ def write_part(part: DatasetPart) -> None:
     trajectory = load_trajectory(episode.path)
     shared = frame_columns(columns, trajectory)
     for placed in episode.texts:
-        place = _place(placed.episode_index)
+        index = placed.episode_index
+        place = {"episode_chunk": index // CHUNK_SIZE, "episode_index": index}
         if columns.has_videos:
             write_videos(part, partial(_VIDEO.format, **place))
         own = own_columns(placed, trajectory.facts.frames)
@@ -121,53 +122,30 @@ def write_part(part: DatasetPart) -> None:
         write_frames(path, columns.table_features(), shared, [own], is_described=True)
 
 
-def _place(episode_index: int) -> dict[str, int]:
-    return {"episode_chunk": episode_index // CHUNK_SIZE, "episode_index": episode_index}
-
-
 def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the metadata; ``info.json``, without which nothing reads the dataset, comes last."""
     columns = parts[0].columns
-    lines = _EpisodeLines(columns)
+    collector = StatsCollector(columns)
+    episodes = []
+    stats = []
+    facts = []
     for _, episode, trajectory in read_episodes(parts):
         for placed in episode.texts:
-            lines.add(trajectory, placed)
+            index = placed.episode_index
+            tasks = [placed.words.text]
+            length = trajectory.facts.frames
+            episodes.append({"episode_index": index, "tasks": tasks, "length": length})
+            stats.append({"episode_index": index, "stats": collector.add(trajectory, placed)})
+            facts.append(episode_row(trajectory, placed))
     texts = all_texts(parts)
     task_lines = [{"task_index": index, "task": text} for index, text in enumerate(texts)]
-    write_rows(root / EPISODE_TABLE, lines.facts)
-    _write_lines(root / "meta/episodes.jsonl", lines.episodes)
-    _write_lines(root / "meta/episodes_stats.jsonl", lines.stats)
+    write_rows(root / EPISODE_TABLE, facts)
+    _write_lines(root / "meta/episodes.jsonl", episodes)
+    _write_lines(root / "meta/episodes_stats.jsonl", stats)
     _write_lines(root / "meta/tasks.jsonl", task_lines)
-    write_json(root / "meta/stats.json", lines.collector.result())
+    write_json(root / "meta/stats.json", collector.result())
     write_json(root / "meta/modality.json", modality(columns))
     write_json(root / INFO, _info(parts, texts))
-
-
-class _EpisodeLines:
-    """What the files of metadata say of each episode.
-
-    Attributes:
-        collector: of the statistics of all.
-        episodes: lines of ``episodes.jsonl``.
-        stats: lines of ``episodes_stats.jsonl``.
-        facts: rows of the table of facts.
-    """
-
-    def __init__(self, columns: FrameColumns) -> None:
-        self.collector = StatsCollector(columns)
-        self.episodes: list[dict[str, Any]] = []
-        self.stats: list[dict[str, Any]] = []
-        self.facts: list[dict[str, Any]] = []
-
-    def add(self, trajectory: Trajectory, placed: PlacedText) -> None:
-        """Add an episode: a trajectory with one of its instructions."""
-        index = placed.episode_index
-        texts = [placed.words.text]
-        length = trajectory.facts.frames
-        self.episodes.append({"episode_index": index, "tasks": texts, "length": length})
-        stats = self.collector.add(trajectory, placed)
-        self.stats.append({"episode_index": index, "stats": stats})
-        self.facts.append(episode_row(trajectory, placed))
 
 
 def _info(parts: Sequence[DatasetPart], texts: Sequence[str]) -> dict[str, Any]:

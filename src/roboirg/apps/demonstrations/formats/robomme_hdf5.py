@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -46,7 +45,7 @@ _CLOSED_FINGER = 0.03
 _COMPRESSION = {"compression": "gzip", "compression_opts": 1}
 """Of pictures and depth."""
 _NO_CHOICE = json.dumps({"choice": "", "point": []})
-_HDF5_NAME = re.compile(r"record_dataset_(\w+)\.h5")
+_FILES = "record_dataset_*.h5"
 """For example record_dataset_PickXtimes.h5."""
 _JOINTS = 7
 _MME_VLA = """\
@@ -235,35 +234,23 @@ def training_text(_plan: ExportPlan, root: Path) -> str:
     return _MME_VLA.format(root=root)
 
 
-def read(path: Path) -> Iterator[ReplayableTrajectory] | None:
-    """Return the trajectories of a folder or file; None if it holds none of RoboMME's files."""
-    files = _hdf5_files(path)
-    if not files:
-        return None
-    check_hdf5_support()
-    return _read_hdf5(files)
+def read(path: Path) -> Iterator[ReplayableTrajectory]:
+    """Yield the trajectories of RoboMME's files in a folder, or of one such file."""
+    for file_path in _hdf5_files(path):
+        check_hdf5_support()
+        import h5py
+
+        task = file_path.stem.removeprefix("record_dataset_")
+        with h5py.File(file_path, "r") as file:
+            for name in sorted(file, key=_number):
+                yield _read_hdf5_episode(file[name], task, name)
 
 
 def _hdf5_files(path: Path) -> list[Path]:
     """Return the HDF5 files that hold time steps, not links to them."""
-    if path.is_file() and _HDF5_NAME.fullmatch(path.name):
+    if path.is_file() and path.match(_FILES):
         return [path]
-    for place in (path, path / SHARED_FOLDER):
-        files = sorted(path for path in place.glob("*.h5") if _HDF5_NAME.fullmatch(path.name))
-        if files:
-            return files
-    return []
-
-
-def _read_hdf5(files: list[Path]) -> Iterator[ReplayableTrajectory]:
-    """Yield the trajectories of RoboMME's files."""
-    import h5py
-
-    for path in files:
-        task = path.stem.removeprefix("record_dataset_")
-        with h5py.File(path, "r") as file:
-            for name in sorted(file, key=_number):
-                yield _read_hdf5_episode(file[name], task, name)
+    return sorted(path.glob(_FILES)) or sorted((path / SHARED_FOLDER).glob(_FILES))
 
 
 def _read_hdf5_episode(group: Any, task: str, name: str) -> ReplayableTrajectory:  # noqa: ANN401

@@ -78,8 +78,9 @@ class ModelProvider(NamedTuple):
 @functools.cache
 def model_providers() -> Mapping[str, ModelProvider]:
     """Return every provider by name."""
-    ours = f"{__package__}.providers"
-    return discover(ours, "PROVIDER", ModelProvider, "roboirg.model_providers")
+    return discover(
+        f"{__package__}.providers", "PROVIDER", ModelProvider, "roboirg.model_providers"
+    )
 
 
 class ModelOptions(BaseModel):
@@ -129,9 +130,8 @@ class ModelOptions(BaseModel):
     @classmethod
     def _is_known(cls, name: str) -> str:
         """Refuse a provider that does not exist."""
-        known = model_providers()
-        if name not in known:
-            raise ValueError(f"Input should be {' or '.join(map(repr, known))}")
+        if name not in model_providers():
+            raise ValueError(f"Input should be {' or '.join(map(repr, model_providers()))}")
         return name
 
     @field_validator("base_url")
@@ -172,10 +172,10 @@ class ModelOptions(BaseModel):
     @property
     def prices(self) -> TokenPrices:
         """What tokens cost: by the options, or as the provider declares for its own service."""
-        given_prices = TokenPrices(self.input_price, self.output_price)
-        if self.base_url or given_prices != TokenPrices():
-            return given_prices
-        return self.service.prices.get(self.model, given_prices)
+        prices = TokenPrices(self.input_price, self.output_price)
+        if self.base_url or prices != TokenPrices():
+            return prices
+        return self.service.prices.get(self.model, prices)
 
     def key(self) -> str:
         """Return the key, or `NO_KEY` if none is needed.
