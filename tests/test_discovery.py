@@ -41,14 +41,14 @@ def install(monkeypatch):
 
 
 def found():
-    return discovery.discover(tasks, "TASK", Task, tasks.ENTRY_POINTS)
+    return list(discovery.discover("roboirg.tasks", "TASK", Task, tasks.ENTRY_POINTS).values())
 
 
 @pytest.mark.parametrize("thing", [OUTSIDE, MODULE], ids=["object", "module"])
 def test_an_entry_point_names_the_object_or_its_module(install, thing):
     install(lambda: thing, lambda: OTHER)
     assert found()[-2:] == [OUTSIDE, OTHER]
-    assert len(found()) == len(discovery.discover_in_modules(tasks, "TASK", Task)) + 2
+    assert len(found()) == len(discovery.discover_in_modules("roboirg.tasks", "TASK", Task)) + 2
     assert discovery.find_entry("outside-1", "TASK", Task, tasks.ENTRY_POINTS) is OTHER
 
 

@@ -28,6 +28,7 @@ from roboirg.cli import (
     report_commands,
     run_commands,
 )
+from roboirg.cli.listed_names import ListingCommand
 from roboirg.cli.run_commands import INTERRUPTED, USAGE_ERROR
 from roboirg.core.error_words import is_of_others, one_line
 from roboirg.core.errors import RoboIRGError
@@ -102,10 +103,10 @@ def _add_commands() -> None:
         report_commands.figures,
         report_commands.compare,
     ):
-        app.command()(command)
+        app.command(cls=ListingCommand)(command)
     app.command("fetch-models")(look_commands.fetch_models)
     app.command("tasks")(look_commands.list_tasks)
-    app.command(cls=policy_commands.ProtocolHelpCommand)(policy_commands.serve)
+    app.command(cls=ListingCommand)(policy_commands.serve)
     app.add_typer(export_commands.export_app, name="export")
     app.add_typer(records_commands.records_app, name="records")
     for application in pkgutil.iter_modules(apps.__path__):

@@ -20,7 +20,7 @@ from roboirg.analysis.measures.comparison import compare
 from roboirg.analysis.measures.comparison_text import sentences
 from roboirg.analysis.results.frame import Frame, as_column
 from roboirg.analysis.results.reading import (
-    WORD_COLUMNS,
+    record_columns,
     with_columns,
 )
 from roboirg.analysis.tables.diagnostic_tables import make_breakdown_table
@@ -62,7 +62,7 @@ def run(records: Records, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_rival_has_the_kind_of_words_that_single_it_out(records: Records) -> None:
-    read = WORD_COLUMNS["rival"].read
+    read = record_columns()["rival"].read
     for record in records:
         reference = record.metadata["rival_reference"]
         assert (reference is not None) == (record.setting == "direct-rival")
@@ -70,7 +70,7 @@ def test_a_rival_has_the_kind_of_words_that_single_it_out(records: Records) -> N
 
 
 def test_only_the_command_s_expressions_count(records: Records) -> None:
-    read = WORD_COLUMNS["expression"].read
+    read = record_columns()["expression"].read
     contextual = [record for record in records if record.setting == "contextual"]
     found = {label for record in contextual for label in read(record)}  # type: ignore[attr-defined]
     said = {mention.expression for record in contextual for mention in record.mentions}
@@ -152,7 +152,7 @@ def test_words_are_read_line_by_line(records: Records, tmp_path: Path) -> None:
     """The long parts of records are dropped at once: labels take a small share of the file."""
     long = replace(records[1], details="x" * 20_000)
     store(tmp_path, [replace(long, episode=episode) for episode in range(2000)])
-    reads = {name: column.read for name, column in WORD_COLUMNS.items()}
+    reads = {name: column.read for name, column in record_columns().items()}
     tracemalloc.start()
     frame = with_columns(frame_of([long]), iterate_records(tmp_path), reads)
     _, peak = tracemalloc.get_traced_memory()

@@ -84,7 +84,9 @@ def dots(figure: Figure) -> dict[tuple[str, str], list[float]]:
 
 @pytest.mark.slow
 def test_all_figures_that_apply_are_written_and_are_the_same_again(tmp_path: Path) -> None:
-    paths = write_figures(content(planned=PLAN.jobs()), tmp_path / "a" / "b")
+    paths = write_figures(
+        content(planned=PLAN.jobs()), tmp_path / "a" / "b", ("gaps", "context", "failures")
+    )
     # Nothing is known about contexts of other lengths.
     assert {path.name for path in paths} == {
         f"{name}{ending}"

@@ -15,7 +15,7 @@ from page_text import store
 import roboirg
 from roboirg.analysis.measures.measure import summarize
 from roboirg.analysis.results.frame import COLUMNS, make_frame
-from roboirg.analysis.results.reading import WORD_COLUMNS, with_columns
+from roboirg.analysis.results.reading import record_columns, with_columns
 from roboirg.analysis.results.run_cells import cells_of
 from roboirg.analysis.results.sources import opened_sources
 from roboirg.core.versions import Versions
@@ -40,7 +40,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_columns_have_their_types_and_lack_what_they_may_lack(run: Path) -> None:
     found = roboirg.results(run)
-    declared = {**COLUMNS, **WORD_COLUMNS}
+    declared = {**COLUMNS, **record_columns()}
     assert list(found) == list(declared)
     kinds = found.dtypes.astype(str).to_dict()
     assert {(one.kind, kinds[name]) for name, one in declared.items()} == {
@@ -143,7 +143,7 @@ def test_the_page_lists_the_columns() -> None:
     page = (Path(__file__).parents[2] / "docs" / "own-tables.md").read_text(encoding="utf-8")
     rows = [
         f"| `{one.name}` | {one.kind} | {one.meaning} | {one.missing or 'never'} |"
-        for one in (*COLUMNS.values(), *WORD_COLUMNS.values())
+        for one in (*COLUMNS.values(), *record_columns().values())
     ]
     assert "\n".join(rows) in page, "\n".join(rows)
 
@@ -160,7 +160,3 @@ def test_a_run_is_opened_once_for_all_that_is_wanted_of_it(
         assert [(str(one.path), one.policies) for one in found] == [
             ("a", None), ("b", ("y", "z:Z")), ("c:d", ("e",)), ("c", ("e",)),
         ]  # fmt: skip
-
-
-def test_no_column_of_the_words_hides_one_of_the_records():
-    assert not COLUMNS.keys() & WORD_COLUMNS.keys()

@@ -14,7 +14,7 @@ from roboirg.analysis.measures.breakdowns import BREAKDOWNS
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.frame import Frame
 from roboirg.analysis.tables.diagnostic_tables import (
-    DIAGNOSTIC_TABLES,
+    diagnostic_tables,
     make_breakdown_table,
     make_failure_table,
 )
@@ -114,7 +114,7 @@ MIXED = frame_of(
 )
 def test_other_tables_are_as_stored(snapshot: SnapshotAssertion, name: str, kind: str) -> None:
     """Numbers of one row, column, form or outcome in place of another."""
-    assert get_format(kind).draw(DIAGNOSTIC_TABLES[name](RunData(MIXED), ())) == snapshot
+    assert get_format(kind).draw(diagnostic_tables()[name].make(RunData(MIXED))) == snapshot
 
 
 def ended(kinds: str, setting: str) -> list[Summary]:
@@ -154,7 +154,7 @@ def test_all_episodes_end_in_one_of_four_ways_and_gaps_are_sums_of_changes(
 def test_a_failure_with_a_name_of_another_version_is_not_attributed() -> None:
     other = Attribution(kind="execution", failure="renamed", sentence="So.")
     data = RunData(frame_of(play("10", attribution=other)))
-    (row,) = DIAGNOSTIC_TABLES["failure-names"](data, ()).rows
+    (row,) = diagnostic_tables()["failure-names"].make(data).rows
     assert [one.text for one in row.entries] == ["2", "1", "1"]
 
 

@@ -54,10 +54,11 @@ DUMMY = Setting(
 @pytest.fixture
 def register(monkeypatch):
     """Adds settings to those of the language for the length of a test."""
-    found = tuple(all_settings().values())
+    found = dict(all_settings())
 
     def add(*more):
-        monkeypatch.setattr(settings, "discover", lambda *_: [*found, *more])
+        added = {setting.name: setting for setting in more}
+        monkeypatch.setattr(settings, "discover", lambda *_: {**found, **added})
         all_settings.cache_clear()
 
     yield add

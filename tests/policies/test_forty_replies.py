@@ -11,7 +11,7 @@ from planning_fakes import Garbage, fake_vlm, model_options
 from roboirg.policies.planners.model_planners import StatelessOptions, StatelessPlanner
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.policies.vlm.model_content import ChatTurn
-from roboirg.policies.vlm.models import ModelOptions, ModelQuery, make_model
+from roboirg.policies.vlm.models import ModelOptions, ModelQuery
 from roboirg.policies.vlm.vlm_query import VLMQuery
 from roboirg.util.reply_reading import (
     UnparsableReplyError,
@@ -27,7 +27,7 @@ QUERY = ModelQuery("system", (ChatTurn("user", ("words",)),))
 
 
 def reply_of(styled):
-    return make_model(styled.options()).read(styled.body())
+    return styled.options().service.read(styled.body())
 
 
 def goal_in(text):

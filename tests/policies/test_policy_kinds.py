@@ -18,7 +18,7 @@ def lab(tmp_path, monkeypatch):
     for cached in (policy_kinds.find_kind, policy_kinds.known_kinds):
         cached.cache_clear()
     gone = "gone = no_such_module\n"
-    install(tmp_path, "lab_kind", "PolicyKind(", "policy_kinds", gone)
+    install(tmp_path, "add-protocol", "policy_kinds", gone)
     monkeypatch.syspath_prepend(tmp_path)
     yield
     sys.modules.pop("lab_kind", None)
@@ -38,5 +38,5 @@ def test_the_recipe_makes_policies_in_a_process_of_their_own():
 @pytest.mark.usefixtures("lab")
 def test_a_kind_is_imported_only_when_it_is_named():
     make_policy("lab:walk", 0)
-    with pytest.raises(InvalidValueError, match=r"'gone' .* of lab_kind .* cannot be loaded"):
+    with pytest.raises(InvalidValueError, match=r"'gone' .* of add-protocol .* cannot be loaded"):
         make_policy("gone:anything", 0)

@@ -31,7 +31,7 @@ def _fresh_registry():
 @pytest.fixture
 def _tiny_package(tmp_path, monkeypatch, _fresh_registry):
     """The recipe of the docs page, installed as a package of its own."""
-    install(tmp_path, "tiny_protocol", "TinyPolicy", "roboirg.protocols")
+    install(tmp_path, "add-protocol", "protocols")
     monkeypatch.syspath_prepend(tmp_path)
     yield
     sys.modules.pop("tiny_protocol", None)

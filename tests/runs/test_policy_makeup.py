@@ -175,6 +175,7 @@ OTHER_TEXTS = {
     "asked": "every+9+steps",
     "base_url": "http://other:1",
     "prompts": "{prompts}",
+    "provider": "google",
 }
 
 

@@ -16,7 +16,7 @@ from roboirg.analysis.measures.measure import ALL_TASKS
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.frame import COLUMNS, MISSING
 from roboirg.analysis.results.option_labels import options_label
-from roboirg.analysis.results.reading import WORD_COLUMNS, read_frame
+from roboirg.analysis.results.reading import read_frame, record_columns
 from roboirg.analysis.results.sources import Source, opened_sources
 from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
 from roboirg.analysis.tables.rendering import get_format
@@ -60,7 +60,7 @@ def results(*paths: str | Path) -> pd.DataFrame:
         frame = read_frame(sources, words=True)
     played = frame.take(frame["outcome"] != MISSING)
     series = {}
-    for column in (*COLUMNS.values(), *WORD_COLUMNS.values()):
+    for column in (*COLUMNS.values(), *record_columns().values()):
         values = pd.Series(played[column.name])
         series[column.name] = values.astype(_TYPES[column.kind])
     return pd.DataFrame(series)

@@ -6,10 +6,9 @@ import os
 import signal
 import sys
 from types import FrameType
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperCommand
 
 from roboirg.cli.options import add_working_directory
 from roboirg.core.errors import InvalidValueError, RoboIRGError
@@ -20,43 +19,23 @@ from roboirg.util.web.request_origin import LOOPBACK, LOOPBACK_NAMES
 _STOPPED = {signal.SIGINT: 130, signal.SIGTERM: 143}
 """Exit codes by the signal that ends a server."""
 
-_PROTOCOLS = "PROTOCOLS"
-_URL_SCHEMES = "SCHEMES"
-"""Stand for the protocols, and for the schemes of all policy URLs, in help texts."""
-
 PolicySpec = Annotated[
     str,
-    typer.Argument(help=f"Built-in name, package.module:Class, or a URL ({_URL_SCHEMES})."),
+    typer.Argument(
+        help="Built-in name, package.module:Class, or a URL "
+        "({roboirg.policies.by_name.policy_classes:url_forms})."
+    ),
 ]
-
-
-class ProtocolHelpCommand(TyperCommand):
-    """A command whose help lists the protocols; they are imported only for that."""
-
-    def get_help(self, ctx: Any) -> str:  # noqa: ANN401 - typer does not export its base class
-        """Return the help, in which the installed protocols and schemes of URLs are listed.
-
-        The texts of the options have a placeholder for each, as the list is slow to make.
-        """
-        from roboirg.policies.by_name.policy_classes import url_classes
-        from roboirg.policies.remote.protocols import protocols_by_scheme
-
-        served: list[str] = []
-        for scheme, protocol in protocols_by_scheme().items():
-            if protocol.service is not None:
-                served.append(scheme)
-        urls = [f"{scheme}://…" for scheme in url_classes()]
-        for parameter in self.params:
-            words = getattr(parameter, "help", None) or ""
-            words = words.replace(_PROTOCOLS, ", ".join(served))
-            vars(parameter)["help"] = words.replace(_URL_SCHEMES, ", ".join(urls))
-        return super().get_help(ctx)
 
 
 def serve(
     policy: PolicySpec,
     protocol: Annotated[
-        str, typer.Option(help=f"Protocol of the clients: one of {_PROTOCOLS}.")
+        str,
+        typer.Option(
+            help="Protocol of the clients: one of "
+            "{roboirg.policies.remote.protocols:served_protocols}."
+        ),
     ] = "mme-vla",
     host: Annotated[str, typer.Option(help="Address to listen on.")] = LOOPBACK,
     port: Annotated[int, typer.Option(help="Port to listen on; 0 for any free port.")] = 8000,

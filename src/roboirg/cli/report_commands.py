@@ -16,7 +16,6 @@ from roboirg.core.errors import InvalidValueError, known_name
 if TYPE_CHECKING:
     from roboirg.analysis.measures.breakdowns import Breakdown
     from roboirg.analysis.measures.run_data import RunData
-    from roboirg.analysis.results.sources import Source
     from roboirg.analysis.tables.table import Table
 
 # Heavy modules are imported inside the commands, so that --help answers at once.
@@ -118,7 +117,8 @@ def figures(
     which: Annotated[
         str,
         typer.Option(
-            help="gaps, context, failures, several separated by commas, or all that apply."
+            help="{roboirg.analysis.figures:figure_kinds}, several separated by commas, or all "
+            "that apply."
         ),
     ] = _ALL,
     published: Annotated[bool, typer.Option(help="Add the paper's values.")] = False,
@@ -127,7 +127,7 @@ def figures(
 
     Example: roboirg figures runs/first --out figures
     """
-    from roboirg.analysis.figures import FIGURES, write_figures
+    from roboirg.analysis.figures import figure_kinds, write_figures
     from roboirg.analysis.figures.figure_style import check_figure_support
     from roboirg.analysis.measures.run_data import RunData
     from roboirg.analysis.results.reading import read_frame
@@ -136,7 +136,7 @@ def figures(
     check_figure_support()
     if not runs and not published:
         raise InvalidValueError("Figures need a run; give its folder, a pack, or --published.")
-    names = known_names("figure", which, tuple(FIGURES))
+    names = known_names("figure", which, tuple(figure_kinds()))
     with opened_sources(runs or []) as sources:
         content = RunData(read_frame(sources))
     for path in write_figures(content, out, names, published=published):
@@ -149,9 +149,7 @@ def tables(
         str,
         typer.Option(
             help="main, planner, context, real, harder, other, coverage, or all that apply; or of "
-            "runs alone: forms, failures (of all episodes, and in the gap to explicit), "
-            "failure-names, subgoals (of planners), heard (how many prompts were cut), arms (what "
-            "control arms show), facts (what a methods section needs)."
+            "runs alone: {roboirg.analysis.tables.diagnostic_tables:described_tables}."
         ),
     ] = _ALL,
     format: Annotated[  # noqa: A002
@@ -191,8 +189,9 @@ def tables(
     output = get_format(format)
     _check_choice(which, by, runs or [], published=published, floors=floors)
     with paused_collection(), opened_sources(runs or []) as sources:
-        data = RunData(read_frame(sources, words=by is not None))
-        made = _tables(which, by, sources, data, published=published, floors=floors)
+        records = itertools.chain.from_iterable(source.records() for source in sources)
+        data = RunData(read_frame(sources, words=by is not None), records)
+        made = _tables(which, by, data, published=published, floors=floors)
     if output.is_for_programs:
         warn_of_mixtures(data.frame)
     if out is not None:
@@ -267,18 +266,18 @@ def _check_choice(
     Diagnostic tables (such as ``failures``) and those by kind of words (``--by``) show runs alone,
     so they take neither published values nor floors.
     """
-    from roboirg.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
+    from roboirg.analysis.tables.diagnostic_tables import diagnostic_tables
     from roboirg.analysis.tables.paper_tables import WHICH
 
-    known_name("table", which, (*WHICH, *DIAGNOSTIC_TABLES, _ALL))
-    is_diagnostic = which in DIAGNOSTIC_TABLES
+    known_name("table", which, (*WHICH, *diagnostic_tables(), _ALL))
+    is_diagnostic = which in diagnostic_tables()
     is_broken_down = by is not None
     if is_diagnostic or is_broken_down:
         names_both = is_broken_down and which != _ALL  # --by and a table
         if names_both or published or floors:
             raise InvalidValueError(
-                f"--by, and --which {', '.join(DIAGNOSTIC_TABLES)}, show runs alone; each excludes "
-                "the other, --published and --floors."
+                f"--by, and --which {', '.join(diagnostic_tables())}, show runs alone; each "
+                "excludes the other, --published and --floors."
             )
     if not runs and not published and which != _COVERAGE:
         raise InvalidValueError("Tables need a run; give its folder, a pack, or --published.")
@@ -287,7 +286,6 @@ def _check_choice(
 def _tables(
     which: str,
     by: str | None,
-    sources: Sequence[Source],
     data: RunData,
     *,
     published: bool,
@@ -297,14 +295,13 @@ def _tables(
 
     ``--by`` chooses tables by kind of words, a diagnostic name one table, all else the paper's.
     """
-    from roboirg.analysis.tables.diagnostic_tables import DIAGNOSTIC_TABLES
+    from roboirg.analysis.tables.diagnostic_tables import diagnostic_tables
     from roboirg.analysis.tables.table_notes import with_mixtures
 
     if by is not None:
         made = _breakdown_tables(data, by)
-    elif which in DIAGNOSTIC_TABLES:
-        records = itertools.chain.from_iterable(source.records() for source in sources)
-        made = [DIAGNOSTIC_TABLES[which](data, records)]
+    elif which in diagnostic_tables():
+        made = [diagnostic_tables()[which].make(data)]
     else:
         made = _paper_tables(which, data, published=published, floors=floors)
     return with_mixtures(made, data.frame)

@@ -9,14 +9,13 @@ only on request: by name or by suite.
 from __future__ import annotations
 
 import functools
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from roboirg.core.episode import BENCHMARK_SUITES, SUITES, Episode, Goal
 from roboirg.core.errors import InvalidValueError, UnknownNameError
 from roboirg.tasks.task import Task
-from roboirg.util.discovery import discover, discover_in_modules
+from roboirg.util.discovery import discover_in_modules, with_entries
 
 __all__ = [
     "Task",
@@ -95,11 +94,10 @@ def with_goal(episode: Episode, goal: Goal) -> Episode:
 @functools.cache
 def _registry() -> tuple[Task, ...]:
     """Return our tasks and those of installed packages, which must not enter our suites."""
-    package = sys.modules[__name__]
-    ours = {task.name for task in discover_in_modules(package, "TASK", Task)}
-    tasks = discover(package, "TASK", Task, ENTRY_POINTS)
+    ours = discover_in_modules(__name__, "TASK", Task)
+    tasks = with_entries(ours, "TASK", Task, ENTRY_POINTS).values()
     for task in tasks:
-        if task.name not in ours and task.suite in SUITES:
+        if task not in ours and task.suite in SUITES:
             raise InvalidValueError(
                 f"The task {task.name} of another package is in the suite {task.suite!r}, which "
                 "only this package may fill; give it a suite of its own, such as "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.metadata
 import pkgutil
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from types import ModuleType
 from typing import Any, Protocol, TypeVar
 
@@ -24,11 +24,11 @@ class Named(Protocol):
 Thing = TypeVar("Thing", bound=Named)
 
 
-def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str) -> list[Thing]:
-    """Return what the modules of a package and the installed entry points define.
+def discover(package: str, attribute: str, kind: type[Thing], group: str) -> dict[str, Thing]:
+    """Return what the modules of a package and the installed entry points define, by name.
 
     Args:
-        package: ours; a module in it that has `attribute` defines one.
+        package: name of ours; a module in it that has `attribute` defines one.
         attribute: for example ``"TASK"``.
         kind: the class that every one must be an instance of.
         group: of the entry points through which other packages add theirs, for example
@@ -38,8 +38,15 @@ def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str)
         Ours in the order of the modules' names, then those of other packages in the order of the
         entry points' names.
     """
-    things = discover_in_modules(package, attribute, kind)
-    owners = {thing.name: "roboirg" for thing in things}
+    return with_entries(discover_in_modules(package, attribute, kind), attribute, kind, group)
+
+
+def with_entries(
+    ours: Iterable[Thing], attribute: str, kind: type[Thing], group: str
+) -> dict[str, Thing]:
+    """Return ours and what the installed entry points define, by name; see `discover`."""
+    things = {thing.name: thing for thing in ours}
+    owners = dict.fromkeys(things, "roboirg")
     for entry in entry_points_of(group):
         thing = _thing(entry, attribute, kind)
         if thing.name in owners:
@@ -48,7 +55,7 @@ def discover(package: ModuleType, attribute: str, kind: type[Thing], group: str)
                 f"{owners[thing.name]} has; choose another one."
             )
         owners[thing.name] = _distribution(entry)
-        things.append(thing)
+        things[thing.name] = thing
     return things
 
 
@@ -76,11 +83,11 @@ def find_entry(name: str, attribute: str, kind: type[Thing], group: str) -> Thin
     return None
 
 
-def discover_in_modules(package: ModuleType, attribute: str, kind: type[Thing]) -> list[Thing]:
+def discover_in_modules(package: str, attribute: str, kind: type[Thing]) -> list[Thing]:
     """Return what the modules of a package define, in the order of their names."""
     things = []
-    for info in pkgutil.iter_modules(package.__path__):
-        module = importlib.import_module(f"{package.__name__}.{info.name}")
+    for info in pkgutil.iter_modules(importlib.import_module(package).__path__):
+        module = importlib.import_module(f"{package}.{info.name}")
         thing = getattr(module, attribute, None)
         if isinstance(thing, kind):
             things.append(thing)

@@ -2,38 +2,59 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from roboirg.analysis.figures.failures import draw_failures
 from roboirg.analysis.figures.figure_style import STYLE, check_figure_support, save
 from roboirg.analysis.figures.gaps import draw_next_to_reference
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.core.errors import InvalidValueError, check_names
+from roboirg.util.discovery import with_entries
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FIGURES: Mapping[str, Callable[[RunData, bool], Figure | None]] = {
-    "gaps": partial(draw_next_to_reference, "main"),
-    "context": partial(draw_next_to_reference, "context"),
+
+class FigureKind(NamedTuple):
+    """A figure of runs.
+
+    Attributes:
+        name: as in the command line.
+        draw: returns the figure, None without data; it is called with the data of the runs, and
+            with whether the paper's values are wanted, too.
+    """
+
+    name: str
+    draw: Callable[[RunData, bool], Figure | None]
+
+
+_OURS = (
+    FigureKind("gaps", partial(draw_next_to_reference, "main")),
+    FigureKind("context", partial(draw_next_to_reference, "context")),
     # The paper has no causes of failures.
-    "failures": lambda content, _published: draw_failures(content),
-}
-"""By name: what draws a figure of runs, and of the paper's values if wanted; None without data."""
+    FigureKind("failures", lambda content, _published: draw_failures(content)),
+)
+
+
+@functools.cache
+def figure_kinds() -> Mapping[str, FigureKind]:
+    """Return ours and those of installed packages, by name."""
+    return with_entries(_OURS, "FIGURE", FigureKind, "roboirg.figures")
 
 
 def write_figures(
-    content: RunData, folder: Path, which: Sequence[str] = (*FIGURES,), *, published: bool = False
+    content: RunData, folder: Path, which: Sequence[str], *, published: bool = False
 ) -> tuple[Path, ...]:
     """Draw figures as PNG, SVG and PDF, and as PNG and SVG for dark pages.
 
     Args:
         content: of the runs.
         folder: created if missing.
-        which: names out of `FIGURES`; figures without data are left out.
+        which: names of figures; those without data are left out.
         published: whether to add the paper's values, in gray.
 
     Returns:
@@ -41,7 +62,7 @@ def write_figures(
     """
     paths: list[Path] = []
     for name in which:
-        paths += save(partial(FIGURES[name], content.told, published), folder, name)
+        paths += save(partial(figure_kinds()[name].draw, content.told, published), folder, name)
     if not paths:
         whose = "The runs have" if content.cells else "The paper's tables have"
         raise InvalidValueError(
@@ -52,15 +73,15 @@ def write_figures(
 
 
 def draw_figure(name: str, content: RunData, *, published: bool = False) -> Figure | None:
-    """Draw one of `FIGURES`; return None without data.
+    """Draw a figure; return None without data.
 
     Raises:
         UnknownNameError: there is no such figure.
     """
-    check_names("figure", [name], FIGURES)
+    check_names("figure", [name], figure_kinds())
     check_figure_support()
     import matplotlib as mpl
 
     # The keys of its own type are those of one version.
     with mpl.rc_context(cast("Any", STYLE)):
-        return FIGURES[name](content.told, published)
+        return figure_kinds()[name].draw(content.told, published)

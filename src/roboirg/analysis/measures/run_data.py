@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,13 +10,21 @@ from roboirg.analysis.measures.measure import Summaries, summarize
 from roboirg.analysis.results.frame import Frame
 from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.analysis.results.run_cells import Cells, cells_of
+from roboirg.records.record import Record
 
 
 @dataclass(frozen=True)
 class RunData:
-    """The results of some runs; what is measured of them is measured when it is asked for."""
+    """The results of some runs; what is measured of them is measured when it is asked for.
+
+    Attributes:
+        frame: the results.
+        records: all whole records of the runs, for those who need more than results; they are read
+            from the disk when they are asked for, once.
+    """
 
     frame: Frame
+    records: Iterable[Record] = ()
 
     @cached_property
     def cells(self) -> Cells:
@@ -30,7 +39,7 @@ class RunData:
     def told(self) -> RunData:
         """The data without control arms, if there is any."""
         frame = self.frame.told()
-        return self if frame is self.frame else RunData(frame)
+        return self if frame is self.frame else RunData(frame, self.records)
 
     def name(self, policy_run: PolicyRun) -> str:
         """Return the label of a policy run, marked if some planned trial has no verdict."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from roboirg.analysis.results.frame import Frame, FrameColumn, as_column, make_frame
+from roboirg.analysis.results.frame import COLUMNS, Frame, FrameColumn, as_column, make_frame
 from roboirg.analysis.results.sources import Source
 from roboirg.language.instruction import command_expressions
 from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import identity_key
+from roboirg.util.discovery import with_entries
 from roboirg.util.freed_memory import paused_collection
 
 SINGLED = "one of two"
@@ -31,65 +33,69 @@ def _rival(record: Record) -> str | None:
     return f"{SINGLED}: {reference}"
 
 
-WORD_COLUMNS: Mapping[str, FrameColumn] = {
-    column.name: column
-    for column in (
-        FrameColumn(
-            "pattern",
-            "text",
-            "main reasoning pattern",
-            "no reasoning",
-            lambda record: record.metadata.get("pattern"),
-        ),
-        FrameColumn(
-            "expression",
-            "texts",
-            "classes of the command's referring expressions",
-            "",
-            _expressions,
-        ),
-        FrameColumn(
-            "slots",
-            "number",
-            "values of the goal that the command leaves to its context",
-            "none",
-            lambda record: record.metadata.get("hidden_slots") or None,
-        ),
-        FrameColumn(
-            "rival",
-            "text",
-            "how the words single out one of two values",
-            "no rival",
-            _rival,
-        ),
-        FrameColumn(
-            "landmark",
-            "texts",
-            "landmarks in the words",
-            "",
-            lambda record: tuple(record.metadata.get("landmarks", ())),
-        ),
-        FrameColumn(
-            "words",
-            "number",
-            "words of all utterances",
-            "",
-            lambda record: sum(len(turn.text.split()) for turn in record.instruction),
-        ),
-        FrameColumn(
-            "command",
-            "text",
-            "the same task in explicit words",
-            "",
-            lambda record: record.command,
-        ),
-    )
-}
+_OURS = (
+    FrameColumn(
+        "pattern",
+        "text",
+        "main reasoning pattern",
+        "no reasoning",
+        lambda record: record.metadata.get("pattern"),
+    ),
+    FrameColumn(
+        "expression",
+        "texts",
+        "classes of the command's referring expressions",
+        "",
+        _expressions,
+    ),
+    FrameColumn(
+        "slots",
+        "number",
+        "values of the goal that the command leaves to its context",
+        "none",
+        lambda record: record.metadata.get("hidden_slots") or None,
+    ),
+    FrameColumn(
+        "rival",
+        "text",
+        "how the words single out one of two values",
+        "no rival",
+        _rival,
+    ),
+    FrameColumn(
+        "landmark",
+        "texts",
+        "landmarks in the words",
+        "",
+        lambda record: tuple(record.metadata.get("landmarks", ())),
+    ),
+    FrameColumn(
+        "words",
+        "number",
+        "words of all utterances",
+        "",
+        lambda record: sum(len(turn.text.split()) for turn in record.instruction),
+    ),
+    FrameColumn(
+        "command",
+        "text",
+        "the same task in explicit words",
+        "",
+        lambda record: record.command,
+    ),
+)
+
+
+@functools.cache
+def record_columns() -> Mapping[str, FrameColumn]:
+    """Return the columns that are read from whole records, those of installed packages, too."""
+    found = with_entries((*COLUMNS.values(), *_OURS), "COLUMN", FrameColumn, "roboirg.columns")
+    return {name: column for name, column in found.items() if name not in COLUMNS}
 
 
 @paused_collection()
 def read_frame(sources: Sequence[Source], *, words: bool = False) -> Frame:
-    """Return the results of runs and what is missing in them, with `WORD_COLUMNS` if wanted."""
+    """Return the results of runs and what is missing in them, with `record_columns` if wanted."""
     runs = [(str(source.path), source.results) for source in sources]
     planned: list[Job] = []
     for source in sources:
@@ -102,8 +108,8 @@ def read_frame(sources: Sequence[Source], *, words: bool = False) -> Frame:
 
 
 def with_words(frame: Frame, records: Iterable[Record]) -> Frame:
-    """Return a frame with `WORD_COLUMNS`; see `with_columns`."""
-    reads = {name: column.read for name, column in WORD_COLUMNS.items()}
+    """Return a frame with `record_columns`; see `with_columns`."""
+    reads = {name: column.read for name, column in record_columns().items()}
     return with_columns(frame, records, reads)
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from roboirg.analysis.measures.breakdowns import Breakdown, break_down
 from roboirg.analysis.measures.comparison_text import incomplete_note
@@ -53,7 +54,6 @@ from roboirg.analysis.tables.table import (
 from roboirg.core import failures
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.records.record import Record
 from roboirg.stats.cells import NOTHING, Key, rows_of
 from roboirg.stats.rates import (
     NOT_APPLICABLE,
@@ -61,6 +61,7 @@ from roboirg.stats.rates import (
     percent,
     percent_range,
 )
+from roboirg.util.discovery import with_entries
 
 UNATTRIBUTED = "not attributed"
 FAILURES: Mapping[str, str] = {
@@ -430,13 +431,41 @@ def _rate(measured: Measured[Any]) -> Entry:
     return Entry(percent=percent(measured.rate), counts=measured.counts, interval=measured.interval)
 
 
-DIAGNOSTIC_TABLES: Mapping[str, Callable[[RunData, Iterable[Record]], Table]] = {
-    "forms": lambda data, _records: make_forms_table(data),
-    "failures": lambda data, _records: make_failure_table(data),
-    "failure-names": lambda data, _records: make_failure_name_table(data),
-    "heard": lambda data, _records: make_heard_table(data),
-    "arms": lambda data, _records: make_arm_table(data),
-    "subgoals": make_subgoal_table,
-    "facts": make_facts_table,
-}
-"""By name, as in the command line; the last two read whole records, too."""
+class RunTable(NamedTuple):
+    """A table of runs alone, without values of the paper.
+
+    Attributes:
+        name: as in the command line.
+        make: returns the table of the runs' data.
+        about: what the help has behind the name, such as `` (of planners)``.
+    """
+
+    name: str
+    make: Callable[[RunData], Table]
+    about: str = ""
+
+
+_OURS = (
+    RunTable("forms", make_forms_table),
+    RunTable(
+        "failures",
+        make_failure_table,
+        " (of all episodes, and in the gap to explicit)",
+    ),
+    RunTable("failure-names", make_failure_name_table),
+    RunTable("heard", make_heard_table, " (how many prompts were cut)"),
+    RunTable("arms", make_arm_table, " (what control arms show)"),
+    RunTable("subgoals", make_subgoal_table, " (of planners)"),
+    RunTable("facts", make_facts_table, " (what a methods section needs)"),
+)
+
+
+@functools.cache
+def diagnostic_tables() -> Mapping[str, RunTable]:
+    """Return ours and those of installed packages, by name."""
+    return with_entries(_OURS, "TABLE", RunTable, "roboirg.tables")
+
+
+def described_tables() -> list[str]:
+    """Return the names with what the tables show, for the help."""
+    return [table.name + table.about for table in diagnostic_tables().values()]

@@ -69,7 +69,7 @@ _DECLARED = (
 """Keys of a policy's ``metadata``; the last four are also reported by its own process."""
 
 
-def make_facts_table(data: RunData, records: Iterable[Record]) -> Table:
+def make_facts_table(data: RunData) -> Table:
     """Make the table from the whole records of the runs of `data`."""
     results = data.frame.played
     words: defaultdict[_FactKey, dict[str, None]] = defaultdict(dict)
@@ -77,7 +77,7 @@ def make_facts_table(data: RunData, records: Iterable[Record]) -> Table:
         for value in values:
             words[_FactKey(RUN, name)] |= dict.fromkeys(_words(value))
     totals: defaultdict[str, Counter[str]] = defaultdict(Counter)
-    for record in _last_played(records, results):
+    for record in _last_played(data.records, results):
         for name, value in _of_policy(record):
             words[_FactKey(record.policy, name)] |= dict.fromkeys(_words(value))
         total = totals[record.policy]

@@ -53,13 +53,13 @@ _READ: Mapping[str, Callable[[Record], object]] = {
 """What the table reads of whole records."""
 
 
-def make_subgoal_table(data: RunData, records: Iterable[Record]) -> Table:
+def make_subgoal_table(data: RunData) -> Table:
     """Make the table from the whole records of the runs of `data`.
 
     Raises:
         InvalidValueError: no record holds a subgoal, or the failure of a planner.
     """
-    counts_by_cell = _count_in_cells(data, records)
+    counts_by_cell = _count_in_cells(data)
     if not counts_by_cell:
         raise InvalidValueError("No planner of the runs named a subgoal; their records hold none.")
     occurring: set[str] = set()
@@ -98,13 +98,13 @@ def _columns(failures: Iterable[str], costs: Iterable[str]) -> list[Column]:
     return columns
 
 
-def _count_in_cells(data: RunData, records: Iterable[Record]) -> dict[CellKey, Counter[str]]:
+def _count_in_cells(data: RunData) -> dict[CellKey, Counter[str]]:
     """Count what the table shows, in each cell in which a planner has a subgoal or a failure.
 
     A count is the number of ``episodes``, that of subgoals with a verdict or of failures, by name,
     or the sum of a cost: ``{"episodes": 10, "right": 31, "wrong_place": 2, "calls": 40, …}``.
     """
-    frame = with_columns(data.frame, records, _READ)
+    frame = with_columns(data.frame, data.records, _READ)
     counts_by_cell: defaultdict[CellKey, Counter[str]] = defaultdict(Counter)
     names = ("run", "task", "options", *_READ)
     for run, task, options, verdicts, failure, usage in rows_of(frame, *names):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from roboirg.cli.export_commands import export_app
+from roboirg.cli.listed_names import ListingCommand
 from roboirg.cli.options import (
     PlanName,
     PlanWords,
@@ -42,7 +43,8 @@ def export_demonstrations(
     context: typer.Context,
     out: Annotated[Path, typer.Option(help="Folder of the dataset.")],
     format: Annotated[  # noqa: A002
-        str, typer.Option(help="lerobot-v3, lerobot-v2.1 or robomme-hdf5.")
+        str,
+        typer.Option(help="One of {roboirg.apps.demonstrations.export_format:export_formats}."),
     ] = "lerobot-v3",
     split: Split = "train",
     tasks: Tasks = "all",
@@ -70,16 +72,17 @@ def export_demonstrations(
 
     Example: roboirg export demonstrations --tasks PickXtimes --out data
     """
+    from roboirg.apps.demonstrations.export_format import find_format
     from roboirg.apps.demonstrations.export_plan import ExportPlan, training_words
     from roboirg.policies import find_policy
     from roboirg.runs.plan.option_parsing import parse_episodes
 
     add_working_directory(last=True)
     words = PlanWords(context, plan, "demonstrations", OWN_OPTIONS)
-    chosen = {"video": format == "robomme-hdf5", **words.choices(ExportPlan)}
+    chosen = {"video": find_format(format).begins_with_video, **words.choices(ExportPlan)}
     find_policy(chosen.get("policy", ExportPlan.policy))
     split = words.given("split", split)
-    # `validated` checks the names that are cast.
+    # `validated` checks what is cast.
     names = words.tasks(tasks)
     export_plan = ExportPlan(
         tasks=names,
@@ -88,7 +91,7 @@ def export_demonstrations(
         settings=words.settings(settings),
         forms=words.forms(),
         options=training_words(split, words.options()),
-        format=cast("Any", format),
+        format=format,
         pictures=cast("Any", pictures),
         **chosen,
     ).validated()
@@ -172,5 +175,5 @@ def _difference_text(result: ReplayResult) -> str:
 
 
 def add_commands(app: typer.Typer) -> None:
-    export_app.command("demonstrations")(export_demonstrations)
+    export_app.command("demonstrations", cls=ListingCommand)(export_demonstrations)
     app.command()(replay)

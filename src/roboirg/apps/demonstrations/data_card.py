@@ -9,7 +9,6 @@ from pathlib import Path
 
 from roboirg.apps.demonstrations.dataset_part import DatasetPart
 from roboirg.apps.demonstrations.export_plan import ExportPlan
-from roboirg.apps.demonstrations.formats.training_lines import training_text
 from roboirg.apps.demonstrations.picture_coding import LOSSY_QUALITY
 from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, load_facts
 from roboirg.core.episode import ENVIRONMENT_VERSION
@@ -41,14 +40,14 @@ def card_text(
     """
     lines = ["---", "license: apache-2.0", "task_categories: [robotics]"]
     lines.append("tags: [LeRobot, RoboIRGBench]")
-    if plan.format != "robomme-hdf5":
+    if plan.file_format.has_frame_tables:
         # Without them, Hugging Face takes the tables of facts for frames.
         lines.append("configs: [{config_name: default, data_files: data/*/*.parquet}]")
     lines += ["---", "", "# Demonstrations of RoboIRGBench", "", _head_line(plan), ""]
     lines += _count_lines(_counts(parts))
     lines += ["", *_words_lines(plan, facts)]
     lines += ["", "## Content", "", *_content_lines(plan)]
-    lines += ["", "## Training", "", training_text(plan, root)]
+    lines += ["", "## Training", "", plan.file_format.training_text(plan, root.resolve())]
     return "\n".join(lines) + "\n"
 
 

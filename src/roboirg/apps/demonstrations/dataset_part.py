@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
-from roboirg.apps.demonstrations.export_plan import ORACLE, ExportPlan, TaskText
+from roboirg.apps.demonstrations.export_plan import ORACLE, TaskText
 from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
 from roboirg.apps.demonstrations.trajectory import (
     Trajectory,
@@ -60,24 +60,6 @@ class DatasetPart:
     def place(self) -> FilePlace:
         """Numbers of the folder and of the file in it."""
         return FilePlace(*divmod(self.number, CHUNK_SIZE))
-
-
-class DatasetWriter(Protocol):
-    """Writes one format; a module for each is one."""
-
-    def make_parts(
-        self,
-        plan: ExportPlan,
-        root: Path,
-        recorded: Sequence[RecordedTexts],
-    ) -> list[DatasetPart]:
-        """Return the parts of the dataset in order."""
-
-    def write_part(self, part: DatasetPart) -> None:
-        """Write the frames of a part; runs in a worker process."""
-
-    def finish(self, root: Path, parts: Sequence[DatasetPart]) -> None:
-        """Write what describes all parts; its last file makes the dataset readable."""
 
 
 class RecordedTexts(NamedTuple):

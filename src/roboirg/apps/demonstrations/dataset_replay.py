@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from roboirg.apps.demonstrations.dataset_reading import ReplayableTrajectory, read_dataset
+from roboirg.apps.demonstrations.dataset_reading import read_dataset
+from roboirg.apps.demonstrations.replayable_trajectory import ReplayableTrajectory
 from roboirg.core.episode import SPLITS, Episode
 from roboirg.core.errors import InvalidValueError
 from roboirg.envs.factory import make
@@ -61,7 +62,7 @@ def replay_dataset(path: Path, workers: int) -> Iterator[ReplayResult]:
         InvalidValueError: the path holds no dataset, or one of episodes that do not exist here.
         MissingDependencyError: a package is not installed.
     """
-    for _, result in parallel_map(replay, list(read_dataset(path)), workers):
+    for _, result in parallel_map(replay, read_dataset(path), workers):
         yield result
 
 

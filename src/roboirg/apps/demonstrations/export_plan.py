@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, get_args
 
+from roboirg.apps.demonstrations.export_format import ExportFormat, find_format, names_where
 from roboirg.apps.demonstrations.picture_coding import PictureCoding
 from roboirg.apps.demonstrations.trajectory import SUFFIX, TRAJECTORY_VERSION
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
@@ -27,7 +28,6 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.media import PICTURE_SIZE
 from roboirg.util.short_hash import short_hash
 
-FormatName = Literal["lerobot-v3", "lerobot-v2.1", "robomme-hdf5"]
 Outcomes = Literal["successes", "all"]
 
 ORACLE = "oracle"
@@ -64,7 +64,7 @@ class ExportPlan:
     settings: tuple[str, ...]
     forms: tuple[str, ...] = ("implicit",)
     options: InstructionOptions = InstructionOptions()  # noqa: RUF009 - immutable
-    format: FormatName = "lerobot-v3"
+    format: str = "lerobot-v3"
     pictures: PictureCoding = "png"
     cameras: tuple[str, ...] = CAMERAS
     size: int = PICTURE_SIZE
@@ -82,7 +82,7 @@ class ExportPlan:
             UnknownNameError: a name does not exist.
             InvalidValueError: a value or a combination is not possible.
         """
-        known_name("format", self.format, get_args(FormatName))
+        find_format(self.format)
         known_name("way to store pictures", self.pictures, get_args(PictureCoding))
         check_whole("variations", self.variations)
         if self.variations > 1 and not self.disturbed:
@@ -95,16 +95,18 @@ class ExportPlan:
         return self
 
     def _check_disturbed(self) -> None:
-        if self.disturbed and (self.policy != ORACLE or self.format == "robomme-hdf5"):
+        if self.disturbed and (self.policy != ORACLE or not self.file_format.has_labels):
+            unlabeled = names_where(lambda known: not known.has_labels)
             raise InvalidValueError(
                 f"disturbed is true, the policy {self.policy!r} and the format {self.format!r}: "
-                "only the oracle is disturbed, and a time step of 'robomme-hdf5' is the result of "
-                "its action, so it has no place for one that was not executed."
+                f"only the oracle is disturbed, and a time step of {unlabeled} is the "
+                "result of its action, so it has no place for one that was not executed."
             )
-        if self.actions == "waypoint" and (self.format != "lerobot-v3" or self.video):
+        if self.actions == "waypoint" and (self.video or not self.file_format.has_waypoints):
+            able = names_where(lambda known: known.has_waypoints)
             raise InvalidValueError(
-                "actions is 'waypoint': such frames have the format 'lerobot-v3', and none is of "
-                "the video."
+                f"actions is 'waypoint': such frames have the format {able}, and "
+                "none is of the video."
             )
 
     def _check_pictures(self) -> None:
@@ -116,20 +118,25 @@ class ExportPlan:
                 f"size is {self.size}; it must be an even number from {SMALLEST} to {PICTURE_SIZE}."
             )
         is_whole = set(self.cameras) == set(CAMERAS) and self.size == PICTURE_SIZE
-        if not is_whole and (self.format == "robomme-hdf5" or self.is_for_openpi):
+        if not is_whole and (self.file_format.has_depth or self.is_for_openpi):
             raise InvalidValueError(
                 f"cameras is {', '.join(self.cameras)} and size {self.size}; RoboMME's format and "
                 f"openpi have both cameras in {PICTURE_SIZE} pixels."
             )
-        if self.format == "robomme-hdf5" and self.pictures != "png":
+        if self.file_format.has_depth and self.pictures != "png":
             raise InvalidValueError(
-                f"The format 'robomme-hdf5' holds lossless pictures; it has no {self.pictures!r}."
+                f"The format {self.format!r} holds lossless pictures; it has no {self.pictures!r}."
             )
+
+    @property
+    def file_format(self) -> ExportFormat:
+        """The format: what it can carry, and its functions."""
+        return find_format(self.format)
 
     @property
     def is_for_openpi(self) -> bool:
         """Whether the features have openpi's names: it alone reads tables of this format."""
-        return self.format == "lerobot-v2.1" and self.pictures == "png"
+        return self.file_format.is_for_openpi and self.pictures == "png"
 
     @property
     def recording(self) -> RecordingSpec:
@@ -137,7 +144,7 @@ class ExportPlan:
         return RecordingSpec(
             coding=self.pictures,
             video=self.video,
-            depth=self.format == "robomme-hdf5",
+            depth=self.file_format.has_depth,
             cameras=self.cameras,
             size=self.size,
             actions=self.actions,

@@ -19,17 +19,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from roboirg.apps.demonstrations import data_card
-from roboirg.apps.demonstrations.dataset_part import DatasetPart, DatasetWriter, RecordedTexts
+from roboirg.apps.demonstrations.dataset_part import DatasetPart, RecordedTexts
 from roboirg.apps.demonstrations.export_plan import (
     ORACLE,
     ExportPlan,
-    FormatName,
     RecordingJob,
     SpokenJob,
     recording_jobs,
 )
-from roboirg.apps.demonstrations.formats import lerobot_v3, lerobot_v21, robomme_hdf5
-from roboirg.apps.demonstrations.formats.robomme_hdf5 import check_hdf5_support
 from roboirg.apps.demonstrations.trajectory import (
     TrajectoryFacts,
     drop_pictures,
@@ -53,12 +50,6 @@ from roboirg.util.parquet_support import check_parquet_support
 WORK_FOLDER = ".export"
 EXPORT_FILE = "meta/export.json"
 """What was exported, with its fingerprint; written when everything else is complete."""
-
-WRITERS: Mapping[FormatName, DatasetWriter] = {
-    "lerobot-v3": lerobot_v3,
-    "lerobot-v2.1": lerobot_v21,
-    "robomme-hdf5": robomme_hdf5,
-}
 
 Report = Callable[[str, int, int, int], None]
 """Called with the kind of work, how much is done, how much there is, and bytes on the disk."""
@@ -103,8 +94,7 @@ def run_export(
         MissingDependencyError: a package is not installed.
     """
     check_parquet_support("demonstrations")
-    if plan.format == "robomme-hdf5":
-        check_hdf5_support()
+    plan.file_format.check_support()
     jobs = recording_jobs(plan)
     with _opened(plan, out) as work:
         usable = _Usable(
@@ -115,7 +105,7 @@ def run_export(
         recorded = _record_missing(jobs, usable, workers, report)
         facts = [load_facts(spoken.job.path(usable.folder)) for spoken in jobs]
         texts = _wanted(plan, jobs, facts, usable.folder)
-        parts = WRITERS[plan.format].make_parts(plan, out, texts)
+        parts = plan.file_format.make_parts(plan, out, texts)
         keeps_pictures = trajectories is not None
         _write_parts(parts, work / "parts", workers, report, keeps_pictures=keeps_pictures)
         _finish(plan, out, parts, facts)
@@ -287,7 +277,7 @@ def _mark(folder: Path, part: DatasetPart) -> Path:
 
 
 def _write_part(part: DatasetPart) -> None:
-    WRITERS[part.columns.plan.format].write_part(part)
+    part.columns.plan.file_format.write_part(part)
 
 
 def _finish(
@@ -295,7 +285,7 @@ def _finish(
 ) -> None:
     """Write what describes the dataset."""
     write_atomically(out / "README.md", data_card.card_text(plan, parts, facts, out))
-    WRITERS[plan.format].finish(out, parts)
+    plan.file_format.finish(out, parts)
     content = {"fingerprint": plan.fingerprint(), "roboirg": __version__, "format": plan.format}
     write_atomically(out / EXPORT_FILE, json.dumps(content, indent=2) + "\n")
 

@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
+from roboirg.cli.listed_names import ListingCommand
 from roboirg.cli.options import add_working_directory
-from roboirg.cli.policy_commands import PolicySpec, ProtocolHelpCommand
+from roboirg.cli.policy_commands import PolicySpec
 from roboirg.cli.run_commands import USAGE_ERROR
 
 
@@ -36,4 +37,4 @@ def check_policy(
 
 
 def add_commands(app: typer.Typer) -> None:
-    app.command("check-policy", cls=ProtocolHelpCommand)(check_policy)
+    app.command("check-policy", cls=ListingCommand)(check_policy)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import sys
 from collections.abc import Iterable, Mapping
 
 from roboirg.core.errors import InvalidValueError, check_names
@@ -39,8 +38,8 @@ longer be compared. A new setting may refuse some of these episodes instead.
 @functools.cache
 def all_settings() -> Mapping[str, Setting]:
     """Return every setting by name, explicit first."""
-    found = discover(sys.modules[__name__], "SETTING", Setting, "roboirg.settings")
-    in_order = sorted(found, key=lambda setting: (setting.order, setting.name))
+    found = discover(__name__, "SETTING", Setting, "roboirg.settings")
+    in_order = sorted(found.values(), key=lambda setting: (setting.order, setting.name))
     return {setting.name: setting for setting in in_order}
 
 

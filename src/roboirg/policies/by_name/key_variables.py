@@ -61,7 +61,7 @@ def key_variables(ref: PolicyRef) -> set[str]:
     """
     options = dict(ref.options)
     names = {options.get("api_key_env"), _HUB_KEYS.get(ref.kind)}
-    with contextlib.suppress(InvalidValueError):  # then it cannot be made, either
+    with contextlib.suppress(InvalidValueError, KeyError):  # then it cannot be made, either
         system = system_of(ref.kind, ref.target, options)
         if system is not None:
             names |= key_variables(split_spec(system.policy, system.policy))

@@ -41,6 +41,11 @@ def url_classes() -> Mapping[str, type[Any]]:
     return {**clients, **CHECKPOINTS}
 
 
+def url_forms() -> list[str]:
+    """Return the forms of URLs, such as ``openpi://…``, for help and error messages."""
+    return [f"{scheme}://…" for scheme in url_classes()]
+
+
 def find_class(spec: str, methods: tuple[str, ...] = ("reset", "act")) -> type[Any]:
     """Return the class of a built-in name, ``package.module:Class``, or a URL.
 
@@ -75,7 +80,7 @@ def find_class(spec: str, methods: tuple[str, ...] = ("reset", "act")) -> type[A
 def _known_specs() -> list[str]:
     """Return the specs that exist, such as ``oracle`` and ``openpi://…``, for an error message."""
     specs = [*BUILTIN, "package.module:Class"]
-    specs += [f"{scheme}://…" for scheme in url_classes()]
+    specs += url_forms()
     specs += ["system:NAME", "planner:KIND", "vlm-listener:PROVIDER"]
     specs += [f"{kind}:…" for kind in entry_names(KINDS_GROUP)]
     return specs

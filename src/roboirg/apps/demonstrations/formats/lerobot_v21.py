@@ -16,8 +16,9 @@ from roboirg.apps.demonstrations.dataset_part import (
     episode_row,
     read_episodes,
 )
-from roboirg.apps.demonstrations.formats.lerobot_v3 import (
-    INFO,
+from roboirg.apps.demonstrations.export_format import ExportFormat
+from roboirg.apps.demonstrations.export_plan import ExportPlan
+from roboirg.apps.demonstrations.formats.lerobot import (
     StatsCollector,
     common_info,
     frame_columns,
@@ -26,16 +27,83 @@ from roboirg.apps.demonstrations.formats.lerobot_v3 import (
     write_json,
     write_videos,
 )
-from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
+from roboirg.apps.demonstrations.formats.lerobot_tables import INFO, read_tables
+from roboirg.apps.demonstrations.frame_columns import FrameColumns
 from roboirg.apps.demonstrations.parquet_tables import write_frames, write_rows
-from roboirg.apps.demonstrations.trajectory import Trajectory, load_trajectory
+from roboirg.apps.demonstrations.trajectory import load_trajectory
 from roboirg.util.atomic_write import write_atomically
-
-__all__ = ["finish", "make_parts", "write_part"]
 
 _DATA = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
 _VIDEO = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"
 _ARM_JOINTS = 7
+_OPENPI = """\
+openpi reads this dataset with the LeRobot that it pins. Save the following as
+`roboirg_config.py` next to openpi's `scripts/`, and start training through it:
+
+```python
+import dataclasses
+import pathlib
+import runpy
+import sys
+
+import openpi.models.pi0_config as pi0_config
+import openpi.policies.libero_policy as libero_policy
+import openpi.training.config as configs
+import openpi.training.optimizer as optimizer
+import openpi.training.weight_loaders as weight_loaders
+import openpi.transforms as transforms
+
+
+@dataclasses.dataclass(frozen=True)
+class RoboIRGData(configs.DataConfigFactory):
+    def create(self, assets_dirs: pathlib.Path, model_config):
+        repack = transforms.Group(inputs=[transforms.RepackTransform({{
+            "observation/image": "{front}", "observation/wrist_image": "{wrist}",
+            "observation/state": "{state}", "actions": "{action}", "prompt": "prompt"}})])
+        data = transforms.Group(
+            inputs=[libero_policy.LiberoInputs(model_type=model_config.model_type)],
+            outputs=[FirstEight()])
+        mask = transforms.make_bool_mask(7, -1)
+        data = data.push(inputs=[transforms.DeltaActions(mask)],
+                         outputs=[transforms.AbsoluteActions(mask)])
+        return dataclasses.replace(
+            self.create_base_config(assets_dirs, model_config), repack_transforms=repack,
+            data_transforms=data,
+            model_transforms=configs.ModelTransformFactory()(model_config),
+            action_sequence_keys=("{action}",))
+
+
+@dataclasses.dataclass(frozen=True)
+class FirstEight(transforms.DataTransformFn):
+    def __call__(self, data):
+        return {{"actions": data["actions"][..., :8]}}
+
+
+configs._CONFIGS_DICT["pi05_roboirg"] = configs.TrainConfig(
+    name="pi05_roboirg",
+    model=pi0_config.Pi0Config(pi05=True, action_horizon=20, max_token_len=160),
+    data=RoboIRGData(repo_id="roboirg", base_config=configs.DataConfig(prompt_from_task=True)),
+    weight_loader=weight_loaders.CheckpointWeightLoader(
+        "gs://openpi-assets/checkpoints/pi05_base/params"),
+    num_train_steps=80000, batch_size=64,
+    lr_schedule=optimizer.CosineDecaySchedule(
+        warmup_steps=10000, peak_lr=5e-05, decay_steps=80000,
+        decay_lr=5e-05))
+runpy.run_path(sys.argv.pop(1), run_name="__main__")
+```
+
+```sh
+export HF_LEROBOT_HOME={parent}   # the folder above this one, which must be named `roboirg`
+python roboirg_config.py scripts/compute_norm_stats.py --config-name pi05_roboirg
+python roboirg_config.py scripts/train.py pi05_roboirg --exp-name first
+```
+
+The configuration follows the shape of openpi's own; it has not been run here, because openpi needs
+a GPU and packages from git. """
+_GROOT = """\
+GR00T reads `meta/modality.json`; it needs videos, so export with `--pictures lossless-video` or
+`lossy-video`.
+"""
 
 
 def write_part(part: DatasetPart) -> None:
@@ -45,7 +113,8 @@ def write_part(part: DatasetPart) -> None:
     trajectory = load_trajectory(episode.path)
     shared = frame_columns(columns, trajectory)
     for placed in episode.texts:
-        place = _place(placed.episode_index)
+        index = placed.episode_index
+        place = {"episode_chunk": index // CHUNK_SIZE, "episode_index": index}
         if columns.has_videos:
             write_videos(part, partial(_VIDEO.format, **place))
         own = own_columns(placed, trajectory.facts.frames)
@@ -53,53 +122,30 @@ def write_part(part: DatasetPart) -> None:
         write_frames(path, columns.table_features(), shared, [own], is_described=True)
 
 
-def _place(episode_index: int) -> dict[str, int]:
-    return {"episode_chunk": episode_index // CHUNK_SIZE, "episode_index": episode_index}
-
-
 def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     """Write the metadata; ``info.json``, without which nothing reads the dataset, comes last."""
     columns = parts[0].columns
-    lines = _EpisodeLines(columns)
+    collector = StatsCollector(columns)
+    episodes = []
+    stats = []
+    facts = []
     for _, episode, trajectory in read_episodes(parts):
         for placed in episode.texts:
-            lines.add(trajectory, placed)
+            index = placed.episode_index
+            tasks = [placed.words.text]
+            length = trajectory.facts.frames
+            episodes.append({"episode_index": index, "tasks": tasks, "length": length})
+            stats.append({"episode_index": index, "stats": collector.add(trajectory, placed)})
+            facts.append(episode_row(trajectory, placed))
     texts = all_texts(parts)
     task_lines = [{"task_index": index, "task": text} for index, text in enumerate(texts)]
-    write_rows(root / EPISODE_TABLE, lines.facts)
-    _write_lines(root / "meta/episodes.jsonl", lines.episodes)
-    _write_lines(root / "meta/episodes_stats.jsonl", lines.stats)
+    write_rows(root / EPISODE_TABLE, facts)
+    _write_lines(root / "meta/episodes.jsonl", episodes)
+    _write_lines(root / "meta/episodes_stats.jsonl", stats)
     _write_lines(root / "meta/tasks.jsonl", task_lines)
-    write_json(root / "meta/stats.json", lines.collector.result())
+    write_json(root / "meta/stats.json", collector.result())
     write_json(root / "meta/modality.json", modality(columns))
     write_json(root / INFO, _info(parts, texts))
-
-
-class _EpisodeLines:
-    """What the files of metadata say of each episode.
-
-    Attributes:
-        collector: of the statistics of all.
-        episodes: lines of ``episodes.jsonl``.
-        stats: lines of ``episodes_stats.jsonl``.
-        facts: rows of the table of facts.
-    """
-
-    def __init__(self, columns: FrameColumns) -> None:
-        self.collector = StatsCollector(columns)
-        self.episodes: list[dict[str, Any]] = []
-        self.stats: list[dict[str, Any]] = []
-        self.facts: list[dict[str, Any]] = []
-
-    def add(self, trajectory: Trajectory, placed: PlacedText) -> None:
-        """Add an episode: a trajectory with one of its instructions."""
-        index = placed.episode_index
-        texts = [placed.words.text]
-        length = trajectory.facts.frames
-        self.episodes.append({"episode_index": index, "tasks": texts, "length": length})
-        stats = self.collector.add(trajectory, placed)
-        self.stats.append({"episode_index": index, "stats": stats})
-        self.facts.append(episode_row(trajectory, placed))
 
 
 def _info(parts: Sequence[DatasetPart], texts: Sequence[str]) -> dict[str, Any]:
@@ -135,3 +181,21 @@ def _write_lines(path: Path, lines: Iterable[object]) -> None:
     """Write a line of JSON for each object."""
     texts = [json.dumps(line) + "\n" for line in lines]
     write_atomically(path, "".join(texts))
+
+
+def training_text(plan: ExportPlan, root: Path) -> str:
+    """Return how to train openpi, if it can read a dataset, and GR00T, as Markdown."""
+    if not plan.is_for_openpi:
+        return _GROOT
+    return _OPENPI.format(parent=root.parent, **FrameColumns(plan).keys) + _GROOT
+
+
+FORMAT = ExportFormat(
+    name="lerobot-v2.1",
+    is_for_openpi=True,
+    make_parts=make_parts,
+    write_part=write_part,
+    finish=finish,
+    training_text=training_text,
+    read=read_tables,
+)

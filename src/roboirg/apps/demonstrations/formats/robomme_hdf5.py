@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +24,11 @@ from roboirg.apps.demonstrations.dataset_part import (
     place_texts,
     read_episodes,
 )
+from roboirg.apps.demonstrations.export_format import ExportFormat
 from roboirg.apps.demonstrations.export_plan import ExportPlan, TaskText
 from roboirg.apps.demonstrations.frame_columns import FrameColumns, PlacedText
 from roboirg.apps.demonstrations.parquet_tables import write_rows
+from roboirg.apps.demonstrations.replayable_trajectory import ReplayableTrajectory
 from roboirg.apps.demonstrations.trajectory import (
     Trajectory,
     load_trajectory,
@@ -43,6 +45,25 @@ _CLOSED_FINGER = 0.03
 _COMPRESSION = {"compression": "gzip", "compression_opts": 1}
 """Of pictures and depth."""
 _NO_CHOICE = json.dumps({"choice": "", "point": []})
+_FILES = "record_dataset_*.h5"
+"""For example record_dataset_PickXtimes.h5."""
+_JOINTS = 7
+_MME_VLA = """\
+```sh
+python scripts/build_dataset.py --raw_data_path {root}
+uv run scripts/train.py mme_vla_suite --exp-name=perceptual-framesamp-modul \\
+    --dataset-path=data/robomme_preprocessed_data --model.use_history \\
+    --model.history_config=perceptual-framesamp-modul.yaml \\
+    --num-train-steps=80000 --batch-size=64 \\
+    --lr-schedule.peak-lr=5e-05 --lr-schedule.decay-lr=5e-05 \\
+    --lr-schedule.warmup-steps=10000
+```
+
+are MME-VLA's builder, which reads these files as RoboMME's own, and its training.
+`waypoint_action` is all NaN, `choice_action` empty and `available_multi_choices` an empty list:
+nothing here acts in these spaces. Recording ends with the success, so that no time step
+`is_completed`.
+"""
 
 
 def check_hdf5_support() -> None:
@@ -206,3 +227,77 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
     for _, episode, trajectory in read_episodes(parts):
         rows += [episode_row(trajectory, placed) for placed in episode.texts]
     write_rows(root / EPISODE_TABLE, rows)
+
+
+def training_text(_plan: ExportPlan, root: Path) -> str:
+    """Return how to train MME-VLA from a dataset, as Markdown."""
+    return _MME_VLA.format(root=root)
+
+
+def read(path: Path) -> Iterator[ReplayableTrajectory]:
+    """Yield the trajectories of RoboMME's files in a folder, or of one such file."""
+    for file_path in _hdf5_files(path):
+        check_hdf5_support()
+        import h5py
+
+        task = file_path.stem.removeprefix("record_dataset_")
+        with h5py.File(file_path, "r") as file:
+            for name in sorted(file, key=_number):
+                yield _read_hdf5_episode(file[name], task, name)
+
+
+def _hdf5_files(path: Path) -> list[Path]:
+    """Return the HDF5 files that hold time steps, not links to them."""
+    if path.is_file() and path.match(_FILES):
+        return [path]
+    return sorted(path.glob(_FILES)) or sorted((path / SHARED_FOLDER).glob(_FILES))
+
+
+def _read_hdf5_episode(group: Any, task: str, name: str) -> ReplayableTrajectory:  # noqa: ANN401
+    """Return an episode of RoboMME's files, without the time steps of its video."""
+    actions = []
+    states = []
+    final = None
+    names = [name for name in group if name.startswith("timestep_")]
+    for step in sorted(names, key=_number):
+        entry = group[step]
+        action = np.asarray(entry["action/joint_action"][()])
+        has_action = action.dtype.kind == "f"  # else it is a text
+        if entry["info/is_video_demo"][()] or not has_action:
+            continue
+        joints = entry["obs/joint_state"][()]
+        fingers = entry["obs/gripper_state"][()]
+        actions.append(action.astype(np.float64))
+        states.append(np.append(joints, fingers[0]).astype(np.float64))
+        final = np.append(joints, fingers).astype(np.float64)
+    return ReplayableTrajectory(
+        name=f"{task}/{name}",
+        task=task,
+        seed=int(group["setup/seed"][()]),
+        split=None,
+        index=None,
+        actions=np.array(actions).reshape(-1, _JOINTS + 1),
+        states=np.array(states).reshape(-1, _JOINTS + 1),
+        final_state=final,
+        status="success",
+    )
+
+
+def _number(name: str) -> int:
+    """Return the number at the end of a group's name."""
+    return int(name.rpartition("_")[2])
+
+
+FORMAT = ExportFormat(
+    name="robomme-hdf5",
+    begins_with_video=True,
+    has_depth=True,
+    has_frame_tables=False,
+    has_labels=False,
+    check_support=check_hdf5_support,
+    make_parts=make_parts,
+    write_part=write_part,
+    finish=finish,
+    training_text=training_text,
+    read=read,
+)

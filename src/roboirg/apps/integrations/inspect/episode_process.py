@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from roboirg.core.errors import PolicyConnectionError
 from roboirg.core.policy_ref import PRIVILEGED
 from roboirg.policies.vlm.models import ModelOptions, ModelQuery, ModelReply
-from roboirg.policies.vlm.models.openai_compatible import chat_messages
+from roboirg.policies.vlm.models.providers.chat_completions import chat_messages
 from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 from roboirg.records.record import Job
 from roboirg.records.record_codec import encode

@@ -7,7 +7,6 @@ imports a network library before a server is named.
 from __future__ import annotations
 
 import functools
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -15,7 +14,7 @@ from roboirg.policies.remote.remote_policy import RemotePolicy
 from roboirg.policies.remote.service import Service
 from roboirg.util.discovery import discover
 
-__all__ = ["Protocol", "protocols_by_scheme"]
+__all__ = ["Protocol", "protocols_by_scheme", "served_protocols"]
 
 
 @dataclass(frozen=True)
@@ -36,5 +35,10 @@ class Protocol:
 @functools.cache
 def protocols_by_scheme() -> Mapping[str, Protocol]:
     """Return all protocols by name: ours by file, then those of installed packages."""
-    found = discover(sys.modules[__name__], "PROTOCOL", Protocol, "roboirg.protocols")
-    return {protocol.name: protocol for protocol in found}
+    return discover(__name__, "PROTOCOL", Protocol, "roboirg.protocols")
+
+
+def served_protocols() -> list[str]:
+    """Return the names of those that have a service."""
+    protocols = protocols_by_scheme().values()
+    return [protocol.name for protocol in protocols if protocol.service is not None]

@@ -9,9 +9,6 @@ __all__ = ["Model", "ModelOptions", "ModelQuery", "ModelReply", "make_model"]
 
 def make_model(options: ModelOptions) -> Model:
     """Return a connection to a model; nothing is sent before the first query."""
-    from roboirg.policies.vlm.models.google import GoogleModel
-    from roboirg.policies.vlm.models.openai_compatible import OpenAIModel
+    from roboirg.policies.vlm.models.http_model import HttpModel
 
-    if options.provider == "google":
-        return GoogleModel(options)
-    return OpenAIModel(options)
+    return HttpModel(options)

@@ -6,11 +6,10 @@ import json
 import math
 import threading
 import weakref
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from concurrent.futures import Future
 from http import HTTPStatus
-from typing import Any, ClassVar, NamedTuple
+from typing import NamedTuple
 
 from roboirg.core.errors import (
     ModelBusyError,
@@ -22,7 +21,7 @@ from roboirg.core.errors import (
 from roboirg.core.extras import extra_needed
 from roboirg.core.handed_keys import without_keys
 from roboirg.core.waiting import waiting
-from roboirg.policies.vlm.models.model import ModelOptions, ModelQuery, ModelReply, tokens_of
+from roboirg.policies.vlm.models.model import HttpRequest, ModelOptions, ModelQuery, ModelReply
 from roboirg.util.proxies import proxy_of
 
 with extra_needed("Models need httpx", "vlm"):
@@ -39,14 +38,6 @@ MALFORMED = (
 """What reading a reply of the wrong form raises."""
 
 
-class HttpRequest(NamedTuple):
-    """What is posted to a service."""
-
-    url: str
-    headers: Mapping[str, str]
-    body: bytes
-
-
 class _Response(NamedTuple):
     """What a service replied."""
 
@@ -55,48 +46,33 @@ class _Response(NamedTuple):
     content: bytes
 
 
-class HttpModel(ABC):
-    """Posts queries; a subclass writes them as its provider's API wants, and reads the replies.
-
-    Attributes:
-        home: URL of the provider's own service.
+class HttpModel:
+    """Posts queries as the provider's API wants them, and returns its replies.
 
     Raises:
         MissingDependencyError: the environment names a proxy that cannot be used; a run stops.
     """
 
-    home: ClassVar[str]
-
     def __init__(self, options: ModelOptions) -> None:
         self.options = options
-        self.key = options.key()
-        proxy = proxy_of(options.base_url or self.home)
+        self._key = options.key()
+        proxy = proxy_of(options.url)
         self._name = f"Model {options.model!r} at {options.address()}{proxy.words}"
         # The library itself takes a proxy for this machine, too, and does not name it.
         transport = httpx.HTTPTransport(proxy=proxy.url)
         self._client = httpx.Client(transport=transport, timeout=options.timeout_s)
         weakref.finalize(self, self._client.close)  # the connection ends with this object
 
-    @abstractmethod
-    def write(self, query: ModelQuery) -> HttpRequest:
-        """Return the request for a query, with JSON as its body; its schema is to be sent."""
-
-    @abstractmethod
-    def read(self, reply: Any) -> ModelReply:  # noqa: ANN401 - depends on what the server sends
-        """Return a provider's reply as a `ModelReply`; impossible token counts become unknown.
-
-        It may raise any error of a missing or wrong text.
-        """
-
     def answer(self, query: ModelQuery) -> ModelReply:
         """Send a query and return the reply; errors become those that `Model` names."""
         if not self.options.structured:
             query = query._replace(schema=None)
+        service = self.options.service
         # No error is chained: the service's message may hold the key, and tracebacks are recorded.
         try:
-            response = self._post(self.write(query))
+            response = self._post(service.write(query, self.options, self._key))
             if response.status == HTTPStatus.OK:
-                reply = self.read(json.loads(response.content))
+                reply = service.read(json.loads(response.content))
                 return reply._replace(text=without_keys(reply.text))
         except (TimeoutError, httpx.TimeoutException):
             raise PolicyTimeoutError(
@@ -157,24 +133,6 @@ class HttpModel(ABC):
 def _quote(words: object) -> str:
     """Return the beginning of what a service said, without keys."""
     return " ".join(without_keys(str(words)).split())[:MAX_ERROR_LENGTH]
-
-
-def given(**entries: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
-    """Return the entries that are not None."""
-    return {name: value for name, value in entries.items() if value is not None}
-
-
-def reported_count(usage: object, name: str, absent: int | None = None) -> float:
-    """Return a count of tokens from what a service reports; NaN if it is unknown.
-
-    Args:
-        usage: the counts by name, or anything else.
-        name: of the count.
-        absent: the count if there is none of that name.
-    """
-    if not isinstance(usage, dict):
-        return math.nan
-    return tokens_of(usage.get(name, absent))
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:

@@ -1,11 +1,17 @@
-"""The contract of models: options, queries, and replies with their cost."""
+"""The contract of models: providers, options, queries, and replies with their cost.
+
+A file in `providers/` that defines ``PROVIDER`` is a provider. Installed packages add theirs
+through entry points of the group ``roboirg.model_providers``.
+"""
 
 from __future__ import annotations
 
+import functools
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, Protocol
 from urllib.parse import urlsplit
 
@@ -15,13 +21,10 @@ from roboirg.core.errors import MissingDependencyError
 from roboirg.core.handed_keys import remember_key
 from roboirg.policies.contract.option_checking import NOT_COMPARED, Seconds
 from roboirg.policies.vlm.model_content import ChatTurn
+from roboirg.util.discovery import discover
 from roboirg.util.reply_reading import whole_number
 from roboirg.util.short_hash import short_hash
 
-Provider = Literal["openai", "google"]
-
-KEY_VARIABLES: Mapping[Provider, str] = {"openai": "OPENAI_API_KEY", "google": "GOOGLE_API_KEY"}
-"""Environment variables with the keys of the providers' own services, by default."""
 NO_KEY = "none"
 """Sent as the key to a server that needs none."""
 _PRICED_TOKENS = 1_000_000
@@ -30,11 +33,61 @@ MOST_TOKENS = 100_000_000
 """Of one query or reply: ten times the longest context of a model, ten million tokens."""
 
 
+class HttpRequest(NamedTuple):
+    """What is posted to a service."""
+
+    url: str
+    headers: Mapping[str, str]
+    body: bytes
+
+
+class TokenPrices(NamedTuple):
+    """Prices of a model in US dollars per million tokens; None if unknown.
+
+    Attributes:
+        input: of what is sent.
+        output: of what is answered, thoughts included.
+    """
+
+    input: float | None = None
+    output: float | None = None
+
+
+class ModelProvider(NamedTuple):
+    """A provider: its own service, and an API that other services may share.
+
+    Attributes:
+        name: as in options.
+        home: URL of its own service.
+        key_variable: environment variable with the key of its own service, by default.
+        write: returns the request for a query, with JSON as its body; the schema is to be sent.
+            It is called with the options, too, and with the key.
+        read: returns a reply, which was JSON, as a `ModelReply`; impossible token counts become
+            unknown. It may raise any error of a missing or wrong text.
+        prices: of models of its own service, by name.
+    """
+
+    name: str
+    home: str
+    key_variable: str
+    write: Callable[[ModelQuery, ModelOptions, str], HttpRequest]
+    read: Callable[[Any], ModelReply]
+    prices: Mapping[str, TokenPrices] = MappingProxyType({})
+
+
+@functools.cache
+def model_providers() -> Mapping[str, ModelProvider]:
+    """Return every provider by name."""
+    return discover(
+        f"{__package__}.providers", "PROVIDER", ModelProvider, "roboirg.model_providers"
+    )
+
+
 class ModelOptions(BaseModel):
     """A model and the options of its queries.
 
     Attributes:
-        provider: ``openai`` for every endpoint with its API, or ``google``.
+        provider: ``openai`` for every endpoint with its API, ``google``, or a package's.
         model: its name at the provider.
         base_url: of the endpoint; None for the provider's own.
         api_key_env: environment variable with the key. By default it is the provider's usual one
@@ -46,7 +99,8 @@ class ModelOptions(BaseModel):
         requests_per_minute: that the service takes from all processes of a run; None for any.
         temperature: None leaves it to the provider.
         max_output_tokens: None leaves it to the provider.
-        input_price, output_price: US dollars per million tokens; without them no cost is reported.
+        input_price, output_price: US dollars per million tokens. Without either, they are those
+            that the provider declares, or no cost is reported.
         video: send clips as ``mp4`` files, or as pictures (``frames``). Google takes files.
         clip_frames: maximum of pictures per clip, where it is not a file.
         structured: whether to send the JSON schema of the answer.
@@ -55,7 +109,7 @@ class ModelOptions(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    provider: Provider = "openai"
+    provider: str = "openai"
     model: str = Field(min_length=1)
     base_url: str | None = Field(default=None, exclude=NOT_COMPARED)
     api_key_env: str | None = Field(default=None, exclude=NOT_COMPARED)
@@ -71,6 +125,14 @@ class ModelOptions(BaseModel):
     clip_frames: int = Field(default=16, ge=1)
     structured: bool = True
     sampling_fps: float | None = Field(default=None, gt=0)
+
+    @field_validator("provider")
+    @classmethod
+    def _is_known(cls, name: str) -> str:
+        """Refuse a provider that does not exist."""
+        if name not in model_providers():
+            raise ValueError(f"Input should be {' or '.join(map(repr, model_providers()))}")
+        return name
 
     @field_validator("base_url")
     @classmethod
@@ -95,7 +157,25 @@ class ModelOptions(BaseModel):
         """The environment variable with the key; None if none is needed."""
         if self.api_key_env:
             return self.api_key_env
-        return None if self.base_url else KEY_VARIABLES.get(self.provider)
+        return None if self.base_url else self.service.key_variable
+
+    @property
+    def service(self) -> ModelProvider:
+        """The provider: its own service, and how to speak with all that have its API."""
+        return model_providers()[self.provider]
+
+    @property
+    def url(self) -> str:
+        """The address that requests begin with, without a slash at its end."""
+        return (self.base_url or self.service.home).rstrip("/")
+
+    @property
+    def prices(self) -> TokenPrices:
+        """What tokens cost: by the options, or as the provider declares for its own service."""
+        prices = TokenPrices(self.input_price, self.output_price)
+        if self.base_url or prices != TokenPrices():
+            return prices
+        return self.service.prices.get(self.model, prices)
 
     def key(self) -> str:
         """Return the key, or `NO_KEY` if none is needed.
@@ -126,15 +206,16 @@ class ModelOptions(BaseModel):
     @property
     def has_prices(self) -> bool:
         """Whether the cost of replies is known."""
-        return self.input_price is not None or self.output_price is not None
+        return self.prices != TokenPrices()
 
     def cost_usd(self, reply: ModelReply) -> float:
         """Return what a reply costs: 0 without prices, NaN if tokens with a price are unknown."""
         cost = 0.0
-        if self.input_price:
-            cost += reply.input_tokens * self.input_price
-        if self.output_price:
-            cost += reply.output_tokens * self.output_price
+        prices = self.prices
+        if prices.input:
+            cost += reply.input_tokens * prices.input
+        if prices.output:
+            cost += reply.output_tokens * prices.output
         return cost / _PRICED_TOKENS
 
 
@@ -175,6 +256,24 @@ def tokens_of(count: object) -> float:
     if number is None or not 0 <= number <= MOST_TOKENS:
         return math.nan
     return number
+
+
+def given(**entries: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
+    """Return the entries that are not None."""
+    return {name: value for name, value in entries.items() if value is not None}
+
+
+def reported_count(usage: object, name: str, absent: int | None = None) -> float:
+    """Return a count of tokens from what a service reports; NaN if it is unknown.
+
+    Args:
+        usage: the counts by name, or anything else.
+        name: of the count.
+        absent: the count if there is none of that name.
+    """
+    if not isinstance(usage, dict):
+        return math.nan
+    return tokens_of(usage.get(name, absent))
 
 
 class Model(Protocol):

@@ -1,0 +1,69 @@
+"""Read the states and actions of a dataset in either version of LeRobot's format."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from roboirg.apps.demonstrations.dataset_part import EPISODE_TABLE
+from roboirg.apps.demonstrations.frame_columns import EXECUTED
+from roboirg.apps.demonstrations.parquet_tables import read_rows
+from roboirg.apps.demonstrations.replayable_trajectory import ReplayableTrajectory
+from roboirg.core.actions import JOINT_ANGLE
+from roboirg.util.parquet_support import check_parquet_support
+
+INFO = "meta/info.json"
+"""Path of the file that describes a dataset and is written last."""
+_STATES = ("observation.state", "state")
+"""Names of the column of states, by format."""
+_ACTIONS = (EXECUTED, "action", "actions")
+"""Names of the column of what was executed, by format; the first that a dataset has counts."""
+_JOINTS = 7
+
+
+def read_tables(root: Path) -> Iterator[ReplayableTrajectory]:
+    """Yield the trajectories of an export, each with the frames of its first instruction.
+
+    A folder that holds no export has none.
+    """
+    path = root / INFO
+    if not path.is_file() or not (root / EPISODE_TABLE).is_file():
+        return
+    check_parquet_support()
+    from pyarrow import parquet
+
+    info = json.loads(path.read_text(encoding="utf-8"))
+    state = _present(_STATES, info)
+    action = _present(_ACTIONS, info)
+    files = sorted((root / "data").rglob("*.parquet"))
+    frames = parquet.ParquetDataset(files).read(columns=[state, action])
+    rows: dict[str, dict[str, Any]] = {}
+    for row in read_rows(root / EPISODE_TABLE):
+        rows.setdefault(row["trajectory"], row)  # that of its first instruction
+    for name, row in rows.items():
+        after_video = row["from_index"] + row["video_length"]
+        own = frames.slice(after_video, row["length"] - row["video_length"])
+        states = np.array(own[state].to_pylist())
+        actions = np.array(own[action].to_pylist())
+        final = np.array(row["final_state"])
+        yield ReplayableTrajectory(
+            name=name,
+            task=row["task"],
+            seed=row["seed"],
+            split=row["split"],
+            index=row["episode"],
+            actions=actions.astype(np.float64),
+            states=np.concatenate([states[1:], final[None, : _JOINTS + 1]]),
+            final_state=final,
+            status=row["status"],
+            space=row.get("actions", JOINT_ANGLE.name),
+        )
+
+
+def _present(names: Iterable[str], info: Mapping[str, Any]) -> str:
+    """Return the first name that is one of a column."""
+    return next(name for name in names if name in info["features"])

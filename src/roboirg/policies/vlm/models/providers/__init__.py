@@ -1,0 +1,1 @@
+"""The services of models, one file each; a file that defines ``PROVIDER`` is one."""
