@@ -202,6 +202,14 @@ def count_failures(frame: Frame, by: Sequence[str]) -> Mapping[Key, Counter[str]
     return counts_by_key
 
 
+def occurring_failures(counts: Iterable[Counter[str]]) -> list[str]:
+    """Return the names of the failures that some of the counts have, in the order of `FAILURES`."""
+    total: Counter[str] = Counter()
+    for counts_of_key in counts:
+        total += counts_of_key
+    return [name for name in FAILURES if name in total]
+
+
 def make_failure_table(data: RunData, *, means: bool = False) -> Table:
     """Make the table of how all episodes ended, and of what the gap to explicit consists.
 
@@ -286,10 +294,7 @@ def make_failure_name_table(data: RunData) -> Table:
         InvalidValueError: no episode failed.
     """
     counts_by_scope = _failures_by_scope(data)
-    occurring: Counter[str] = Counter()
-    for counts in counts_by_scope.values():
-        occurring += counts
-    names = [name for name in FAILURES if name in occurring]
+    names = occurring_failures(counts_by_scope.values())
     if not names:
         raise InvalidValueError("No episode of the runs failed.")
 
