@@ -59,7 +59,7 @@ _FAIR = Fraction(2, 5)
 """The smallest rates in green and in yellow."""
 
 
-class _Result(NamedTuple):
+class _ScopeResult(NamedTuple):
     """What a policy run achieved in a scope with some options.
 
     Attributes:
@@ -71,7 +71,7 @@ class _Result(NamedTuple):
     gap: str
 
 
-_RunResults = Mapping[str, Mapping[InstructionOptions, _Result]]
+_RunResults = Mapping[str, Mapping[InstructionOptions, _ScopeResult]]
 """The results of a policy run by scope: its tasks, and last all tasks."""
 
 
@@ -102,13 +102,13 @@ def make_run_tables(frame: Frame) -> list[Table]:
 def _results_by_run(cells: Cells) -> Mapping[PolicyRun, _RunResults]:
     """Return the results of each policy run in its tasks and in all of them, not in suites."""
     scopes = by_scope(cells)
-    results: dict[PolicyRun, dict[str, dict[InstructionOptions, _Result]]] = {}
+    results: dict[PolicyRun, dict[str, dict[InstructionOptions, _ScopeResult]]] = {}
     for key, by_task in scopes.items():
         is_suite = key.scope not in by_task and key.scope != ALL_TASKS
         if is_suite:
             continue
         by_options = results.setdefault(key.policy_run, {}).setdefault(key.scope, {})
-        by_options[key.options] = _Result(Measured(key, by_task), gap_text(key, scopes))
+        by_options[key.options] = _ScopeResult(Measured(key, by_task), gap_text(key, scopes))
     return results
 
 
@@ -208,7 +208,7 @@ def _has_several_tasks(results: _RunResults) -> bool:
     return len(results.keys() - {ALL_TASKS}) > 1
 
 
-def _entry(result: _Result | None, differences: AllDifferences) -> Entry:
+def _entry(result: _ScopeResult | None, differences: AllDifferences) -> Entry:
     """Return an entry such as ``62 (−12)``, the success rate and the gap to explicit in brackets.
 
     It is a dash where nothing was played or planned, or no episode has a verdict.
