@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple, TypeVar, get_args
 
 from roboirg.core.conditions import Condition, Fact, Rule
@@ -308,6 +308,10 @@ class Stage:
     lasting: int = 0
     timer: str | None = None
     in_video: bool = True
+
+    def forbidding(self, *forbidden: Fact | Rule) -> Stage:
+        """Return the stage in which these fail the episode as well."""
+        return replace(self, forbids=(*self.forbids, *forbidden))
 
 
 def episode_key(task: str, split: Split, index: int) -> str:

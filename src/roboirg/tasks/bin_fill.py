@@ -198,7 +198,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
             points_at="bin",
         )
         plan += [pick, put_in]
-    return (*plan, press_stage(forbids=tuple(_wrong_counts(scene, goal))))
+    return (*plan, press_stage().forbidding(*_wrong_counts(scene, goal)))
 
 
 class _WantedCube(NamedTuple):

@@ -71,15 +71,15 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     again = Rule(
         Fact("picked", f"tape_{color}"), f"picked up the {color} tape again", failure="wrong_count"
     )
-    plan = placing_stages("tape", color, goal.number("repeats"), tuple(wrong))
+    plan = placing_stages("tape", color, goal.number("repeats"))
     leave = Stage(
         expects=Elapsed(WAIT_STEPS, timer="left alone"),
-        forbids=(again, *wrong),
+        forbids=(again,),
         primitive=Primitive("retreat", "robot", steps=WAIT_STEPS),
         subgoal="leave the tapes where they are",
         timer="left alone",
     )
-    return (*plan, leave)
+    return tuple(stage.forbidding(*wrong) for stage in (*plan, leave))
 
 
 TASK = Task(

@@ -20,7 +20,12 @@ from roboirg.tasks.shared.fixtures import (
     draw_number,
     draw_target,
 )
-from roboirg.tasks.shared.stages import PRESSED, facts_of_others, placing_stages, press_stage
+from roboirg.tasks.shared.stages import (
+    PRESSED,
+    facts_of_others,
+    placing_stages,
+    press_stage,
+)
 from roboirg.tasks.task import SceneAndGoal, Task
 from roboirg.util.random_draws import draw
 
@@ -66,10 +71,11 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     color = goal.text("color")
     cubes = scene.of_kind("cube")
     wrong_picks = facts_of_others("picked", cubes, f"cube_{color}")
-    repeats = goal.number("repeats")
-    plan = placing_stages("cube", color, repeats, (*wrong_picks, PRESSED))
-    all_picks = tuple(Fact("picked", cube.name) for cube in cubes)
-    return (*plan, press_stage("press the button {at} to stop", all_picks))
+    all_picks = [Fact("picked", cube.name) for cube in cubes]
+    plan = placing_stages("cube", color, goal.number("repeats"))
+    before_press = [stage.forbidding(*wrong_picks, PRESSED) for stage in plan]
+    press = press_stage("press the button {at} to stop")
+    return (*before_press, press.forbidding(*all_picks))
 
 
 TASK = Task(

@@ -120,15 +120,14 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     cube = f"cube_{color}"
     wrong_picks = facts_of_others("picked", scene.of_kind("cube"), cube)
     too_often = _too_often(cube, len(SIDES) * repeats)
-    forbidden: tuple[Fact | Rule, ...] = (*wrong_picks, PRESSED, too_often)
 
-    plan = [pick_stage(cube, f"pick up the {color} cube {{at}}", forbidden)]
+    plan = [pick_stage(cube, f"pick up the {color} cube {{at}}")]
     for ordinal in ORDINALS[:repeats]:
-        plan += [_swing(cube, side, ordinal, forbidden) for side in SIDES]
-    put_down = put_down_stage(
-        Primitive("put_down", cube), f"put the {color} cube on the table", forbidden
-    )
-    return (*plan, put_down, press_stage(forbids=(*wrong_picks, too_often)))
+        plan += [_swing(cube, side, ordinal) for side in SIDES]
+    put_down = Primitive("put_down", cube)
+    plan.append(put_down_stage(put_down, f"put the {color} cube on the table"))
+    before_press = [stage.forbidding(*wrong_picks, PRESSED, too_often) for stage in plan]
+    return (*before_press, press_stage().forbidding(*wrong_picks, too_often))
 
 
 def _too_often(cube: str, visits: int) -> Rule:
@@ -141,12 +140,12 @@ def _too_often(cube: str, visits: int) -> Rule:
     return Rule(limit, "moved the cube over a target too often")
 
 
-def _swing(cube: str, side: str, ordinal: str, forbidden: tuple[Fact | Rule, ...]) -> Stage:
+def _swing(cube: str, side: str, ordinal: str) -> Stage:
     """Return the stage in which the cube is carried over the target on a side."""
     target = f"target_{side}"
     return Stage(
         expects=Fact("over", cube, target),
-        forbids=forbidden,
+        forbids=(),
         primitive=Primitive("move_over", cube, target),
         subgoal=f"move to the top of the {side}-side target {{at}} for the {ordinal} time",
         points_at=target,

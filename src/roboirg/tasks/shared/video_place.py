@@ -180,10 +180,10 @@ def place_stages(scene: Scene, color: str, answer: str) -> tuple[Stage, ...]:
     """
     cube = f"cube_{color}"
     discs = [item.name for item in scene.of_kind("target")]
-    wrong_discs = tuple(Fact("placed", cube, disc) for disc in discs if disc != answer)
-    pick = pick_stage(cube, forbids=facts_of_others("picked", scene.of_kind("cube"), cube))
-    put = "place the cube onto the correct target {at}"
-    return pick, place_stage(cube, answer, put, wrong_discs)
+    wrong_discs = [Fact("placed", cube, disc) for disc in discs if disc != answer]
+    wrong_picks = facts_of_others("picked", scene.of_kind("cube"), cube)
+    put = place_stage(cube, answer, "place the cube onto the correct target {at}")
+    return pick_stage(cube).forbidding(*wrong_picks), put.forbidding(*wrong_discs)
 
 
 def colors_of(scene: Scene) -> tuple[str, ...]:
