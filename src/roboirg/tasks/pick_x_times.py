@@ -29,11 +29,9 @@ from roboirg.tasks.shared.stages import (
 from roboirg.tasks.task import SceneAndGoal, Task
 from roboirg.util.random_draws import draw
 
-CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
 REPEATS: dict[Difficulty, Bounds] = {"easy": (1, 3), "medium": (1, 3), "hard": (4, 5)}
 MAX_REPEATS = 5
 
-BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
 WORK_REGION = Region(-0.1, 0.0, 0.2, 0.2)
 CUBE_GAP = 0.02
 TARGET_RADIUS = 0.04
@@ -43,13 +41,7 @@ TARGET_GAP = 0.04
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, cubes of different colors, target disc; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
-    placed = draw_button_and_cubes(
-        rng,
-        button_region=BUTTON_REGION,
-        count=CUBES[difficulty],
-        region=WORK_REGION,
-        gap=CUBE_GAP,
-    )
+    placed = draw_button_and_cubes(rng, difficulty, WORK_REGION, CUBE_GAP)
     target = draw_target(
         rng,
         name="target",

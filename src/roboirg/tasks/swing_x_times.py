@@ -35,11 +35,9 @@ from roboirg.tasks.shared.stages import (
 from roboirg.tasks.task import SceneAndGoal, Task
 from roboirg.util.random_draws import draw
 
-CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
 REPEATS: dict[Difficulty, Bounds] = {"easy": (1, 3), "medium": (1, 2), "hard": (3, 3)}
 MAX_REPEATS = 3
 
-BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
 CUBE_REGION = Region(-0.1, 0.0, 0.25, 0.25)
 CUBE_GAP = 0.02
 SIDES: dict[str, Region] = {
@@ -57,13 +55,7 @@ LINGER = 20
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, cubes and a target on either side; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
-    placed = draw_button_and_cubes(
-        rng,
-        button_region=BUTTON_REGION,
-        count=CUBES[difficulty],
-        region=CUBE_REGION,
-        gap=CUBE_GAP,
-    )
+    placed = draw_button_and_cubes(rng, difficulty, CUBE_REGION, CUBE_GAP)
     targets = _draw_targets(rng, placed.obstacles)
     chosen = draw(rng, placed.cubes)
     scene = make_scene(placed.button, placed.cubes, targets, chosen.name)

@@ -166,7 +166,8 @@ class _Rows(NamedTuple):
             top += units
         axes.set_ylim(top, 0)
         axes.set_yticks(places, [label.text for label in self.labels])
-        for tick, label in zip(axes.get_yticklabels(), self.labels, strict=True):
+        # All labels or none, as only the panels on the left show them.
+        for tick, label in zip(axes.get_yticklabels(), self.labels, strict=False):
             tick.set_fontweight("bold" if label.is_heading else "normal")
         return places
 

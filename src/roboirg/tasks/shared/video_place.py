@@ -30,8 +30,6 @@ from roboirg.tasks.shared.stages import (
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS
 from roboirg.util.random_draws import draw, shuffled
 
-CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
-
 BUTTON_REGION = Region(0.1, 0.0, 0.025, 0.15)
 SITE_REGION = Region(-0.1, 0.0, 0.1, 0.1)
 WORK_REGION = Region(0.0, 0.0, 0.2, 0.2)
@@ -56,19 +54,15 @@ class PlaceTable(NamedTuple):
     cube: SceneObject
 
 
-def draw_table(rng: np.random.Generator, cubes: int, discs: int, site_radius: float) -> PlaceTable:
+def draw_table(
+    rng: np.random.Generator, difficulty: Difficulty, discs: int, site_radius: float
+) -> PlaceTable:
     """Draw site, button, cubes of different colors and target discs, and choose one of the cubes.
 
     The site is the round place for the cube at the end of the video; its radius is in meters.
     """
     site = _draw_site(rng, site_radius)
-    placed = draw_button_and_cubes(
-        rng,
-        button_region=BUTTON_REGION,
-        count=cubes,
-        region=WORK_REGION,
-        gap=GAP,
-    )
+    placed = draw_button_and_cubes(rng, difficulty, WORK_REGION, GAP, BUTTON_REGION)
     # As in RoboMME, cubes may lie on the site; discs may not.
     targets = _draw_discs(rng, discs, [*placed.obstacles, disc_area(site)])
     objects = (site, placed.button, *placed.cubes, *targets)
@@ -184,8 +178,3 @@ def place_stages(scene: Scene, color: str, answer: str) -> tuple[Stage, ...]:
     wrong_picks = facts_of_others("picked", scene.of_kind("cube"), cube)
     put = place_stage(cube, answer, "place the cube onto the correct target {at}")
     return pick_stage(cube).forbidding(*wrong_picks), put.forbidding(*wrong_discs)
-
-
-def colors_of(scene: Scene) -> tuple[str, ...]:
-    """Return the colors of the cubes on the table."""
-    return tuple(str(cube.color) for cube in scene.of_kind("cube"))
