@@ -377,18 +377,22 @@ def _sorted(rows: Sequence[_FrameRow], policies: Sequence[str]) -> Frame:
     runs = _Groups.of([row.policy_run for row in rows], lambda run: _run_key(run, policies))
     tasks = _Groups.of([job.task for job in jobs], _task_key)
     options = _Groups.of([job.column for job in jobs], options_sort_key)
+    groups = zip(runs.numbers, tasks.numbers, options.numbers, strict=True)
+    order = _order(groups, jobs)
 
-    def place(row: int) -> tuple[int, ...]:
-        job = jobs[row]
-        groups = (runs.numbers[row], tasks.numbers[row], options.numbers[row])
-        return (*groups, job.episode, job.policy_seed)
-
-    order = sorted(range(len(rows)), key=place)
     columns = _columns_of([rows[row] for row in order])
     columns["place"] = np.array(order, dtype=np.int64)
     columns["run"] = runs.column(order)
     columns["options"] = options.column(order)
     return Frame(columns)
+
+
+def _order(groups: Iterable[tuple[int, ...]], jobs: Sequence[Job]) -> list[int]:
+    """Return the numbers of the rows, sorted by group and within it by episode and policy seed."""
+    places = []
+    for row, (group, job) in enumerate(zip(groups, jobs, strict=True)):
+        places.append((group, job.episode, job.policy_seed, row))
+    return [row for *_, row in sorted(places)]
 
 
 def _columns_of(rows: Sequence[_FrameRow]) -> dict[str, Values]:
