@@ -13,16 +13,15 @@ import numpy as np
 
 from roboirg.core.conditions import Fact, OccurrenceCount, Rule
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
-from roboirg.core.footprints import Obstacle, Region
+from roboirg.core.footprints import Region
 from roboirg.core.motions import Glow, Motion
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     Bounds,
     counted_goals,
-    disc_area,
     draw_button_and_cubes,
     draw_number,
-    draw_target,
+    draw_targets,
     marker_over,
 )
 from roboirg.tasks.shared.stages import (
@@ -56,29 +55,11 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, cubes and a target on either side; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
     placed = draw_button_and_cubes(rng, difficulty, CUBE_REGION, CUBE_GAP)
-    targets = _draw_targets(rng, placed.obstacles)
+    regions = {f"target_{side}": region for side, region in SIDES.items()}
+    targets = draw_targets(rng, regions, TARGET_RADIUS, TARGET_GAP, placed.obstacles, TARGET_RGB)
     chosen = draw(rng, placed.cubes)
     scene = make_scene(placed.button, placed.cubes, targets, chosen.name)
     return scene, Goal.of(color=str(chosen.color), repeats=repeats)
-
-
-def _draw_targets(rng: np.random.Generator, obstacles: Sequence[Obstacle]) -> list[SceneObject]:
-    """Draw the target on each side, in the order of `SIDES`."""
-    taken = list(obstacles)
-    targets: list[SceneObject] = []
-    for side, region in SIDES.items():
-        target = draw_target(
-            rng,
-            name=f"target_{side}",
-            radius=TARGET_RADIUS,
-            region=region,
-            gap=TARGET_GAP,
-            obstacles=taken,
-            rgb=TARGET_RGB,
-        )
-        targets.append(target)
-        taken.append(disc_area(target))
-    return targets
 
 
 def make_scene(

@@ -6,7 +6,7 @@ What finds no free place raises `SceneRejectedError`: the seed gives no scene.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -211,6 +211,24 @@ def draw_target(
         return SceneObject(name, "target", place, radius=radius, rgb=rgb)
 
     return placed(name, draw, lambda target: disc_area(target, gap), obstacles)
+
+
+def draw_targets(
+    rng: np.random.Generator,
+    regions: Mapping[str, Region],
+    radius: float,
+    gap: float,
+    obstacles: Sequence[Obstacle],
+    rgb: tuple[float, float, float] | None = None,
+) -> list[SceneObject]:
+    """Draw a target disc in each region, by its name, away from those before it."""
+    taken = list(obstacles)
+    targets: list[SceneObject] = []
+    for name, region in regions.items():
+        target = draw_target(rng, name, radius, region, gap, taken, rgb)
+        targets.append(target)
+        taken.append(disc_area(target))
+    return targets
 
 
 def marker_over(target: SceneObject, name: str) -> SceneObject:

@@ -15,9 +15,9 @@ import numpy as np
 from roboirg.core import object_sizes
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Primitive, Scene, SceneObject, Stage
-from roboirg.core.footprints import Obstacle, Region
+from roboirg.core.footprints import Region
 from roboirg.core.motions import Point, Swap
-from roboirg.tasks.shared.fixtures import disc_area, draw_button_and_cubes, draw_target
+from roboirg.tasks.shared.fixtures import disc_area, draw_button_and_cubes, draw_targets
 from roboirg.tasks.shared.stages import (
     facts_of_others,
     go_home,
@@ -64,7 +64,9 @@ def draw_table(
     site = _draw_site(rng, site_radius)
     placed = draw_button_and_cubes(rng, difficulty, WORK_REGION, GAP, BUTTON_REGION)
     # As in RoboMME, cubes may lie on the site; discs may not.
-    targets = _draw_discs(rng, discs, [*placed.obstacles, disc_area(site)])
+    obstacles = [*placed.obstacles, disc_area(site)]
+    regions = {f"target_{number}": WORK_REGION for number in range(discs)}
+    targets = tuple(draw_targets(rng, regions, TARGET_RADIUS, GAP, obstacles))
     objects = (site, placed.button, *placed.cubes, *targets)
     return PlaceTable(objects, targets, cube=draw(rng, placed.cubes))
 
@@ -75,26 +77,6 @@ def _draw_site(rng: np.random.Generator, radius: float) -> SceneObject:
     # A site is as high as a disc: the release height of the hand follows from it.
     position = Point(x, y, object_sizes.TARGET_HEIGHT)
     return SceneObject("site", "site", position, radius=radius)
-
-
-def _draw_discs(
-    rng: np.random.Generator, count: int, obstacles: Sequence[Obstacle]
-) -> tuple[SceneObject, ...]:
-    """Draw target discs one after the other, each away from those before it."""
-    taken = list(obstacles)
-    discs: list[SceneObject] = []
-    for number in range(count):
-        disc = draw_target(
-            rng,
-            name=f"target_{number}",
-            radius=TARGET_RADIUS,
-            region=WORK_REGION,
-            gap=GAP,
-            obstacles=taken,
-        )
-        discs.append(disc)
-        taken.append(disc_area(disc))
-    return tuple(discs)
 
 
 def draw_scene(
