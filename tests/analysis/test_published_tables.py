@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from fractions import Fraction
 from importlib import resources
 
@@ -103,7 +104,7 @@ def test_published_averages_are_means_of_the_printed_rates() -> None:
     """All rates are multiples of 1/150 (real world: 1/10), rounded half up, without exception."""
     count = 0
     for table in RATE_TABLES:
-        trials = TRIALS[table][0] * TRIALS[table][1]
+        trials = math.prod(TRIALS[table])
         for row in published_rows(table):
             rates = [rate for rate in row.rates.values() if rate is not None]
             assert (row, mean_percent(rates)) == (row, row.average)
@@ -139,8 +140,7 @@ def test_published_tables_fit_this_benchmark() -> None:
 def test_the_stored_notes_have_intervals_of_their_trials_and_stand_below_the_tables() -> None:
     """Computed anew: no code of the package."""
     for table, (first, *_) in NOTES.items():
-        episodes, seeds = TRIALS[table]
-        trials = episodes * seeds
+        trials = math.prod(TRIALS[table])
         half = 1.96 * (0.25 / trials + (1.96 / (2 * trials)) ** 2) ** 0.5 / (1 + 1.96**2 / trials)
         assert f"cell's is ±{100 * half:.0f} points." in first
         assert {*NOTES[table]} <= {*make_table(table, EMPTY, published=True).notes}

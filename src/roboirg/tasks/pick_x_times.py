@@ -42,14 +42,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, cubes of different colors, target disc; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
     placed = draw_button_and_cubes(rng, difficulty, WORK_REGION, CUBE_GAP)
-    target = draw_target(
-        rng,
-        name="target",
-        radius=TARGET_RADIUS,
-        region=WORK_REGION,
-        gap=TARGET_GAP,
-        obstacles=placed.obstacles,
-    )
+    target = draw_target(rng, "target", TARGET_RADIUS, WORK_REGION, TARGET_GAP, placed.obstacles)
     chosen = draw(rng, placed.cubes)
     goal = Goal.of(color=str(chosen.color), repeats=repeats)
     return Scene((placed.button, *placed.cubes, target)), goal

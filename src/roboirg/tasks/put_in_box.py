@@ -58,7 +58,6 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
             wrong.append(Rule(Fact("binned", "tape", box.name), cause, failure="wrong_place"))
     put_in = Stage(
         expects=Fact("binned", "tape", f"box_{color}"),
-        forbids=(),
         primitive=Primitive("put_into", "tape", f"box_{color}"),
         subgoal=f"put the tape into the {color} box {{at}}",
         points_at=f"box_{color}",

@@ -118,7 +118,6 @@ def _swing(cube: str, side: str, ordinal: str) -> Stage:
     target = f"target_{side}"
     return Stage(
         expects=Fact("over", cube, target),
-        forbids=(),
         primitive=Primitive("move_over", cube, target),
         subgoal=f"move to the top of the {side}-side target {{at}} for the {ordinal} time",
         points_at=target,

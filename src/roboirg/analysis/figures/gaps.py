@@ -41,8 +41,8 @@ SIZE_NOTE = (
 )
 PUBLISHED_NOTE = "published: the same tasks, the paper's instructions and simulator."
 WORDS = {
-    "main": RateWords("success", "success with explicit instructions", "with implicit ones"),
-    "context": RateWords("success", "success with stages 1,5", "with more stages"),
+    "main": RateWords("success with explicit instructions", "with implicit ones"),
+    "context": RateWords("success with stages 1,5", "with more stages"),
 }
 
 Tasks = Mapping[InstructionOptions, Sequence[str]]

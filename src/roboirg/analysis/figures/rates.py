@@ -48,15 +48,13 @@ class RateRow(NamedTuple):
 
 
 class RateWords(NamedTuple):
-    """What the legend calls rates.
+    """What the legend calls rates next to each other.
 
     Attributes:
-        alone: a rate that stands alone.
         reference: one that others are compared with.
         compared: one next to a reference.
     """
 
-    alone: str
     reference: str
     compared: str
 
@@ -155,7 +153,7 @@ def _keys(rates: Sequence[Rate], words: RateWords) -> dict[str, Artist]:
         keys[f"{words.reference}, %"] = _key_dot(paper())
         keys[f"{words.compared}; number: difference"] = _key_dot(GHOST)
     else:
-        keys[f"{words.alone}, %"] = _key_dot(GHOST)
+        keys["success, %"] = _key_dot(GHOST)
     if interval_label:
         keys[interval_label] = Line2D([], [], color=GHOST, **BAND)
     return keys

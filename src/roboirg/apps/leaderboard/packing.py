@@ -46,7 +46,12 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
     """
     run = StoredRun(folder, read_summary)
     run.file.refuse_damage()
-    paths = _packed_files(folder, videos=videos, logs=logs)
+    names = [RECORDS_FILE, *plan_names(folder), *_names_below(folder, ACTION_FOLDER)]
+    if logs:
+        names += _names_below(folder, LOG_FOLDER)
+    if videos:
+        names += _names_below(folder, VIDEO_FOLDER)
+    paths = {name: run_file(folder, name) for name in names}
     _check_size(paths, folder)
     policies = {entry.policy for entry in run.newest}
     manifest = PackManifest(
@@ -57,16 +62,6 @@ def pack_run(folder: Path, out: Path, *, videos: bool = False, logs: bool = Fals
     )
     _write(out, manifest, paths)
     return manifest
-
-
-def _packed_files(folder: Path, *, videos: bool, logs: bool) -> dict[str, Path]:
-    """Return the files of a run that are packed, by their paths in it."""
-    names = [RECORDS_FILE, *plan_names(folder), *_names_below(folder, ACTION_FOLDER)]
-    if logs:
-        names += _names_below(folder, LOG_FOLDER)
-    if videos:
-        names += _names_below(folder, VIDEO_FOLDER)
-    return {name: run_file(folder, name) for name in names}
 
 
 def _names_below(folder: Path, name: str) -> list[str]:

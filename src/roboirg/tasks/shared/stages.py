@@ -31,7 +31,6 @@ def pick_stage(
     """Return the stage in which a cube or tape is picked up."""
     return Stage(
         expects=Fact("picked", name),
-        forbids=(),
         primitive=Primitive("pick_cube", name),
         subgoal=subgoal,
         points_at=name,
@@ -43,7 +42,6 @@ def place_stage(name: str, place: str, subgoal: str) -> Stage:
     """Return the stage in which a cube or tape is placed on a target."""
     return Stage(
         expects=Fact("placed", name, place),
-        forbids=(),
         primitive=Primitive("place_on", name, place),
         subgoal=subgoal,
         points_at=place,
@@ -54,7 +52,6 @@ def put_down_stage(put_down: Primitive, subgoal: str, timer: str | None = None) 
     """Return the stage in which a cube is put down on the table by a movement."""
     return Stage(
         expects=Fact("lying", put_down.subject),
-        forbids=(),
         primitive=put_down,
         subgoal=subgoal,
         timer=timer,
@@ -79,7 +76,6 @@ def press_stage(
     """Return the stage in which a button is pressed."""
     return Stage(
         expects=expects,
-        forbids=(),
         primitive=Primitive("press", button),
         subgoal=subgoal,
         points_at=button,
@@ -100,7 +96,6 @@ def _static(primitive: Primitive) -> Stage:
     """Return the stage of a movement that ends at rest, and lasts as long as it says."""
     return Stage(
         expects=Fact("still", "robot"),
-        forbids=(),
         primitive=primitive,
         subgoal="static",
         lasting=primitive.steps,
@@ -111,7 +106,6 @@ def go_home() -> Stage:
     """Return the stage after the video in which the robot goes to the policy's start pose."""
     return Stage(
         expects=Fact("home", "robot"),
-        forbids=(),
         primitive=Primitive("go_home", "robot"),
         subgoal="go home",
         in_video=False,

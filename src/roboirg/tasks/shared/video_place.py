@@ -135,7 +135,6 @@ def _demonstration_of(past: Sequence[Fact]) -> tuple[Stage, ...]:
             plan += [pick_stage(cube), place_stage(cube, str(fact.place), put)]
     put_back = Stage(
         expects=Fact("placed", cube, "site"),
-        forbids=(),
         primitive=Primitive("place_on", cube, "site"),
         subgoal="drop the cube onto table",
     )
