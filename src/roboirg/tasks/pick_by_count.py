@@ -34,7 +34,7 @@ then. The longest pick in RoboMME's data takes 137."""
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw the target and a tape on either side; sides, goal tape and number are uniform."""
     del difficulty
-    target = draw_target(rng, "target", TARGET_RADIUS, TARGET_REGION, gap=0.0, obstacles=())
+    target = draw_target(rng, "target", TARGET_RADIUS, TARGET_REGION, 0.0, ())
     tapes: list[SceneObject] = []
     for color, region in draw_regions(rng, TAPES, LEFT_TAPE_REGION).items():
         tape = draw_tape(

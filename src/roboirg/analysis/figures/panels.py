@@ -123,7 +123,7 @@ def _clear_axes(axes: Axes) -> None:
     """Remove most of the frame and add vertical grid lines."""
     axes.set_axisbelow(True)
     axes.grid(axis="x")
-    axes.tick_params(axis="both", length=0)
+    axes.tick_params(length=0)
     axes.spines[["top", "right", "left"]].set_visible(False)
 
 

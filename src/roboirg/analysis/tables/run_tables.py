@@ -198,7 +198,9 @@ def _make_run_table(
             group = ALL_TASKS
         else:
             continue  # it would only repeat its task
-        entries = [_entry(by_options.get(options), differences) for options in settings]
+        entries = []
+        for options in settings:
+            entries.append(_entry(by_options.get(options), differences))
         rows.append(Row(group, scope, entries))
     columns = [Column(options_label(options), options.setting) for options in settings]
     return Table(key="run", title=label, heads=("task",), columns=columns, rows=rows, notes=notes)
@@ -274,7 +276,8 @@ def _sizes(results: _RunResults) -> str:
     of_all_tasks: list[int] = []
     for scope, by_options in results.items():
         trials = of_all_tasks if scope == ALL_TASKS else of_cells
-        trials += [result.measured.counts.trials for result in by_options.values()]
+        for result in by_options.values():
+            trials.append(result.measured.counts.trials)
     text = f"n = {range_text(of_cells, 'episode')} per cell"
     if _has_several_tasks(results):
         text += f", {range_text(of_all_tasks, 'episode')} for {ALL_TASKS}, the mean over tasks"
