@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from fractions import Fraction
 from importlib import resources
 
@@ -26,6 +27,7 @@ from roboirg.language.settings import settings_of
 from roboirg.stats.rates import mean_percent, percent
 from roboirg.tasks import all_tasks
 
+EMPTY = RunData(frame_of())
 FILES = {"main": "main", "planner": "planner", "context": "context", "real": "real_world"}
 
 
@@ -102,7 +104,7 @@ def test_published_averages_are_means_of_the_printed_rates() -> None:
     """All rates are multiples of 1/150 (real world: 1/10), rounded half up, without exception."""
     count = 0
     for table in RATE_TABLES:
-        trials = TRIALS[table][0] * TRIALS[table][1]
+        trials = math.prod(TRIALS[table])
         for row in published_rows(table):
             rates = [rate for rate in row.rates.values() if rate is not None]
             assert (row, mean_percent(rates)) == (row, row.average)
@@ -113,7 +115,7 @@ def test_published_averages_are_means_of_the_printed_rates() -> None:
 
 
 def test_the_coverage_of_this_benchmark_is_read_off_its_tasks() -> None:
-    table = make_table("coverage", None)
+    table = make_table("coverage", EMPTY)
     found = [(row.group, row.name, row.cells) for row in table.rows]
     lines = [tuple(one.values()) for one in published_lines("coverage")]
     published = [(kind, name, list(words)) for name, kind, *words in lines]
@@ -124,7 +126,7 @@ def test_the_coverage_of_this_benchmark_is_read_off_its_tasks() -> None:
 @pytest.mark.parametrize("which", WHICH)
 @pytest.mark.parametrize("name", FORMATS)
 def test_all_can_be_drawn_from_the_published_rows_alone(which: str, name: str) -> None:
-    text = FORMATS[name].draw(make_table(which, None, published=True))
+    text = FORMATS[name].draw(make_table(which, EMPTY, published=True))
     assert text.rstrip("\n") + "\n" == text
 
 
@@ -138,8 +140,7 @@ def test_published_tables_fit_this_benchmark() -> None:
 def test_the_stored_notes_have_intervals_of_their_trials_and_stand_below_the_tables() -> None:
     """Computed anew: no code of the package."""
     for table, (first, *_) in NOTES.items():
-        episodes, seeds = TRIALS[table]
-        trials = episodes * seeds
+        trials = math.prod(TRIALS[table])
         half = 1.96 * (0.25 / trials + (1.96 / (2 * trials)) ** 2) ** 0.5 / (1 + 1.96**2 / trials)
         assert f"cell's is ±{100 * half:.0f} points." in first
-        assert {*NOTES[table]} <= {*make_table(table, None, published=True).notes}
+        assert {*NOTES[table]} <= {*make_table(table, EMPTY, published=True).notes}

@@ -98,7 +98,7 @@ def toppled(monkeypatch: pytest.MonkeyPatch) -> FactTraits:
 
 
 def stage(expects: Fact, *forbids: Fact | Rule) -> Stage:
-    return Stage(expects, forbids, Primitive("hold", "robot"), "leave the pillar alone")
+    return Stage(expects, Primitive("hold", "robot"), "leave the pillar alone", forbids)
 
 
 def test_a_kind_from_outside_is_judged_and_described(toppled: FactTraits) -> None:

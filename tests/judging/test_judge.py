@@ -17,7 +17,7 @@ A, B, BAD = Fact("picked", "a"), Fact("placed", "a", "target"), Fact("pressed", 
 
 def stage(expects: Fact, *forbids: Fact, lasting: int = 0) -> Stage:
     primitive = Primitive("press", expects.subject)
-    return Stage(expects, forbids, primitive, "do {at} it", points_at="a", lasting=lasting)
+    return Stage(expects, primitive, "do {at} it", forbids, points_at="a", lasting=lasting)
 
 
 def test_stages_complete_in_order():

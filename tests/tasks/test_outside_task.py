@@ -119,7 +119,7 @@ def test_a_fact_that_can_never_hold_is_refused(task, monkeypatch, fact, sentence
     made = replace(
         task,
         sample=lambda _rng, _difficulty: (scene, Goal.of(color="red")),
-        stages=lambda scene, goal: (Stage(fact, (), Primitive("pick_cube", "cube_red"), "go"),),
+        stages=lambda scene, goal: (Stage(fact, Primitive("pick_cube", "cube_red"), "go"),),
     )
     monkeypatch.setattr(splits, "get_task", lambda _name: made)
     with pytest.raises(RoboIRGError, match=re.escape(sentence)):

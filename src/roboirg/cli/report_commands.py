@@ -6,7 +6,7 @@ import functools
 import itertools
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -174,37 +174,47 @@ def tables(
 
     Example: roboirg tables runs/first --which main --published
     """
-    from rich.console import Console
-
     from roboirg.analysis.measures.run_data import RunData
     from roboirg.analysis.results.reading import read_frame
     from roboirg.analysis.results.sources import opened_sources
     from roboirg.analysis.tables.rendering import get_format
-    from roboirg.analysis.tables.rendering.terminal import print_tables
     from roboirg.cli.run_commands import warn_of_mixtures
     from roboirg.util.atomic_write import write_atomically
     from roboirg.util.freed_memory import paused_collection
 
     # The options are checked first, as reading takes long.
     output = get_format(format)
-    _check_choice(which, by, runs or [], published=published, floors=floors)
+    choice = _TableChoice(which, by, published, floors)
+    choice.check(runs or [])
     with paused_collection(), opened_sources(runs or []) as sources:
         records = itertools.chain.from_iterable(source.records() for source in sources)
         data = RunData(read_frame(sources, words=by is not None), records)
-        made = _tables(which, by, data, published=published, floors=floors)
+        made = choice.tables(data)
     if output.is_for_programs:
         warn_of_mixtures(data.frame)
-    if out is not None:
-        for table in made:
-            path = out / f"{table.key}{output.suffix}"
-            write_atomically(path, output.draw(table))
-            typer.echo(path)
-    elif format == "terminal":
-        print_tables(made, Console())
+    if out is None:
+        _print_tables(made, format)
+        return
+    for table in made:
+        path = out / f"{table.key}{output.suffix}"
+        write_atomically(path, output.draw(table))
+        typer.echo(path)
+
+
+def _print_tables(tables: Sequence[Table], format: str) -> None:  # noqa: A002
+    """Print tables: in colors, as one document for a program, or one after the other."""
+    from rich.console import Console
+
+    from roboirg.analysis.tables.rendering import get_format
+    from roboirg.analysis.tables.rendering.terminal import print_tables
+
+    output = get_format(format)
+    if format == "terminal":
+        print_tables(tables, Console())
     elif output.is_for_programs:
-        typer.echo(output.draw(*made), nl=False)  # one text with all tables
+        typer.echo(output.draw(*tables), nl=False)
     else:
-        typer.echo("\n".join(map(output.draw, made)), nl=False)
+        typer.echo("\n".join(map(output.draw, tables)), nl=False)
 
 
 def compare(
@@ -258,81 +268,84 @@ def compare(
         console.print(Text(line), highlight=False)
 
 
-def _check_choice(
-    which: str, by: str | None, runs: Sequence[str], *, published: bool, floors: str | None
-) -> None:
-    """Raise if the options of `tables` exclude each other, before any record is read.
+class _TableChoice(NamedTuple):
+    """The tables that the command is to make.
 
-    Diagnostic tables (such as ``failures``) and those by kind of words (``--by``) show runs alone,
-    so they take neither published values nor floors.
+    Attributes:
+        which: a name, or all tables of the paper.
+        by: kinds of words, each a table of its own; None for the tables of `which`.
+        published: whether to add the paper's rows.
+        floors: names of expected successes to add; None for none.
     """
-    from roboirg.analysis.tables.diagnostic_tables import diagnostic_tables
-    from roboirg.analysis.tables.paper_tables import WHICH
 
-    known_name("table", which, (*WHICH, *diagnostic_tables(), _ALL))
-    is_diagnostic = which in diagnostic_tables()
-    is_broken_down = by is not None
-    if is_diagnostic or is_broken_down:
-        names_both = is_broken_down and which != _ALL  # --by and a table
-        if names_both or published or floors:
-            raise InvalidValueError(
-                f"--by, and --which {', '.join(diagnostic_tables())}, show runs alone; each "
-                "excludes the other, --published and --floors."
-            )
-    if not runs and not published and which != _COVERAGE:
-        raise InvalidValueError("Tables need a run; give its folder, a pack, or --published.")
+    which: str
+    by: str | None
+    published: bool
+    floors: str | None
 
+    def check(self, runs: Sequence[str]) -> None:
+        """Raise if the options exclude each other, before any record is read.
 
-def _tables(
-    which: str,
-    by: str | None,
-    data: RunData,
-    *,
-    published: bool,
-    floors: str | None,
-) -> list[Table]:
-    """Return the tables that were chosen, with notes about what differs between the results.
+        Diagnostic tables (such as ``failures``) and those by kind of words (``--by``) show runs
+        alone, so they take neither published values nor floors.
+        """
+        from roboirg.analysis.tables.diagnostic_tables import diagnostic_tables
+        from roboirg.analysis.tables.paper_tables import WHICH
 
-    ``--by`` chooses tables by kind of words, a diagnostic name one table, all else the paper's.
-    """
-    from roboirg.analysis.tables.diagnostic_tables import diagnostic_tables
-    from roboirg.analysis.tables.table_notes import with_mixtures
+        known_name("table", self.which, (*WHICH, *diagnostic_tables(), _ALL))
+        is_broken_down = self.by is not None
+        if is_broken_down or self.which in diagnostic_tables():
+            names_both = is_broken_down and self.which != _ALL  # --by and a table
+            if names_both or self.published or self.floors:
+                raise InvalidValueError(
+                    f"--by, and --which {', '.join(diagnostic_tables())}, show runs alone; each "
+                    "excludes the other, --published and --floors."
+                )
+        if not runs and not self.published and self.which != _COVERAGE:
+            raise InvalidValueError("Tables need a run; give its folder, a pack, or --published.")
 
-    if by is not None:
-        made = _breakdown_tables(data, by)
-    elif which in diagnostic_tables():
-        made = [diagnostic_tables()[which].make(data)]
-    else:
-        made = _paper_tables(which, data, published=published, floors=floors)
-    return with_mixtures(made, data.frame)
+    def tables(self, data: RunData) -> list[Table]:
+        """Return the tables, with notes about what differs between the results.
 
+        ``--by`` chooses tables by kind of words, a diagnostic name one table, all else the paper's.
+        """
+        from roboirg.analysis.tables.diagnostic_tables import diagnostic_tables
+        from roboirg.analysis.tables.table_notes import with_mixtures
 
-def _paper_tables(which: str, data: RunData, *, published: bool, floors: str | None) -> list[Table]:
-    """Return one table of the paper, or with ``all`` each for which there are results.
+        if self.by is not None:
+            made = _breakdown_tables(data, self.by)
+        elif self.which in diagnostic_tables():
+            made = [diagnostic_tables()[self.which].make(data)]
+        else:
+            made = self._paper_tables(data)
+        return with_mixtures(made, data.frame)
 
-    With the published values, the tables that have some are always among them.
-    """
-    from roboirg.analysis.measures.chance import FLOORS
-    from roboirg.analysis.published import RATE_TABLES
-    from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
+    def _paper_tables(self, data: RunData) -> list[Table]:
+        """Return one table of the paper, or with ``all`` each for which there are results.
 
-    added = () if floors is None else known_names("floor", floors, FLOORS)
-    make = functools.partial(make_table, data=data, published=published, floors=added)
-    if which != _ALL:
-        table = make(which)
-        if which != _COVERAGE and not table.rows:
-            raise InvalidValueError(
-                f"The runs have no results for the table {which!r}; --which all shows what they "
-                "have."
-            )
-        return [table]
+        With the published values, the tables that have some are always among them.
+        """
+        from roboirg.analysis.measures.chance import FLOORS
+        from roboirg.analysis.published import RATE_TABLES
+        from roboirg.analysis.tables.paper_tables import WHICH, is_informative, make_table
 
-    made: list[Table] = []
-    for name in WHICH:
-        is_of_paper = name in RATE_TABLES or name == _COVERAGE
-        if (published and is_of_paper) or is_informative(name, data):
-            made.append(make(name))
-    return made
+        floors = () if self.floors is None else known_names("floor", self.floors, FLOORS)
+        make = functools.partial(make_table, data=data, published=self.published, floors=floors)
+        if self.which != _ALL:
+            table = make(self.which)
+            if self.which != _COVERAGE and not table.rows:
+                raise InvalidValueError(
+                    f"The runs have no results for the table {self.which!r}; --which all shows "
+                    "what they have."
+                )
+            return [table]
+
+        made: list[Table] = []
+        for name in WHICH:
+            is_of_paper = name in RATE_TABLES or name == _COVERAGE
+            if (self.published and is_of_paper) or is_informative(name, data):
+                made.append(make(name))
+        return made
 
 
 def _breakdown_tables(data: RunData, by: str) -> list[Table]:

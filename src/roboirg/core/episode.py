@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple, TypeVar, get_args
 
 from roboirg.core.conditions import Condition, Fact, Rule
@@ -290,10 +290,10 @@ class Stage:
 
     Attributes:
         expects: the condition that completes the stage.
-        forbids: facts and rules any of which fails the episode while this stage is current.
         primitive: the oracle's movement.
         subgoal: simple subgoal in words, lower case; ``{at}`` marks where the grounded form
             puts ``at <y, x>``.
+        forbids: facts and rules any of which fails the episode while this stage is current.
         points_at: the object whose pixel the grounded form names; None if it has no slot.
         lasting: control steps for which `expects` has to hold before the stage is complete.
         timer: name of the timer that the stage's first evaluation starts, unless it runs already.
@@ -301,13 +301,17 @@ class Stage:
     """
 
     expects: Condition
-    forbids: tuple[Fact | Rule, ...]
     primitive: Primitive
     subgoal: str
+    forbids: tuple[Fact | Rule, ...] = ()
     points_at: str | None = None
     lasting: int = 0
     timer: str | None = None
     in_video: bool = True
+
+    def forbidding(self, *forbidden: Fact | Rule) -> Stage:
+        """Return the stage in which these fail the episode as well."""
+        return replace(self, forbids=(*self.forbids, *forbidden))
 
 
 def episode_key(task: str, split: Split, index: int) -> str:

@@ -81,12 +81,20 @@ def resampled_rates(tasks: Sequence[Rows], rng: np.random.Generator, draws: int 
         # The distinct rows, and how many episodes have each.
         kinds, counts = np.unique(rows, axis=0, return_counts=True)
         drawn_counts = rng.multinomial(len(rows), counts / len(rows), size=draws)
-        sums = drawn_counts @ kinds
-        successes = sums[:, 0::2]
-        trials = sums[:, 1::2]
-        with np.errstate(invalid="ignore"):
-            rates.append(successes / trials)
+        rates.append(rates_of(drawn_counts @ kinds))
     return np.asarray(np.mean(rates, axis=0), dtype=np.float64)
+
+
+def rates_of(counts: Rows) -> Draws:
+    """Return success rates, given k pairs of successes and trials in each row.
+
+    Returns:
+        Shape (rows, k); nan without a trial.
+    """
+    successes = counts[:, 0::2]
+    trials = counts[:, 1::2]
+    with np.errstate(invalid="ignore"):
+        return np.asarray(successes / trials)
 
 
 def percentile_interval(values: Draws, sizes: Sequence[int]) -> Interval | None:

@@ -17,6 +17,7 @@ from roboirg.stats.intervals import (
     Interval,
     Rows,
     percentile_interval,
+    rates_of,
     resampled_interval,
     resampled_rates,
     without_spread,
@@ -157,10 +158,7 @@ def paired_rates(tasks: Sequence[Pairs]) -> PairedRates | None:
     sums = [pairs.rows.sum(axis=0) for pairs in tasks if len(pairs.rows)]
     if not sums:
         return None
-    counts = np.array(sums, dtype=np.float64)
-    successes = counts[:, 0::2]  # of both cells, a row for each task
-    trials = counts[:, 1::2]
-    return PairedRates._make(np.mean(successes / trials, axis=0).tolist())
+    return PairedRates._make(np.mean(rates_of(np.array(sums)), axis=0).tolist())
 
 
 def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = DRAWS) -> Gap | None:

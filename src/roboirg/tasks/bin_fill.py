@@ -29,6 +29,7 @@ from roboirg.core.footprints import Region
 from roboirg.core.motions import Away, Motion, Vanish
 from roboirg.core.plain_text import counted
 from roboirg.tasks.shared.fixtures import (
+    BUTTON_REGION,
     ORDINALS,
     Bounds,
     CubePlan,
@@ -58,7 +59,6 @@ GOAL_CUBES: dict[Difficulty, Bounds] = {"easy": (1, 3), "medium": (2, 4), "hard"
 MAX_GOAL_CUBES = 5
 GOAL_ORDER: tuple[Color, ...] = ("red", "blue", "green")
 
-BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
 BIN_REGION = Region(0.05, 0.0, 0.1, 0.2)
 CUBE_REGION = Region(-0.1, 0.0, 0.2, 0.25)
 CUBE_GAP = 0.02
@@ -198,7 +198,7 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
             points_at="bin",
         )
         plan += [pick, put_in]
-    return (*plan, press_stage(forbids=tuple(_wrong_counts(scene, goal))))
+    return (*plan, press_stage().forbidding(*_wrong_counts(scene, goal)))
 
 
 class _WantedCube(NamedTuple):

@@ -34,14 +34,7 @@ then. The longest pick in RoboMME's data takes 137."""
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw the target and a tape on either side; sides, goal tape and number are uniform."""
     del difficulty
-    target = draw_target(
-        rng,
-        name="target",
-        radius=TARGET_RADIUS,
-        region=TARGET_REGION,
-        gap=0.0,
-        obstacles=(),
-    )
+    target = draw_target(rng, "target", TARGET_RADIUS, TARGET_REGION, 0.0, ())
     tapes: list[SceneObject] = []
     for color, region in draw_regions(rng, TAPES, LEFT_TAPE_REGION).items():
         tape = draw_tape(
@@ -71,15 +64,15 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     again = Rule(
         Fact("picked", f"tape_{color}"), f"picked up the {color} tape again", failure="wrong_count"
     )
-    plan = placing_stages("tape", color, goal.number("repeats"), tuple(wrong))
+    plan = placing_stages("tape", color, goal.number("repeats"))
     leave = Stage(
         expects=Elapsed(WAIT_STEPS, timer="left alone"),
-        forbids=(again, *wrong),
+        forbids=(again,),
         primitive=Primitive("retreat", "robot", steps=WAIT_STEPS),
         subgoal="leave the tapes where they are",
         timer="left alone",
     )
-    return (*plan, leave)
+    return tuple(stage.forbidding(*wrong) for stage in (*plan, leave))
 
 
 TASK = Task(

@@ -20,15 +20,18 @@ from roboirg.tasks.shared.fixtures import (
     draw_number,
     draw_target,
 )
-from roboirg.tasks.shared.stages import PRESSED, facts_of_others, placing_stages, press_stage
+from roboirg.tasks.shared.stages import (
+    PRESSED,
+    facts_of_others,
+    placing_stages,
+    press_stage,
+)
 from roboirg.tasks.task import SceneAndGoal, Task
 from roboirg.util.random_draws import draw
 
-CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
 REPEATS: dict[Difficulty, Bounds] = {"easy": (1, 3), "medium": (1, 3), "hard": (4, 5)}
 MAX_REPEATS = 5
 
-BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
 WORK_REGION = Region(-0.1, 0.0, 0.2, 0.2)
 CUBE_GAP = 0.02
 TARGET_RADIUS = 0.04
@@ -38,21 +41,8 @@ TARGET_GAP = 0.04
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, cubes of different colors, target disc; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
-    placed = draw_button_and_cubes(
-        rng,
-        button_region=BUTTON_REGION,
-        count=CUBES[difficulty],
-        region=WORK_REGION,
-        gap=CUBE_GAP,
-    )
-    target = draw_target(
-        rng,
-        name="target",
-        radius=TARGET_RADIUS,
-        region=WORK_REGION,
-        gap=TARGET_GAP,
-        obstacles=placed.obstacles,
-    )
+    placed = draw_button_and_cubes(rng, difficulty, WORK_REGION, CUBE_GAP)
+    target = draw_target(rng, "target", TARGET_RADIUS, WORK_REGION, TARGET_GAP, placed.obstacles)
     chosen = draw(rng, placed.cubes)
     goal = Goal.of(color=str(chosen.color), repeats=repeats)
     return Scene((placed.button, *placed.cubes, target)), goal
@@ -66,10 +56,11 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     color = goal.text("color")
     cubes = scene.of_kind("cube")
     wrong_picks = facts_of_others("picked", cubes, f"cube_{color}")
-    repeats = goal.number("repeats")
-    plan = placing_stages("cube", color, repeats, (*wrong_picks, PRESSED))
-    all_picks = tuple(Fact("picked", cube.name) for cube in cubes)
-    return (*plan, press_stage("press the button {at} to stop", all_picks))
+    all_picks = [Fact("picked", cube.name) for cube in cubes]
+    plan = placing_stages("cube", color, goal.number("repeats"))
+    before_press = [stage.forbidding(*wrong_picks, PRESSED) for stage in plan]
+    press = press_stage("press the button {at} to stop")
+    return (*before_press, press.forbidding(*all_picks))
 
 
 TASK = Task(

@@ -56,15 +56,14 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
         if box.color != color:
             cause = f"put the tape into the {box.color} box"
             wrong.append(Rule(Fact("binned", "tape", box.name), cause, failure="wrong_place"))
-    forbids = tuple(wrong)
     put_in = Stage(
         expects=Fact("binned", "tape", f"box_{color}"),
-        forbids=forbids,
         primitive=Primitive("put_into", "tape", f"box_{color}"),
         subgoal=f"put the tape into the {color} box {{at}}",
         points_at=f"box_{color}",
     )
-    return pick_stage("tape", "pick up the tape {at}", forbids), put_in
+    pick = pick_stage("tape", "pick up the tape {at}")
+    return pick.forbidding(*wrong), put_in.forbidding(*wrong)
 
 
 TASK = Task(

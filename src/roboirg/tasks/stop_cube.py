@@ -15,12 +15,11 @@ from roboirg.core.conditions import All, Elapsed, Fact, OccurrenceCount, Rule, a
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
 from roboirg.core.footprints import Region
 from roboirg.core.motions import Point, Shuttle
-from roboirg.tasks.shared.fixtures import ORDINALS, draw_button
+from roboirg.tasks.shared.fixtures import BUTTON_REGION, ORDINALS, draw_button
 from roboirg.tasks.shared.stages import PRESSED
 from roboirg.tasks.task import SceneAndGoal, Task
 from roboirg.util.random_draws import draw
 
-BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
 TARGET_REGION = Region(0.0, 0.0, 0.1, 0.1)
 TARGET_RADIUS = 0.036
 TARGET_THICKNESS = 0.01

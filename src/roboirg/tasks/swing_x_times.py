@@ -13,16 +13,15 @@ import numpy as np
 
 from roboirg.core.conditions import Fact, OccurrenceCount, Rule
 from roboirg.core.episode import Difficulty, Goal, Primitive, Scene, SceneObject, Stage
-from roboirg.core.footprints import Obstacle, Region
+from roboirg.core.footprints import Region
 from roboirg.core.motions import Glow, Motion
 from roboirg.tasks.shared.fixtures import (
     ORDINALS,
     Bounds,
     counted_goals,
-    disc_area,
     draw_button_and_cubes,
     draw_number,
-    draw_target,
+    draw_targets,
     marker_over,
 )
 from roboirg.tasks.shared.stages import (
@@ -35,11 +34,9 @@ from roboirg.tasks.shared.stages import (
 from roboirg.tasks.task import SceneAndGoal, Task
 from roboirg.util.random_draws import draw
 
-CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
 REPEATS: dict[Difficulty, Bounds] = {"easy": (1, 3), "medium": (1, 2), "hard": (3, 3)}
 MAX_REPEATS = 3
 
-BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
 CUBE_REGION = Region(-0.1, 0.0, 0.25, 0.25)
 CUBE_GAP = 0.02
 SIDES: dict[str, Region] = {
@@ -57,36 +54,12 @@ LINGER = 20
 def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
     """Draw button, cubes and a target on either side; goal cube and repeats are uniform."""
     repeats = draw_number(rng, REPEATS[difficulty])
-    placed = draw_button_and_cubes(
-        rng,
-        button_region=BUTTON_REGION,
-        count=CUBES[difficulty],
-        region=CUBE_REGION,
-        gap=CUBE_GAP,
-    )
-    targets = _draw_targets(rng, placed.obstacles)
+    placed = draw_button_and_cubes(rng, difficulty, CUBE_REGION, CUBE_GAP)
+    regions = {f"target_{side}": region for side, region in SIDES.items()}
+    targets = draw_targets(rng, regions, TARGET_RADIUS, TARGET_GAP, placed.obstacles, TARGET_RGB)
     chosen = draw(rng, placed.cubes)
     scene = make_scene(placed.button, placed.cubes, targets, chosen.name)
     return scene, Goal.of(color=str(chosen.color), repeats=repeats)
-
-
-def _draw_targets(rng: np.random.Generator, obstacles: Sequence[Obstacle]) -> list[SceneObject]:
-    """Draw the target on each side, in the order of `SIDES`."""
-    taken = list(obstacles)
-    targets: list[SceneObject] = []
-    for side, region in SIDES.items():
-        target = draw_target(
-            rng,
-            name=f"target_{side}",
-            radius=TARGET_RADIUS,
-            region=region,
-            gap=TARGET_GAP,
-            obstacles=taken,
-            rgb=TARGET_RGB,
-        )
-        targets.append(target)
-        taken.append(disc_area(target))
-    return targets
 
 
 def make_scene(
@@ -120,15 +93,14 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     cube = f"cube_{color}"
     wrong_picks = facts_of_others("picked", scene.of_kind("cube"), cube)
     too_often = _too_often(cube, len(SIDES) * repeats)
-    forbidden: tuple[Fact | Rule, ...] = (*wrong_picks, PRESSED, too_often)
 
-    plan = [pick_stage(cube, f"pick up the {color} cube {{at}}", forbidden)]
+    plan = [pick_stage(cube, f"pick up the {color} cube {{at}}")]
     for ordinal in ORDINALS[:repeats]:
-        plan += [_swing(cube, side, ordinal, forbidden) for side in SIDES]
-    put_down = put_down_stage(
-        Primitive("put_down", cube), f"put the {color} cube on the table", forbidden
-    )
-    return (*plan, put_down, press_stage(forbids=(*wrong_picks, too_often)))
+        plan += [_swing(cube, side, ordinal) for side in SIDES]
+    put_down = Primitive("put_down", cube)
+    plan.append(put_down_stage(put_down, f"put the {color} cube on the table"))
+    before_press = [stage.forbidding(*wrong_picks, PRESSED, too_often) for stage in plan]
+    return (*before_press, press_stage().forbidding(*wrong_picks, too_often))
 
 
 def _too_often(cube: str, visits: int) -> Rule:
@@ -141,12 +113,11 @@ def _too_often(cube: str, visits: int) -> Rule:
     return Rule(limit, "moved the cube over a target too often")
 
 
-def _swing(cube: str, side: str, ordinal: str, forbidden: tuple[Fact | Rule, ...]) -> Stage:
+def _swing(cube: str, side: str, ordinal: str) -> Stage:
     """Return the stage in which the cube is carried over the target on a side."""
     target = f"target_{side}"
     return Stage(
         expects=Fact("over", cube, target),
-        forbids=forbidden,
         primitive=Primitive("move_over", cube, target),
         subgoal=f"move to the top of the {side}-side target {{at}} for the {ordinal} time",
         points_at=target,

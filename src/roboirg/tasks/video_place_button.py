@@ -12,6 +12,7 @@ from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.core.goal_slots import MOMENTS
 from roboirg.tasks.shared import video_place
+from roboirg.tasks.shared.fixtures import goals_by_color
 from roboirg.tasks.shared.stages import PRESSED
 from roboirg.tasks.task import SceneAndGoal, Task
 from roboirg.util.random_draws import draw
@@ -25,8 +26,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
 
     The goal is the cube of the video, on the disc before or after the press.
     """
-    cubes = video_place.CUBES[difficulty]
-    table = video_place.draw_table(rng, cubes, DISCS[difficulty], SITE_RADIUS)
+    table = video_place.draw_table(rng, difficulty, DISCS[difficulty], SITE_RADIUS)
     cube = table.cube
     before = Fact("placed", cube.name, "target_0")
     after = Fact("placed", cube.name, "target_1")
@@ -38,10 +38,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
 
 def goals(scene: Scene) -> tuple[Goal, ...]:
     """Return a goal for every cube and the disc used before or after the press."""
-    goals: list[Goal] = []
-    for color in video_place.colors_of(scene):
-        goals += [Goal.of(color=color, relation=relation) for relation in MOMENTS]
-    return tuple(goals)
+    return goals_by_color(scene, "cube", "relation", MOMENTS)
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:

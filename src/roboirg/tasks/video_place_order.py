@@ -12,7 +12,7 @@ import numpy as np
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Goal, Scene, Stage
 from roboirg.tasks.shared import video_place
-from roboirg.tasks.shared.fixtures import draw_number
+from roboirg.tasks.shared.fixtures import draw_number, goals_by_color
 from roboirg.tasks.shared.stages import PRESSED
 from roboirg.tasks.shared.video_place import PlaceTable
 from roboirg.tasks.task import SceneAndGoal, Task
@@ -29,8 +29,7 @@ def sample(rng: np.random.Generator, difficulty: Difficulty) -> SceneAndGoal:
 
     The press comes after the first placing at the earliest, and after the last at the latest.
     """
-    cubes = video_place.CUBES[difficulty]
-    table = video_place.draw_table(rng, cubes, DISCS, SITE_RADIUS)
+    table = video_place.draw_table(rng, difficulty, DISCS, SITE_RADIUS)
     shown = _draw_placings(rng, table)
     placement = draw_number(rng, (1, len(shown)))
     pressed_after = draw_number(rng, (1, len(shown)))
@@ -50,10 +49,7 @@ def _draw_placings(rng: np.random.Generator, table: PlaceTable) -> list[Fact]:
 def goals(scene: Scene) -> tuple[Goal, ...]:
     """Return a goal for every cube and every disc that was visited."""
     placements = range(1, len(video_place.visited(scene)) + 1)
-    goals: list[Goal] = []
-    for color in video_place.colors_of(scene):
-        goals += [Goal.of(color=color, placement=placement) for placement in placements]
-    return tuple(goals)
+    return goals_by_color(scene, "cube", "placement", placements)
 
 
 def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:

@@ -155,23 +155,17 @@ def stages(scene: Scene, goal: Goal) -> tuple[Stage, ...]:
     target = scene.past[0].subject  # the cube that the video shows picked up
     cubes = scene.of_kind("cube")
     wrong_picks = facts_of_others("picked", cubes, target)
+    release = Primitive("put_down", target, height=OWN_RELEASE)
     plan: list[Stage] = []
     for ordinal in ORDINALS[: goal.number("repeats")]:
-        pick = pick_stage(
-            target,
-            f"pick up the correct cube {{at}} for the {ordinal} time",
-            (*wrong_picks, _early_press("pick")),
-            timer="pick",
-        )
-        put_down = put_down_stage(
-            Primitive("put_down", target, height=OWN_RELEASE),
-            "put it down",
-            (*wrong_picks, _early_press("put down")),
-            timer="put down",
-        )
-        plan += [pick, put_down]
-    all_picks = tuple(Fact("picked", cube.name) for cube in cubes)
-    return (*plan, press_stage("press the button {at} to finish", all_picks))
+        subgoal = f"pick up the correct cube {{at}} for the {ordinal} time"
+        pick = pick_stage(target, subgoal, timer="pick")
+        put_down = put_down_stage(release, "put it down", timer="put down")
+        plan.append(pick.forbidding(*wrong_picks, _early_press("pick")))
+        plan.append(put_down.forbidding(*wrong_picks, _early_press("put down")))
+    all_picks = [Fact("picked", cube.name) for cube in cubes]
+    press = press_stage("press the button {at} to finish")
+    return (*plan, press.forbidding(*all_picks))
 
 
 def _early_press(timer: str) -> Rule:

@@ -6,10 +6,15 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from roboirg.analysis.figures.figure_style import panels, paper
+from roboirg.analysis.figures.figure_style import paper
+from roboirg.analysis.figures.panels import RowLabel, panels
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.option_labels import options_label, options_sort_key
-from roboirg.analysis.tables.diagnostic_tables import FAILURES, count_failures
+from roboirg.analysis.tables.diagnostic_tables import (
+    FAILURES,
+    count_failures,
+    occurring_failures,
+)
 from roboirg.analysis.tables.table_notes import where_played
 
 if TYPE_CHECKING:
@@ -40,10 +45,7 @@ COLORS = dict(zip(FAILURES, (*_ORANGE, *_BLUE, *_GRAY, "#eeeeee"), strict=True))
 def draw_failures(content: RunData) -> Figure | None:
     """Draw the shares of episodes by cause of failure; return None without failures."""
     counts_by_bar = count_failures(content.frame, ("run", "options"))
-    occurring: Counter[str] = Counter()
-    for counts in counts_by_bar.values():
-        occurring += counts
-    causes = [name for name in COLORS if occurring[name]]
+    causes = occurring_failures(counts_by_bar.values())
     if not causes:
         return None
 
@@ -51,17 +53,16 @@ def draw_failures(content: RunData) -> Figure | None:
     settings = sorted({options for _, options in counts_by_bar}, key=options_sort_key)
     figure, drawn = panels(
         titles=list(map(content.name, runs)),
-        labels=list(map(options_label, settings)),
+        labels=[RowLabel(options_label(options)) for options in settings],
         most_across=MOST_COLUMNS,
         keys=_keys(causes),
         notes=[NOTE, where_played(runs)],
     )
     for panel, run in zip(drawn, runs, strict=True):
         for place, options in zip(panel.places, settings, strict=True):
-            _draw_bar(panel.axes, place, counts_by_bar.get((run, options), Counter()), causes)
-        panel.axes.set_xlim(0, 100)
-        panel.axes.set_xticks(range(0, 101, 25))
-        panel.axes.set_xlabel("share of the episodes with a verdict, %", fontsize=6.5)
+            counts = counts_by_bar.get((run, options), Counter())
+            _draw_bar(panel.axes, place, counts, causes)
+        panel.set_scale(100, 25, "share of the episodes with a verdict, %")
     return figure
 
 

@@ -6,7 +6,8 @@ compared on the tasks that all of them played; published ones stand apart, below
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from roboirg.analysis.comparability import (
@@ -20,7 +21,7 @@ from roboirg.analysis.comparability import (
 from roboirg.analysis.figures.rates import Rate, RateRow, RateWords, draw_rates
 from roboirg.analysis.measures.measure import Measured, measure_groups
 from roboirg.analysis.measures.run_data import RunData
-from roboirg.analysis.published import TRIALS, RateTable, published_rows
+from roboirg.analysis.published import TRIALS, PublishedRow, RateTable, published_rows
 from roboirg.analysis.results.frame import RunNames
 from roboirg.analysis.results.option_labels import options_label
 from roboirg.analysis.results.policy_run import PolicyRun
@@ -40,8 +41,8 @@ SIZE_NOTE = (
 )
 PUBLISHED_NOTE = "published: the same tasks, the paper's instructions and simulator."
 WORDS = {
-    "main": RateWords("success", "success with explicit instructions", "with implicit ones"),
-    "context": RateWords("success", "success with stages 1,5", "with more stages"),
+    "main": RateWords("success with explicit instructions", "with implicit ones"),
+    "context": RateWords("success with stages 1,5", "with more stages"),
 }
 
 Tasks = Mapping[InstructionOptions, Sequence[str]]
@@ -62,54 +63,137 @@ def draw_next_to_reference(which: RateTable, content: RunData, published: bool) 
         The figure. None without data, and for contexts if there is only one, as in a run of the
         usual settings.
     """
-    played = _played(which, content.cells)
-    tasks: Tasks = _published_tasks(which)  # without results, only the paper's rates are drawn
-    if content.cells:
-        tasks = _shared_tasks(which, played)
-    if which == "context" and len(tasks) <= 1:
-        return None
-    tasks = _without_reference(which, tasks)
-
-    gray_rows = list(_published_rate_rows(which, tasks)) if published else []
-    cells = _cells_behind(which, tasks, content.cells)
+    columns = _Columns(which, _compared_tasks(which, content.cells))
+    gray_rows = columns.rows_of_paper() if published else []
+    cells = columns.cells_behind(content.cells)
     differences = {}
     if gray_rows:
         differences = {key: differences_of(key, cell) for key, cell in cells.items()}
 
+    own_rates = columns.own_rates(content)
     rows = []
+    for policy_run, rates in own_rates.items():
+        label = content.name(policy_run) + _size_and_sign(policy_run, cells, differences)
+        rows.append(RateRow(label, rates))
     notes = []
-    drawn_runs = []
-    for policy_run in content.frame.names:
-        rates = _own_rates(which, policy_run, played, tasks)
-        if rates:
-            drawn_runs.append(policy_run)
-            label = content.name(policy_run) + _size_and_sign(policy_run, cells, differences)
-            rows.append(RateRow(label, rates))
     if rows:
-        notes += [SIZE_NOTE, where_played(drawn_runs)]
+        notes += [SIZE_NOTE, where_played(own_rates)]
     if gray_rows:
-        trials = TRIALS[which]
-        rows.append(RateRow(f"published, n = {trials.episodes} × {trials.seeds}", {}))
         rows += gray_rows
         notes.append(PUBLISHED_NOTE)
         notes += _signed_notes(differences, content.frame.names)
-    columns = _columns(which, tasks, rows)
-    if not columns:
+    titles = columns.titles(rows)
+    if not titles:
         return None
-    return draw_rates(columns, rows, WORDS[which], notes)
+    return draw_rates(titles, rows, WORDS[which], notes)
 
 
-def _columns(which: RateTable, tasks: Tasks, rows: Sequence[RateRow]) -> dict[str, str]:
-    """Return the titles of the columns in which some row has a rate, and what each is over.
+@dataclass(frozen=True)
+class _Columns:
+    """The columns of a figure.
 
-    For example ``{"temporal": "mean over 4 tasks", "ordinal": "PickXtimes"}``.
+    Attributes:
+        which: the table of the paper whose rates are drawn.
+        tasks: over which the rates of each column are, and the references next to them.
     """
-    columns = {}
-    for options, names in tasks.items():
-        title = _title(which, options)
-        if any(title in row.rates for row in rows):
-            columns[title] = names[0] if len(names) == 1 else f"mean over {len(names)} tasks"
-    return columns
+
+    which: RateTable
+    tasks: Tasks
+
+    @property
+    def reference(self) -> InstructionOptions:
+        """The options of the rates that others are compared with."""
+        return PAPER_TABLES[self.which].reference()
+
+    def title(self, options: InstructionOptions) -> str:
+        if self.which == "main":
+            return options_label(options)
+        return f"stages {stages_text(options)}"
+
+    def titles(self, rows: Sequence[RateRow]) -> dict[str, str]:
+        """Return the titles of the columns in which some row has a rate, and what each is over.
+
+        For example ``{"temporal": "mean over 4 tasks", "ordinal": "PickXtimes"}``.
+        """
+        titles = {}
+        for options, names in self.tasks.items():
+            title = self.title(options)
+            if any(title in row.rates for row in rows):
+                titles[title] = names[0] if len(names) == 1 else f"mean over {len(names)} tasks"
+        return titles
+
+    def cells_behind(self, cells: Cells) -> dict[CellKey, Cell]:
+        """Return the cells with a verdict behind the columns, and behind the reference.
+
+        The reference has the tasks of all columns.
+        """
+        drawn: set[tuple[InstructionOptions, str]] = set()
+        for options, names in self.tasks.items():
+            for task in names:
+                drawn.add((options, task))
+                drawn.add((self.reference, task))
+        behind = {}
+        for key, cell in cells.items():
+            if cell.verdicts and (key.options, key.task) in drawn:
+                behind[key] = cell
+        return behind
+
+    def own_rates(self, content: RunData) -> dict[PolicyRun, dict[str, Rate]]:
+        """Return the rates of each policy run by title, over exactly the column's tasks.
+
+        Columns, and policy runs, without results are left out.
+        """
+        played = _played(self.which, content.cells)
+        rates_of_runs = {}
+        for policy_run in content.frame.names:
+            groups = {}
+            for options, names in self.tasks.items():
+                by_task = played.get(options, {}).get(policy_run)
+                if by_task is not None:
+                    groups[(options,)] = {task: by_task[task] for task in names}
+            if groups:
+                explicit = played.get(self.reference, {}).get(policy_run, NOTHING)
+                rates_of_runs[policy_run] = self._measured(groups, explicit)
+        return rates_of_runs
+
+    def _measured(
+        self, groups: Mapping[tuple[InstructionOptions], ByTask], others: ByTask
+    ) -> dict[str, Rate]:
+        """Return the rates of a policy run by title, given its cells at the reference."""
+
+        def reference(key: tuple[InstructionOptions]) -> ByTask:
+            if key == (self.reference,):
+                return NOTHING  # it is not compared with itself
+            return others
+
+        rates = {}
+        for measured in measure_groups(groups, reference, is_mean=lambda _key: True):
+            (options,) = measured.key
+            rates[self.title(options)] = _rate(measured)
+        return rates
+
+    def rows_of_paper(self) -> list[RateRow]:
+        """Return a heading and a row for each published policy, that with the best reference first.
+
+        Its rates and references are over the tasks of the columns, if the paper has a rate for
+        each. Without any there is no heading.
+        """
+        published = {(row.model, row.options): row for row in published_rows(self.which)}
+        references = [row for row in published.values() if row.options == self.reference]
+        rows = []
+        for reference in sorted(references, key=lambda row: -row.average):
+            rates = {}
+            for options, names in self.tasks.items():
+                row = published.get((reference.model, options))
+                rate = None if row is None else _published_rate(row, reference, names)
+                if rate is not None:
+                    rates[self.title(options)] = rate
+            if rates:
+                rows.append(RateRow(reference.model, rates))
+        if not rows:
+            return []
+        trials = TRIALS[self.which]
+        return [RateRow(f"published, n = {trials.episodes} × {trials.seeds}", {}), *rows]
 
 
 def _signed_notes(differences: AllDifferences, names: RunNames) -> list[str]:
@@ -121,11 +205,19 @@ def _signed_notes(differences: AllDifferences, names: RunNames) -> list[str]:
     return notes
 
 
-def _title(which: RateTable, options: InstructionOptions) -> str:
-    """Return the title of a column."""
-    if which == "main":
-        return options_label(options)
-    return f"stages {stages_text(options)}"
+def _compared_tasks(which: RateTable, cells: Cells) -> Tasks:
+    """Return the tasks of the columns other than the reference's, or of that if it is alone.
+
+    Without results these are the columns of the paper. Contexts need several.
+    """
+    tasks: dict[InstructionOptions, list[str]] = _published_tasks(which)
+    if cells:
+        tasks = _shared_tasks(which, _played(which, cells))
+    if len(tasks) > 1:
+        tasks.pop(PAPER_TABLES[which].reference(), None)
+    elif which == "context":
+        return {}
+    return tasks
 
 
 def _played(which: RateTable, cells: Cells) -> Played:
@@ -167,56 +259,6 @@ def _published_tasks(which: RateTable) -> dict[InstructionOptions, list[str]]:
     return tasks
 
 
-def _without_reference(which: RateTable, tasks: Tasks) -> Tasks:
-    """Return the columns other than the reference; the reference only if there is nothing else."""
-    others = dict(tasks)
-    others.pop(PAPER_TABLES[which].reference(), None)
-    return others or tasks
-
-
-def _cells_behind(which: RateTable, tasks: Tasks, cells: Cells) -> dict[CellKey, Cell]:
-    """Return the cells with a verdict behind the columns, and behind the reference next to them.
-
-    The reference has the tasks of all columns.
-    """
-    drawn: set[tuple[InstructionOptions, str]] = set()
-    for options, names in tasks.items():
-        for task in names:
-            drawn.add((options, task))
-            drawn.add((PAPER_TABLES[which].reference(), task))
-    behind = {}
-    for key, cell in cells.items():
-        if cell.verdicts and (key.options, key.task) in drawn:
-            behind[key] = cell
-    return behind
-
-
-def _own_rates(
-    which: RateTable, policy_run: PolicyRun, played: Played, tasks: Tasks
-) -> dict[str, Rate]:
-    """Return the rates of a policy run by column, over exactly the column's tasks.
-
-    A column is left out if the policy run has no results in it.
-    """
-    reference_options = PAPER_TABLES[which].reference()
-    groups = {}
-    for options, names in tasks.items():
-        by_task = played.get(options, {}).get(policy_run)
-        if by_task is not None:
-            groups[(options,)] = {task: by_task[task] for task in names}
-
-    def reference(key: tuple[InstructionOptions]) -> ByTask:
-        if key == (reference_options,):
-            return NOTHING  # it is not compared with itself
-        return played.get(reference_options, {}).get(policy_run, NOTHING)
-
-    rates = {}
-    for measured in measure_groups(groups, reference, is_mean=lambda _key: True):
-        (options,) = measured.key
-        rates[_title(which, options)] = _rate(measured)
-    return rates
-
-
 def _rate(measured: Measured[tuple[InstructionOptions]]) -> Rate:
     """Return a rate, next to that of the reference if there is one."""
     rate = float(measured.rate or 0)
@@ -256,27 +298,17 @@ def _size_and_sign(policy_run: PolicyRun, cells: Cells, differences: AllDifferen
     return ", " + text.replace(" ", NO_BREAK)
 
 
-def _published_rate_rows(which: RateTable, tasks: Tasks) -> Iterator[RateRow]:
-    """Yield a row for each published policy, that with the best reference first.
+def _published_rate(
+    row: PublishedRow, reference: PublishedRow, tasks: Sequence[str]
+) -> Rate | None:
+    """Return a published rate over some tasks, next to the reference's unless it is that itself.
 
-    Its rates and references are over the tasks of the columns, if the paper has a rate for each.
+    None if either lacks the rate of a task.
     """
-    reference_options = PAPER_TABLES[which].reference()
-    published = {(row.model, row.options): row for row in published_rows(which)}
-    references = [row for row in published.values() if row.options == reference_options]
-    for reference in sorted(references, key=lambda row: -row.average):
-        rates = {}
-        for options, names in tasks.items():
-            row = published.get((reference.model, options))
-            if row is None:
-                continue
-            percent = row.average_over(names)
-            reference_percent = reference.average_over(names)
-            if percent is None or reference_percent is None:
-                continue
-            rate = Rate(float(percent) / 100)
-            if row is not reference:
-                rate = rate._replace(reference=float(reference_percent) / 100)
-            rates[_title(which, options)] = rate
-        if rates:
-            yield RateRow(reference.model, rates)
+    percent = row.average_over(tasks)
+    reference_percent = reference.average_over(tasks)
+    if percent is None or reference_percent is None:
+        return None
+    if row is reference:
+        return Rate(float(percent) / 100)
+    return Rate(float(percent) / 100, float(reference_percent) / 100)

@@ -6,13 +6,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from roboirg.analysis.figures.figure_style import (
-    GHOST,
-    Panel,
-    first_color,
-    panels,
-    paper,
-)
+from roboirg.analysis.figures.figure_style import GHOST, first_color, paper
+from roboirg.analysis.figures.panels import Panel, RowLabel, panels
 from roboirg.stats.intervals import Interval
 from roboirg.stats.rates import points
 
@@ -53,15 +48,13 @@ class RateRow(NamedTuple):
 
 
 class RateWords(NamedTuple):
-    """What the legend calls rates.
+    """What the legend calls rates next to each other.
 
     Attributes:
-        alone: a rate that stands alone.
         reference: one that others are compared with.
         compared: one next to a reference.
     """
 
-    alone: str
     reference: str
     compared: str
 
@@ -81,30 +74,23 @@ def draw_rates(
         notes: sentences below the legend.
     """
     labels = []
-    headings = []
     rates: list[Rate] = []
     for row in rows:
-        labels.append(row.label)
+        labels.append(RowLabel(row.label, is_heading=not row.rates))
         rates += row.rates.values()
-        if not row.rates:
-            headings.append(row.label)
     figure, drawn = panels(
         titles=list(columns),
         labels=labels,
         most_across=MOST_COLUMNS,
         keys=_keys(rates, words),
         notes=notes,
-        headings=headings,
     )
     end = _end_of_scale(rates)
     # A narrow panel has no room for all numbers.
     tick = TICK if len(columns) < MOST_COLUMNS else 2 * TICK
     for panel, (column, below) in zip(drawn, columns.items(), strict=True):
         _draw_column(panel, column, rows)
-        # With some room for the dots at both ends.
-        panel.axes.set_xlim(-0.04 * end, 1.04 * end)
-        panel.axes.set_xticks(range(0, end + 1, tick))
-        panel.axes.set_xlabel(below, fontsize=6.5)
+        panel.set_scale(end, tick, below, margin=0.04)  # for the dots at both ends
     return figure
 
 
@@ -167,7 +153,7 @@ def _keys(rates: Sequence[Rate], words: RateWords) -> dict[str, Artist]:
         keys[f"{words.reference}, %"] = _key_dot(paper())
         keys[f"{words.compared}; number: difference"] = _key_dot(GHOST)
     else:
-        keys[f"{words.alone}, %"] = _key_dot(GHOST)
+        keys["success, %"] = _key_dot(GHOST)
     if interval_label:
         keys[interval_label] = Line2D([], [], color=GHOST, **BAND)
     return keys

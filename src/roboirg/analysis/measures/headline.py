@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from roboirg.stats.intervals import (
     Draws,
     Interval,
     Rows,
+    rates_of,
     resampled_interval,
     resampled_rates,
 )
@@ -110,64 +112,71 @@ def measure_headline(
         policy_run: whose number it is.
         settings: over which the gap is the mean.
     """
-    tasks = []
-    is_complete = True
-    for explicit, *others in _tasks_in_settings(cells, policy_run, settings):
-        rows = _paired_rows(others, explicit)
-        if len(rows):
-            tasks.append(rows)
-        if any(cell.errors or cell.missing for cell in (explicit, *others)):
-            is_complete = False
-    if not tasks or not _has_each_setting(tasks):
+    tasks = list(_tasks_in_settings(cells, policy_run, settings))
+    rows_of_tasks = [rows for rows in map(_paired_rows, tasks) if len(rows)]
+    if not rows_of_tasks:
         return None
+    gap = _mean_gap([rates_of(rows.sum(axis=0, keepdims=True)) for rows in rows_of_tasks])
+    if np.isnan(gap):
+        return None  # a setting has no trials in any task
 
     rng = np.random.default_rng(SEED)
-    # A resample of a single row, the sum of all episodes, gives the rates themselves.
-    rates = [resampled_rates([rows.sum(axis=0)[None]], rng, draws=1) for rows in tasks]
-    resampled = [resampled_rates([rows], rng) for rows in tasks]
-    (gap,) = _mean_gap(rates)
-    episodes = list(map(len, tasks))  # of each task
-    interval = resampled_interval(_mean_gap(resampled), episodes, least=-1.0)
-    return Headline(tuple(settings), float(gap), interval, sum(episodes), is_complete)
+    resampled_gaps = _mean_gap([resampled_rates([rows], rng) for rows in rows_of_tasks])
+    episodes = list(map(len, rows_of_tasks))  # of each task
+    return Headline(
+        settings=tuple(settings),
+        gap=float(gap[0]),
+        interval=resampled_interval(resampled_gaps, episodes, least=-1.0),
+        episodes=sum(episodes),
+        is_complete=all(task.is_complete for task in tasks),
+    )
+
+
+class _TaskCells(NamedTuple):
+    """The cells of a task.
+
+    Attributes:
+        explicit: that in explicit.
+        in_settings: one for each other setting, empty if it was not played.
+    """
+
+    explicit: Cell
+    in_settings: list[Cell]
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether every planned trial has a verdict."""
+        cells = (self.explicit, *self.in_settings)
+        return not any(cell.errors or cell.missing for cell in cells)
 
 
 def _tasks_in_settings(
     cells: Cells, policy_run: PolicyRun, settings: Sequence[str]
-) -> Iterator[list[Cell]]:
-    """Yield for each task its cell in explicit, and then that in each of some settings.
-
-    A cell is empty if the setting was not played.
-    """
+) -> Iterator[_TaskCells]:
+    """Yield the cells of each task that a policy run played in explicit."""
     for key, explicit in cells.items():
         if key.policy_run != policy_run or key.options != REFERENCE_OPTIONS:
             continue
-        cells_of_task = [explicit]
+        in_settings = []
         for setting in settings:
             options = replace(key.options, setting=setting)
-            cells_of_task.append(cells.get(key._replace(options=options), Cell()))
-        yield cells_of_task
+            in_settings.append(cells.get(key._replace(options=options), Cell()))
+        yield _TaskCells(explicit, in_settings)
 
 
-def _has_each_setting(tasks: Sequence[Rows]) -> bool:
-    """Return whether each setting has trials in some task, given the rows of `_paired_rows`."""
-    # The second column of each setting counts its trials.
-    trials = np.concatenate(tasks)[:, 1::_PAIR]
-    return bool(trials.any(axis=0).all())
-
-
-def _paired_rows(settings: Sequence[Cell], explicit: Cell) -> Rows:
+def _paired_rows(task: _TaskCells) -> Rows:
     """Return a row for each episode of a task: the columns of `Pairs.rows` for each setting.
 
     They are 0 where the setting has no verdict; an episode without any is left out. Two settings,
     for example, have eight columns.
     """
-    episodes = np.array(sorted(explicit.by_episode()))
-    rows = np.zeros((len(episodes), _PAIR * len(settings)), dtype=np.int64)
-    for number, cell in enumerate(settings):
+    episodes = np.array(sorted(task.explicit.by_episode()))
+    rows = np.zeros((len(episodes), _PAIR * len(task.in_settings)), dtype=np.int64)
+    for number, cell in enumerate(task.in_settings):
         # Both are sorted by episode, as the rows of pairs are.
         is_shared = np.isin(episodes, list(cell.by_episode()))
         begin = _PAIR * number
-        rows[is_shared, begin : begin + _PAIR] = Pairs.of(cell, explicit).rows
+        rows[is_shared, begin : begin + _PAIR] = Pairs.of(cell, task.explicit).rows
     return rows[rows.any(axis=1)]
 
 

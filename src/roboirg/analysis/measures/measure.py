@@ -139,6 +139,19 @@ def measure(
     """
     changed = against or {}
     _check(frame, by, changed, family, pool)
+    return _measure_against(_trials_of_groups(frame, by, pool), by, changed, family)
+
+
+def _trials_of_groups(
+    frame: Columns, by: Sequence[str], pool: Sequence[str]
+) -> Mapping[Key, ByTask]:
+    """Return the trials of each group, each of which has one value in the columns kept apart.
+
+    Args:
+        frame: with the columns.
+        by: columns whose values make a group.
+        pool: columns over whose values a rate may be taken.
+    """
     apart = [name for name in KEPT_APART if name in frame and name not in (*by, *pool)]
     rows = _known_rows(frame, (*by, *apart, *pool, *TRIAL))
     _check_apart(rows, by, apart)
@@ -151,8 +164,7 @@ def measure(
             "Several rows of a group are about the same trial of an episode; choose some of them, "
             f"or group by a column in which they differ, next to {', '.join(by)}."
         )
-
-    return _measure_against(groups, by, changed, family)
+    return groups
 
 
 def _measure_against(

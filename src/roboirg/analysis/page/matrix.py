@@ -31,15 +31,8 @@ def make_matrix(episodes: PageEpisodes) -> JsonObject:
     data = episodes.data
     columns = sorted({key.options for key in data.cells}, key=options_sort_key)
     rows = _rows(data.cells)
-    summaries_by_level: dict[str, Summaries] = {"": data.summaries}  # first, of all episodes
-    occurring = {record.difficulty for record in episodes.records}
-    if len(occurring) > 1:
-        for level in DIFFICULTIES:
-            if level in occurring:
-                cells_of_level = cells_of(data.frame.where(difficulty=level))
-                summaries_by_level[level] = summarize(cells_of_level)
     levels = []
-    for difficulty, summaries in summaries_by_level.items():
+    for difficulty, summaries in _summaries_by_level(episodes).items():
         cells = _cells(episodes, summaries, columns, list(rows))
         levels.append({"difficulty": difficulty, "cells": cells})
     return {
@@ -48,6 +41,19 @@ def make_matrix(episodes: PageEpisodes) -> JsonObject:
         "rows": [{"name": name, **scope} for name, scope in rows.items()],
         "levels": levels,
     }
+
+
+def _summaries_by_level(episodes: PageEpisodes) -> dict[str, Summaries]:
+    """Return what was measured of all episodes, by an empty text, and of each difficulty."""
+    data = episodes.data
+    summaries = {"": data.summaries}
+    occurring = {record.difficulty for record in episodes.records}
+    if len(occurring) > 1:
+        for difficulty in DIFFICULTIES:
+            if difficulty in occurring:
+                cells = cells_of(data.frame.where(difficulty=difficulty))
+                summaries[difficulty] = summarize(cells)
+    return summaries
 
 
 def _heading(options: InstructionOptions) -> JsonObject:

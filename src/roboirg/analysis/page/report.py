@@ -6,7 +6,7 @@ import base64
 import contextlib
 import json
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from roboirg.analysis.measures.breakdowns import BREAKDOWNS
@@ -82,25 +82,28 @@ def write_report(
         progress: called after each episode.
     """
     check_page_support("The report")
-    if served:
-        path = source.folder / REPORT_FILE
-    else:
-        path = out or _usual_path(source)
     sources = [source]
     if against is not None:
         sources.append(against)
     runs = _by_name(sources)
     episodes = PageEpisodes.of(runs, videos=videos)
     if served:
+        path = source.folder / REPORT_FILE
         details = EpisodeDetails(path.parent, embeds=False)
     else:
-        size = sum(media.stat().st_size for media in _media(episodes).values())
-        unpacked = [run.unpacked for run in sources if run.unpacked is not None]
-        details = EpisodeDetails(path.parent, embeds=size <= MAX_EMBEDDED_BYTES, gone=unpacked)
+        path = out or _usual_path(source)
+        details = _details(path.parent, episodes, sources)
     pieces = _render(episodes, details, progress)
     with replacing(path) as part, part.open("w", encoding="utf-8") as file:
         file.writelines(pieces)
     return path
+
+
+def _details(folder: Path, episodes: PageEpisodes, sources: Iterable[Source]) -> EpisodeDetails:
+    """Return the details for a page in a folder; videos are in the page unless they are large."""
+    size = sum(media.stat().st_size for media in _media(episodes).values())
+    unpacked = [run.unpacked for run in sources if run.unpacked is not None]
+    return EpisodeDetails(folder, embeds=size <= MAX_EMBEDDED_BYTES, gone=unpacked)
 
 
 def _by_name(sources: Sequence[Source]) -> dict[str, Source]:

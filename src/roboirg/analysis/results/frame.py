@@ -341,24 +341,27 @@ def _missing_rows(
     return rows
 
 
-class _RowPlace(NamedTuple):
-    """Where a row belongs in a frame: places are compared number by number.
+class _Groups(NamedTuple):
+    """What rows are grouped by, such as their tasks.
 
     Attributes:
-        run: number of its policy run.
-        task: number of its task.
-        options: number of its instruction options.
-        episode: its episode.
-        policy_seed: its policy seed.
-        row: its number among the rows as they were given.
+        values: the distinct values, in the order of the frame.
+        numbers: of each row's value among these.
     """
 
-    run: int
-    task: int
-    options: int
-    episode: int
-    policy_seed: int
-    row: int
+    values: Values
+    numbers: list[int]
+
+    @classmethod
+    def of(cls, values: Sequence[Any], key: Callable[[Any], SortKey]) -> _Groups:
+        """Return the groups of rows with some values, which are sorted by a key."""
+        distinct = sorted(dict.fromkeys(values), key=key)
+        numbers = {value: number for number, value in enumerate(distinct)}
+        return cls(as_column(distinct), [numbers[value] for value in values])
+
+    def column(self, rows: Iterable[int]) -> Values:
+        """Return the values of some rows; equal ones are the same object, found faster later."""
+        return self.values[[self.numbers[row] for row in rows]]
 
 
 def _sorted(rows: Sequence[_FrameRow], policies: Sequence[str]) -> Frame:
@@ -370,26 +373,26 @@ def _sorted(rows: Sequence[_FrameRow], policies: Sequence[str]) -> Frame:
         rows: in any order.
         policies: those that come first, in this order.
     """
-    # Each policy run, task and set of options with its number in the order of the frame.
-    runs = _numbered((row.policy_run for row in rows), lambda run: _run_key(run, policies))
-    tasks = _numbered((row.job.task for row in rows), _task_key)
-    options = _numbered((row.job.column for row in rows), options_sort_key)
-    places = []
-    for number, row in enumerate(rows):
-        job = row.job
-        groups = (runs[row.policy_run], tasks[job.task], options[job.column])
-        places.append(_RowPlace(*groups, job.episode, job.policy_seed, number))
-    places.sort()
+    jobs = [row.job for row in rows]
+    runs = _Groups.of([row.policy_run for row in rows], lambda run: _run_key(run, policies))
+    tasks = _Groups.of([job.task for job in jobs], _task_key)
+    options = _Groups.of([job.column for job in jobs], options_sort_key)
+    groups = zip(runs.numbers, tasks.numbers, options.numbers, strict=True)
+    order = _order(groups, jobs)
 
-    ordered = [rows[place.row] for place in places]
-    # Equal values become the same object, which later groups are found by faster.
-    distinct_runs = as_column(list(runs))
-    distinct_options = as_column(list(options))
-    columns = _columns_of(ordered)
-    columns["place"] = np.array([place.row for place in places], dtype=np.int64)
-    columns["run"] = distinct_runs[[place.run for place in places]]
-    columns["options"] = distinct_options[[place.options for place in places]]
+    columns = _columns_of([rows[row] for row in order])
+    columns["place"] = np.array(order, dtype=np.int64)
+    columns["run"] = runs.column(order)
+    columns["options"] = options.column(order)
     return Frame(columns)
+
+
+def _order(groups: Iterable[tuple[int, ...]], jobs: Sequence[Job]) -> list[int]:
+    """Return the numbers of the rows, sorted by group and within it by episode and policy seed."""
+    places = []
+    for row, (group, job) in enumerate(zip(groups, jobs, strict=True)):
+        places.append((group, job.episode, job.policy_seed, row))
+    return [row for *_, row in sorted(places)]
 
 
 def _columns_of(rows: Sequence[_FrameRow]) -> dict[str, Values]:
@@ -411,12 +414,6 @@ def _run_key(run: PolicyRun, policies: Sequence[str]) -> SortKey:
     """Return a key that sorts policy runs: some policies first, in their order, others by name."""
     place = place_in(policies, run.policy)
     return (place, run.policy, run.run, repr(run.conditions), repr(run.versions), run.robot or "")
-
-
-def _numbered(values: Iterable[Any], key: Callable[[Any], Any]) -> dict[Any, int]:
-    """Return the distinct values, sorted by a key, each with its number: ``{"a": 0, "b": 1}``."""
-    ordered = sorted(dict.fromkeys(values), key=key)
-    return {value: number for number, value in enumerate(ordered)}
 
 
 def task_order(names: Iterable[str]) -> list[str]:

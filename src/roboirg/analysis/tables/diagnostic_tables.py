@@ -38,7 +38,6 @@ from roboirg.analysis.results.option_labels import (
     options_sort_key,
     setting_sort_key,
 )
-from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.analysis.results.run_cells import cells_of
 from roboirg.analysis.tables.arm_table import make_arm_table
 from roboirg.analysis.tables.facts_table import make_facts_table
@@ -53,7 +52,6 @@ from roboirg.analysis.tables.table import (
 )
 from roboirg.core import failures
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.instruction_options import InstructionOptions
 from roboirg.stats.cells import NOTHING, Key, rows_of
 from roboirg.stats.rates import (
     NOT_APPLICABLE,
@@ -76,6 +74,9 @@ OF_CELLS = ("policy and setting", "task")
 """Headings of tables with a row for each task in each setting of a policy."""
 RowCells = Sequence[Entry | str]
 """The cells of a row, as entries or as texts."""
+
+_A_TASK = 2
+"""Scopes of a group with a single task: that, and all tasks."""
 
 _WITH_VERDICT = ("success", "failure")
 """Outcomes of episodes that a rate counts; an error, for example, is none."""
@@ -203,6 +204,14 @@ def count_failures(frame: Frame, by: Sequence[str]) -> Mapping[Key, Counter[str]
     return counts_by_key
 
 
+def occurring_failures(counts: Iterable[Counter[str]]) -> list[str]:
+    """Return the names of the failures that some of the counts have, in the order of `FAILURES`."""
+    total: Counter[str] = Counter()
+    for counts_of_key in counts:
+        total += counts_of_key
+    return [name for name in FAILURES if name in total]
+
+
 def make_failure_table(data: RunData, *, means: bool = False) -> Table:
     """Make the table of how all episodes ended, and of what the gap to explicit consists.
 
@@ -234,7 +243,7 @@ def make_failure_table(data: RunData, *, means: bool = False) -> Table:
             "grounding of failures",
             "the same in explicit",
         ),
-        rows=_rows(ends, data, lambda key: _end_cells(ends[key])),
+        rows=_rows({key: _end_cells(rates) for key, rates in ends.items()}, data.frame),
         notes=(_RATES_NOTE, f"{_KINDS_NOTE} {_SHARES_NOTE}"),
     )
 
@@ -287,25 +296,21 @@ def make_failure_name_table(data: RunData) -> Table:
         InvalidValueError: no episode failed.
     """
     counts_by_scope = _failures_by_scope(data)
-    occurring: Counter[str] = Counter()
-    for counts in counts_by_scope.values():
-        occurring += counts
-    names = [name for name in FAILURES if name in occurring]
+    names = occurring_failures(counts_by_scope.values())
     if not names:
         raise InvalidValueError("No episode of the runs failed.")
 
-    def cells(key: ScopeKey) -> RowCells:
-        counts = counts_by_scope[key]
+    cells = {}
+    for key, counts in counts_by_scope.items():
         failed = [counts[name] for name in names]
-        return list(map(str, (counts["trials"], sum(failed), *failed)))
-
+        cells[key] = list(map(str, (counts["trials"], sum(failed), *failed)))
     failure_columns = [Column(name.replace("_", " "), FAILURES[name]) for name in names]
     return Table(
         key="failure_names",
         title="Failures by name",
         heads=OF_CELLS,
         columns=(*named_columns("trials", "failures"), *failure_columns),
-        rows=_rows(counts_by_scope, data, cells),
+        rows=_rows(cells, data.frame),
         notes=(f"Failed episodes, and how many of them failed in each way. {_KINDS_NOTE}",),
     )
 
@@ -336,62 +341,56 @@ def make_heard_table(data: RunData) -> Table:
         counts_by_scope[ScopeKey(run, ALL_TASKS, options)].append(counts_of_task)
     played = by_scope(data.cells)
     heard = by_scope(cells_of(data.frame.where(prompt="heard")))
-
-    def cells(key: ScopeKey) -> RowCells:
-        tasks = counts_by_scope[key]
-        episodes = sum(counts_of_task["episodes"] for counts_of_task in tasks)
+    cells = {}
+    for key, counts_of_tasks in counts_by_scope.items():
         of_all = Measured(key, played[key])
         of_heard = Measured(key, heard.get(key, NOTHING))
-        return (
-            str(episodes),
-            cut_text(tasks),
-            _rate(of_all),
-            str(of_heard.counts.trials),
-            _rate(of_heard),
-        )
-
+        cells[key] = _heard_cells(counts_of_tasks, of_all, of_heard)
     return Table(
         key="heard",
         title="Instructions that the policies' models read to the end",
         heads=OF_CELLS,
         columns=named_columns("episodes", "cut, %", "success, all", "heard", "success, heard"),
-        rows=_rows(counts_by_scope, data, cells),
+        rows=_rows(cells, data.frame),
         notes=(_HEARD_NOTE,),
     )
 
 
-def _rows(
-    keys: Iterable[ScopeKey], data: RunData, cells: Callable[[ScopeKey], RowCells]
-) -> list[Row]:
+def _heard_cells(
+    counts_of_tasks: Sequence[HeardCounts], of_all: ScopeSummary, of_heard: ScopeSummary
+) -> RowCells:
+    """Return the cells of a row: its prompts by task, and its rates over all and over the heard."""
+    episodes = sum(counts["episodes"] for counts in counts_of_tasks)
+    return (
+        str(episodes),
+        cut_text(counts_of_tasks),
+        _rate(of_all),
+        str(of_heard.counts.trials),
+        _rate(of_heard),
+    )
+
+
+def _rows(cells: Mapping[ScopeKey, RowCells], frame: Frame) -> list[Row]:
     """Return the rows of a table, with a group for each policy run and its options.
 
     The row of all tasks is the last of its group; it is left out if there is only one task.
 
     Args:
-        keys: what the rows are about.
-        data: of the runs.
-        cells: returns the cells of a row.
+        cells: of each row.
+        frame: with the labels of the policy runs, in order.
     """
-    runs = list(data.frame.names)
-    groups: dict[tuple[PolicyRun, InstructionOptions], list[ScopeKey]] = {}
-    for key in keys:
-        groups.setdefault((key.policy_run, key.options), []).append(key)
+    runs = list(frame.names)
 
-    def group_order(group: tuple[PolicyRun, InstructionOptions]) -> SortKey:
-        policy_run, options = group
-        return runs.index(policy_run), options_sort_key(options)
+    def row_order(key: ScopeKey) -> SortKey:
+        return runs.index(key.policy_run), options_sort_key(key.options), key.scope == ALL_TASKS
 
+    scopes = Counter((key.policy_run, key.options) for key in cells)  # how many each group has
     rows = []
-    for policy_run, options in sorted(groups, key=group_order):
-        in_group = groups[policy_run, options]
-        all_tasks = ScopeKey(policy_run, ALL_TASKS, options)
-        if all_tasks in in_group:
-            in_group.remove(all_tasks)
-            if len(in_group) != 1:
-                in_group.append(all_tasks)
-        label = data.frame.group_label(policy_run, options)
-        for key in in_group:
-            rows.append(Row(label, key.scope, cells(key)))
+    for key in sorted(cells, key=row_order):
+        is_repetition = key.scope == ALL_TASKS and scopes[key.policy_run, key.options] == _A_TASK
+        if not is_repetition:
+            label = frame.group_label(key.policy_run, key.options)
+            rows.append(Row(label, key.scope, cells[key]))
     return rows
 
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import operator
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.option_labels import (
@@ -69,29 +68,47 @@ _DECLARED = (
 """Keys of a policy's ``metadata``; the last four are also reported by its own process."""
 
 
+class _FactSheet:
+    """The facts of the run, or of a policy.
+
+    Attributes:
+        words: by name of a fact its values in words, each once, in the order of the records.
+        calls: numbers of steps and calls, and the most actions executed per call.
+    """
+
+    def __init__(self) -> None:
+        self.words: defaultdict[str, dict[str, None]] = defaultdict(dict)
+        self.calls: Counter[str] = Counter()
+
+    def add(self, facts: Facts) -> None:
+        for name, values in facts:
+            for value in values:
+                self.words[name] |= dict.fromkeys(_words(value))
+
+    def rows(self, owner: str) -> list[Row]:
+        rows = []
+        for name, words in self.words.items():
+            rows.append(Row(owner, name, ["; ".join(words) or NOT_REPORTED]))
+        return rows
+
+
 def make_facts_table(data: RunData) -> Table:
     """Make the table from the whole records of the runs of `data`."""
     results = data.frame.played
-    words: defaultdict[_FactKey, dict[str, None]] = defaultdict(dict)
-    for name, values in itertools.chain(_run_conditions(results), _run_counts(results, data)):
-        for value in values:
-            words[_FactKey(RUN, name)] |= dict.fromkeys(_words(value))
-    totals: defaultdict[str, Counter[str]] = defaultdict(Counter)
+    run = _FactSheet()
+    run.add(_run_conditions(results))
+    run.add(_run_counts(results, data))
+    policies: defaultdict[str, _FactSheet] = defaultdict(_FactSheet)
     for record in _last_played(data.records, results):
-        for name, value in _of_policy(record):
-            words[_FactKey(record.policy, name)] |= dict.fromkeys(_words(value))
-        total = totals[record.policy]
-        total.update(steps=record.steps, calls=record.calls)
-        total["executed"] = max(total["executed"], record.executed)
-    for policy, total in totals.items():
-        for name, value in _of_calls(total):
-            words[_FactKey(policy, name)] |= dict.fromkeys(_words(value))
+        policy = policies[record.policy]
+        policy.add(_of_policy(record))
+        policy.calls.update(steps=record.steps, calls=record.calls)
+        policy.calls["executed"] = max(policy.calls["executed"], record.executed)
 
-    rows = []
-    for owner in (RUN, *totals):
-        for key, its_words in words.items():
-            if key.owner == owner:
-                rows.append(Row(owner, key.name, ["; ".join(its_words) or NOT_REPORTED]))
+    rows = run.rows(RUN)
+    for name, policy in policies.items():
+        policy.add(_of_calls(policy.calls))
+        rows += policy.rows(name)
     return Table(
         key="facts",
         title="Facts of the run",
@@ -99,13 +116,6 @@ def make_facts_table(data: RunData) -> Table:
         columns=(Column("value", is_text=True),),
         rows=rows,
     )
-
-
-class _FactKey(NamedTuple):
-    """The run or the policy that a fact is about, and the fact's name."""
-
-    owner: str
-    name: str
 
 
 def _last_played(records: Iterable[Record], results: Iterable[Summary]) -> Iterator[Record]:
@@ -116,13 +126,13 @@ def _last_played(records: Iterable[Record], results: Iterable[Summary]) -> Itera
             yield record
 
 
-def _of_calls(total: Counter[str]) -> Iterator[tuple[str, object]]:
-    """Yield how many steps a policy's calls are for, given its numbers of steps and calls."""
+def _of_calls(calls: Counter[str]) -> Facts:
+    """Yield how many steps a policy's calls are for."""
     steps_per_call = None
-    if total["calls"]:
-        steps_per_call = f"{total['steps'] / total['calls']:.1f}"
-    yield "control steps per call, mean", steps_per_call
-    yield "actions executed per call, most", total["executed"] or None
+    if calls["calls"]:
+        steps_per_call = f"{calls['steps'] / calls['calls']:.1f}"
+    yield "control steps per call, mean", [steps_per_call]
+    yield "actions executed per call, most", [calls["executed"] or None]
 
 
 def _run_conditions(results: Sequence[Summary]) -> Facts:
@@ -151,19 +161,19 @@ def _run_counts(results: Sequence[Summary], data: RunData) -> Facts:
     yield "trials begun again", [begun_again]
 
 
-def _of_policy(record: Record) -> Iterator[tuple[str, object]]:
-    """Yield the facts of a policy that a record of it has; None is unknown."""
+def _of_policy(record: Record) -> Facts:
+    """Yield the facts of a policy that a record of it has."""
     version = record.server_version or record.policy_version
-    yield "version", _unless_unknown(version)
-    yield "reads the simulator's state", record.privileged
+    yield "version", [_unless_unknown(version)]
+    yield "reads the simulator's state", [record.privileged]
     # If a record lists any needs, what it does not list is not needed; else nothing is known.
     not_listed: object = [] if record.needs else None
     for name in _NEEDS:
-        yield name.replace("_", " "), record.needs.get(name, not_listed)
+        yield name.replace("_", " "), [record.needs.get(name, not_listed)]
     declared = _declared(record)
     for name in _DECLARED:
-        yield name.replace("_", " "), declared.get(name)
-    yield "prompts", _unless_unknown(record.prompt_verdict)
+        yield name.replace("_", " "), [declared.get(name)]
+    yield "prompts", [_unless_unknown(record.prompt_verdict)]
 
 
 def _unless_unknown(word: str) -> str | None:

@@ -17,12 +17,10 @@ from roboirg.analysis.published import (
     published_lines,
     published_rows,
 )
-from roboirg.analysis.results.frame import RunNames
 from roboirg.analysis.results.option_labels import (
     REFERENCE_OPTIONS,
     SortKey,
     setting_sort_key,
-    staged_options,
 )
 from roboirg.analysis.results.run_cells import CellKey, Cells
 from roboirg.analysis.tables.table import (
@@ -43,15 +41,15 @@ from roboirg.analysis.tables.table import (
 from roboirg.analysis.tables.table_kinds import (
     PAPER_TABLES,
     PaperTable,
+    TableResults,
     row_order,
-    stages_text,
 )
 from roboirg.analysis.tables.table_notes import notes_of
 from roboirg.core.errors import check_names
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.language.settings import EXPLICIT, all_settings, settings_of
+from roboirg.language.settings import all_settings, settings_of
 from roboirg.records.record import Job
-from roboirg.stats.cells import Cell, cell_interval
+from roboirg.stats.cells import cell_interval
 from roboirg.stats.intervals import SEED
 from roboirg.stats.rates import percent
 from roboirg.tasks import all_tasks, every_task
@@ -63,47 +61,50 @@ WHICH = (*PAPER_TABLES, COVERAGE)
 
 
 def make_table(
-    which: str, data: RunData | None, *, published: bool = False, floors: Sequence[str] = ()
+    which: str, data: RunData, *, published: bool = False, floors: Sequence[str] = ()
 ) -> Table:
     """Make one of the paper's tables.
 
     Args:
         which: main, planner, context, real, harder, other or coverage.
-        data: results, of which control arms are left out; None if only published rows are shown.
+        data: results, of which control arms are left out; without any, the table has no rows of
+            policies that were played.
         published: whether to add the paper's rows, and to say which rates can be compared.
         floors: those of `FLOORS` whose expected success is added below the policies.
     """
     if which == COVERAGE:
         return _coverage()
     check_names("table", [which], WHICH)
-    names: RunNames = {}
-    cells: Cells = {}
-    if data is not None:
-        names = data.told.frame.names_as_played
-        cells = data.told.cells
     table = PAPER_TABLES[which]
-    columns = table.columns(table.tasks(cells))
     # The harder settings have the tasks of a table of the paper, but no published rates.
     shows_published = published and table.of_paper == table.name
-    differences: AllDifferences = {}
-    if shows_published:
-        differences = {key: differences_of(key, cell) for key, cell in cells.items()}
-
-    rows = _policy_rows(table, columns, cells, names, differences)
+    results = _results_of(table, data.told, with_differences=shows_published)
+    columns = table.columns(results.tasks)
+    rows = _policy_rows(table, columns, results)
     if not table.is_by_stages:
         for floor in floors:
-            rows += _floor_rows(floor, table, columns, cells)
+            rows += _floor_rows(floor, columns, results)
     if shows_published:
         for published_row in published_rows(table.name):
             rows.append(_published_row(table, columns, published_row))
     if not table.is_by_stages:
         rows.sort(key=lambda row: setting_sort_key(row.group))
     rows = list(with_best(_compared_rows(table, columns, rows)))
-    notes = notes_of(table, columns, rows, cells, names, differences, floors)
+    notes = notes_of(table, columns, rows, results, floors)
     # Last, because the best policy is one of a setting's rows, which are apart from here on.
     if table.heads == (POLICY, "setting"):
         rows = _by_policy(rows)
     return Table(table.name, table.title, table.heads, columns, rows, notes)
+
+
+def _results_of(table: PaperTable, data: RunData, *, with_differences: bool) -> TableResults:
+    """Return the results behind a table, with differences from the published rates if wanted."""
+    shown = table.shown(data.cells)
+    differences: AllDifferences = {}
+    if with_differences:
+        differences = {key: differences_of(key, cell) for key, cell in shown.items()}
+    tasks = table.tasks(data.cells)
+    return TableResults(tasks, data.cells, shown, data.frame.names_as_played, differences)
 
 
 def is_informative(which: str, data: RunData) -> bool:
@@ -114,11 +115,10 @@ def is_informative(which: str, data: RunData) -> bool:
     """
     if which == COVERAGE:
         return False
-    told = data.told
-    rows = list(PAPER_TABLES[which].positions(told.cells, told.frame.names))
-    options = {row.options for row in rows}
+    shown = PAPER_TABLES[which].shown(data.told.cells)
+    options = {key.options for key in shown}
     if which == "planner":
-        runs = {row.policy_run for row in rows}
+        runs = {key.policy_run for key in shown}
         return len(runs) > 1 and any(run.has_planner for run in runs)
     if which == "context":
         return len(options) > 1
@@ -128,30 +128,23 @@ def is_informative(which: str, data: RunData) -> bool:
     return bool(options)
 
 
-def _policy_rows(
-    table: PaperTable,
-    columns: Sequence[Column],
-    cells: Cells,
-    names: RunNames,
-    differences: AllDifferences,
-) -> list[Row]:
+def _policy_rows(table: PaperTable, columns: Sequence[Column], results: TableResults) -> list[Row]:
     """Return the rows of the policies that were played, as listed by the table."""
     # One generator for all, so an interval depends on the entries before it.
     rng = np.random.default_rng(SEED)
     rows = []
-    for position in table.positions(cells, names):
+    for policy_run, options, label in table.subjects(results.shown, results.names):
         entries = {}
-        for task in table.tasks(cells):
-            key = CellKey(position.policy_run, task, position.options)
-            entries[task] = _entry(key, cells.get(key), differences, rng)
-        rows.append(table.row(position.options, position.label, with_averages(columns, entries)))
+        for task in results.tasks:
+            key = CellKey(policy_run, task, options)
+            entries[task] = _entry(key, results, rng)
+        rows.append(table.row(options, label, with_averages(columns, entries)))
     return rows
 
 
-def _entry(
-    key: CellKey, cell: Cell | None, differences: AllDifferences, rng: np.random.Generator
-) -> Entry:
+def _entry(key: CellKey, results: TableResults, rng: np.random.Generator) -> Entry:
     """Return the rate of a task in a setting; without a rate if no episode of it was planned."""
+    cell = results.shown.get(key)
     if cell is None:
         return Entry(applies=_applies(key.task, key.options))
     marks = ""
@@ -165,7 +158,7 @@ def _entry(
         marks=marks,
         counts=cell.counts,
         interval=cell_interval(cell, rng),
-        differences=differences.get(key),
+        differences=results.differences.get(key),
     )
 
 
@@ -177,26 +170,20 @@ def _applies(task: str, options: InstructionOptions) -> bool:
     return options.setting in settings_of(installed)
 
 
-def _floor_rows(
-    floor: str, table: PaperTable, columns: Sequence[Column], cells: Cells
-) -> Iterator[Row]:
+def _floor_rows(floor: str, columns: Sequence[Column], results: TableResults) -> Iterator[Row]:
     """Yield the rows of a floor, one for each setting and split that any policy played.
 
     Their levels are of the same episodes.
     """
-    tasks = table.tasks(cells)
-    played = {}
-    for key, cell in cells.items():
-        if key.task in tasks and table.shows(key.options) and cell.verdicts:
-            played[key] = cell
-    jobs = _jobs_by_instructions(played)
+    judged = {key: cell for key, cell in results.shown.items() if cell.verdicts}
+    jobs = _jobs_by_instructions(judged)
     # Of several versions of the words it is not known what can be learned.
-    languages = {key.policy_run.language for key in played}
+    languages = {key.policy_run.language for key in judged}
     language = languages.pop() if len(languages) == 1 else ""
     has_several_splits = len({instructions.split for instructions in jobs}) > 1
     for instructions in sorted(jobs, key=_instruction_order):
         options = instructions.options
-        entries = _floor_entries(floor, options, tasks, jobs[instructions], language)
+        entries = _floor_entries(floor, options, results.tasks, jobs[instructions], language)
         if all(entry.percent is None for entry in entries.values()):
             continue  # the floor has not been measured
         name = floor
@@ -282,16 +269,10 @@ def _compared_rows(
     A row is compared with another of the same policy and source; references stay as they are, and
     so do floors, which are not of a policy.
     """
-    rows_by_position = {(row.group, row.name, row.source): row for row in rows}
-    shortest = stages_text(staged_options()[0])
+    rows_by_position = {row.position: row for row in rows}
     for row in rows:
-        # Groups are settings and names policies, but the other way round in the table of contexts.
-        reference_position = (EXPLICIT, row.name, row.source)
-        if table.is_by_stages:
-            reference_position = (row.group, shortest, row.source)
-        reference = rows_by_position.get(reference_position)
-        is_reference = reference_position == (row.group, row.name, row.source)
-        if reference is None or is_reference or row.source == "chance":
+        reference = rows_by_position.get(table.reference_position(row), row)
+        if reference.position == row.position or row.source == "chance":
             yield row
         else:
             yield with_changes(columns, row, reference)

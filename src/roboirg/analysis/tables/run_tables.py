@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence, Set
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
+from typing import NamedTuple
 
 from rich.console import Console
 from rich.text import Text
@@ -22,7 +22,6 @@ from roboirg.analysis.measures.measure import (
     Measured,
     ScopeKey,
     ScopeSummary,
-    Summaries,
     by_scope,
     pair,
 )
@@ -45,6 +44,7 @@ from roboirg.analysis.tables.table import (
 )
 from roboirg.analysis.tables.table_notes import range_text, where_played
 from roboirg.core.arms import TOLD
+from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted, printable
 from roboirg.records.record import Summary
 from roboirg.stats.cells import NOTHING, ByTask
@@ -59,36 +59,57 @@ _FAIR = Fraction(2, 5)
 """The smallest rates in green and in yellow."""
 
 
+class _ScopeResult(NamedTuple):
+    """What a policy run achieved in a scope with some options.
+
+    Attributes:
+        measured: its trials and their rate.
+        gap: to explicit, as printed; empty without one.
+    """
+
+    measured: ScopeSummary
+    gap: str
+
+
+_RunResults = Mapping[str, Mapping[InstructionOptions, _ScopeResult]]
+"""The results of a policy run by scope: its tasks, and last all tasks."""
+
+
 def make_run_tables(frame: Frame) -> list[Table]:
     """Make a table for each policy run, in their order.
 
     What the signs mean is the last note of the last table.
     """
     cells = cells_of(frame)
-    scopes = by_scope(cells)
-    summaries_of_runs: defaultdict[PolicyRun, dict[ScopeKey, ScopeSummary]] = defaultdict(dict)
-    gaps = {}
-    for key, by_task in scopes.items():
-        is_suite = key.scope not in by_task and key.scope != ALL_TASKS
-        if not is_suite:
-            summaries_of_runs[key.policy_run][key] = Measured(key, by_task)
-            gaps[key] = gap_text(key, scopes)
-
+    results_by_run = _results_by_run(cells)
     tables = []
     for policy_run, label in frame.names.items():
         names = {policy_run: label}  # the notes below a table are about its policy run alone
         differences = _explicit_differences(cells, policy_run)
-        summaries = summaries_of_runs[policy_run]
-        notes = [f"{where_played([policy_run])} {_sizes(summaries)}"]
+        results = results_by_run[policy_run]
+        notes = [f"{where_played([policy_run])} {_sizes(results)}"]
         notes += comparison_notes(differences, names)
         notes += heard_notes(frame.where(run=policy_run), names)
         notes += headline_notes(cells, names)
-        tables.append(_make_run_table(label, summaries, gaps, differences, notes))
+        tables.append(_make_run_table(label, results, differences, notes))
     if tables:
-        legend = "; ".join(_legend(summaries_of_runs.values(), set(gaps.values())))
         last = tables[-1]
+        legend = "; ".join(_legend(cells, results_by_run.values()))
         tables[-1] = replace(last, notes=(*last.notes, legend))
     return tables
+
+
+def _results_by_run(cells: Cells) -> Mapping[PolicyRun, _RunResults]:
+    """Return the results of each policy run in its tasks and in all of them, not in suites."""
+    scopes = by_scope(cells)
+    results: dict[PolicyRun, dict[str, dict[InstructionOptions, _ScopeResult]]] = {}
+    for key, by_task in scopes.items():
+        is_suite = key.scope not in by_task and key.scope != ALL_TASKS
+        if is_suite:
+            continue
+        by_options = results.setdefault(key.policy_run, {}).setdefault(key.scope, {})
+        by_options[key.options] = _ScopeResult(Measured(key, by_task), gap_text(key, scopes))
+    return results
 
 
 def _explicit_differences(cells: Cells, policy_run: PolicyRun) -> AllDifferences:
@@ -156,11 +177,7 @@ def gap_text(key: ScopeKey, scopes: Mapping[ScopeKey, ByTask]) -> str:
 
 
 def _make_run_table(
-    label: str,
-    summaries: Summaries,
-    gaps: Mapping[ScopeKey, str],
-    differences: AllDifferences,
-    notes: Sequence[str],
+    label: str, results: _RunResults, differences: AllDifferences, notes: Sequence[str]
 ) -> Table:
     """Return the table of a policy run, with a row for each task and a column for each setting.
 
@@ -168,60 +185,56 @@ def _make_run_table(
 
     Args:
         label: of the policy run, the title.
-        summaries: the results of the policy run by task, and those of all tasks.
-        gaps: as printed.
+        results: of the policy run.
         differences: from the conditions of the published rates.
         notes: below the table.
     """
-    policy_run = next(iter(summaries)).policy_run
-    scopes = list(dict.fromkeys(key.scope for key in summaries))
-    if not _has_several_tasks(scopes):
-        scopes = scopes[:1]  # what is of all tasks would only repeat it
-    settings = sorted({key.options for key in summaries}, key=options_sort_key)
-    columns = [Column(options_label(options), options.setting) for options in settings]
+    settings = sorted(results[ALL_TASKS], key=options_sort_key)
     rows = []
-    for scope in scopes:
+    for scope, by_options in results.items():
+        if scope != ALL_TASKS:
+            group = ""
+        elif _has_several_tasks(results):
+            group = ALL_TASKS
+        else:
+            continue  # it would only repeat its task
         entries = []
         for options in settings:
-            summary = summaries.get(ScopeKey(policy_run, scope, options))
-            entries.append(_entry(summary, gaps, differences))
-        group = ALL_TASKS if scope == ALL_TASKS else ""
+            entries.append(_entry(by_options.get(options), differences))
         rows.append(Row(group, scope, entries))
+    columns = [Column(options_label(options), options.setting) for options in settings]
     return Table(key="run", title=label, heads=("task",), columns=columns, rows=rows, notes=notes)
 
 
-def _has_several_tasks(scopes: Collection[str]) -> bool:
-    """Return whether scopes have more than one task, next to that of all tasks."""
-    return len(set(scopes) - {ALL_TASKS}) > 1
+def _has_several_tasks(results: _RunResults) -> bool:
+    return len(results.keys() - {ALL_TASKS}) > 1
 
 
-def _entry(
-    summary: ScopeSummary | None, gaps: Mapping[ScopeKey, str], differences: AllDifferences
-) -> Entry:
+def _entry(result: _ScopeResult | None, differences: AllDifferences) -> Entry:
     """Return an entry such as ``62 (−12)``, the success rate and the gap to explicit in brackets.
 
     It is a dash where nothing was played or planned, or no episode has a verdict.
     """
-    if summary is None:
+    if result is None:
         return Entry(applies=False)
-    counts = summary.counts
+    measured = result.measured
+    counts = measured.counts
     marks = []
     if counts.errors:
         marks.append(f"{counts.errors}{ERROR_MARK}")
     if counts.missing:
         marks.append(f"{counts.missing}{MISSING_MARK}")
-    rate = summary.rate
+    rate = measured.rate
     if rate is None:
         return Entry(word=NOT_APPLICABLE, marks=" ".join(marks))
 
     word = whole_percent(rate)
-    gap = gaps[summary.key]
-    if gap:
-        word += f" ({gap})"
+    if result.gap:
+        word += f" ({result.gap})"
     return Entry(
         word=word,
         marks=" ".join(marks),
-        differences=differences.get(CellKey(*summary.key)),
+        differences=differences.get(CellKey(*measured.key)),
         style=_color(rate),
     )
 
@@ -234,44 +247,38 @@ def _color(rate: Fraction) -> str:
     return "red"
 
 
-def _legend(summaries_of_runs: Iterable[Summaries], gaps: Set[str]) -> Iterator[str]:
-    """Yield what the signs mean that occur in the tables.
-
-    Args:
-        summaries_of_runs: what each table shows.
-        gaps: as they are printed in brackets; empty where a rate has none.
-    """
-    counts: Counter[str] = Counter()
-    for summaries in summaries_of_runs:
-        for key, summary in summaries.items():
-            counts["errors"] += summary.counts.errors
-            counts["missing"] += summary.counts.missing
-            counts["privileged"] += key.policy_run.is_privileged
+def _legend(cells: Cells, results_of_runs: Iterable[_RunResults]) -> Iterator[str]:
+    """Yield what the signs mean that occur in the tables, given what all of them show."""
+    gaps: set[str] = set()
+    for results in results_of_runs:
+        for by_options in results.values():
+            gaps.update(result.gap for result in by_options.values())
     if any(gaps):
         yield "success rate in %, in brackets the gap to explicit on the same episodes in points"
     else:
         yield "success rate in %"
     if NOT_APPLICABLE in gaps:
         yield f"({NOT_APPLICABLE}) explicit has no success either, so the gap says nothing"
-    if counts["errors"]:
+    if any(cell.errors for cell in cells.values()):
         yield f"{ERROR_MARK} episodes ended in an error and are left out of the rates"
-    if counts["missing"]:
+    if any(cell.missing for cell in cells.values()):
         yield f"{MISSING_MARK} episodes are still to be played"
-    if counts["privileged"]:
+    if any(key.policy_run.is_privileged for key in cells):
         yield "privileged policies and scripted hands use the simulator's state"
 
 
-def _sizes(summaries: Summaries) -> str:
+def _sizes(results: _RunResults) -> str:
     """Return how many trials a cell has, and how many all tasks together.
 
     For example ``n = 10 to 20 episodes per cell, 160 episodes for all tasks, the mean over tasks``.
     """
     of_cells: list[int] = []
     of_all_tasks: list[int] = []
-    for key, summary in summaries.items():
-        trials = of_all_tasks if key.scope == ALL_TASKS else of_cells
-        trials.append(summary.counts.trials)
+    for scope, by_options in results.items():
+        trials = of_all_tasks if scope == ALL_TASKS else of_cells
+        for result in by_options.values():
+            trials.append(result.measured.counts.trials)
     text = f"n = {range_text(of_cells, 'episode')} per cell"
-    if _has_several_tasks({key.scope for key in summaries}):
+    if _has_several_tasks(results):
         text += f", {range_text(of_all_tasks, 'episode')} for {ALL_TASKS}, the mean over tasks"
     return text

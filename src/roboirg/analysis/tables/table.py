@@ -18,6 +18,8 @@ Source = Literal["ours", "published", "cited", "chance"]
 ERROR_MARK = "!"
 MISSING_MARK = "…"
 PARTIAL_MARK = "*"
+MARK_NAMES = {ERROR_MARK: "errors", MISSING_MARK: "missing", PARTIAL_MARK: "partial"}
+"""Why a rate is incomplete, by the mark behind it."""
 CHECK_MARK = "✓"
 PUBLISHED_MARK = " (published)"
 POLICY = "policy"
@@ -35,8 +37,7 @@ class Entry:
         change: difference of the printed rate from the reference's; None without a reference or if
             either is incomplete.
         best: whether it is the best, or among the best, of its group.
-        marks: why the rate is incomplete: `ERROR_MARK`, `MISSING_MARK`, `PARTIAL_MARK`, or several
-            of them.
+        marks: why the rate is incomplete, as keys of `MARK_NAMES` one after the other.
         counts: behind the rate; None if they are unknown.
         interval: 95 %, of the rate; None if it is unknown.
         differences: from the published rate's conditions; None without a published rate.
@@ -113,6 +114,11 @@ class Row:
     name: str
     cells: Sequence[Entry | str]
     source: Source = "ours"
+
+    @property
+    def position(self) -> tuple[str, str, Source]:
+        """What no other row of a table has: its group and name, and the origin of its rates."""
+        return self.group, self.name, self.source
 
     @property
     def entries(self) -> tuple[Entry, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from roboirg.analysis.comparability import AllDifferences
 from roboirg.analysis.published import AVERAGE, RateTable, published_tasks
 from roboirg.analysis.results.frame import RunNames
 from roboirg.analysis.results.option_labels import (
@@ -18,7 +19,7 @@ from roboirg.analysis.results.option_labels import (
 )
 from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.analysis.results.run_cells import Cells
-from roboirg.analysis.tables.table import POLICY, Column, Entry, Row
+from roboirg.analysis.tables.table import POLICY, Column, Entry, Row, Source
 from roboirg.core.instruction_options import ALL_STAGES, InstructionOptions
 from roboirg.tasks import all_tasks, every_task
 
@@ -39,7 +40,25 @@ def stages_text(options: InstructionOptions) -> str:
     return ",".join(map(str, options.stages))
 
 
-class RowPosition(NamedTuple):
+class TableResults(NamedTuple):
+    """The results behind a table of rates.
+
+    Attributes:
+        tasks: of the table.
+        played: the cells of all tasks and options.
+        shown: those of them that the table shows.
+        names: labels of the policy runs, in the order of their rows.
+        differences: of the shown cells from published rates; empty if these are not shown.
+    """
+
+    tasks: Sequence[str]
+    played: Cells
+    shown: Cells
+    names: RunNames
+    differences: AllDifferences
+
+
+class RowSubject(NamedTuple):
     """What a row is about.
 
     Attributes:
@@ -107,29 +126,41 @@ class PaperTable:
             columns.append(Column(f"{suite} {AVERAGE}", suite, tuple(tasks_of_suite)))
         return (*columns, overall)
 
-    def positions(self, cells: Cells, names: RunNames) -> Iterator[RowPosition]:
-        """Yield what each row is about, by policy run and options.
-
-        There is a row if the policy run has a task of the table, played or planned, with options
-        that the table shows.
-        """
+    def shown(self, cells: Cells) -> Cells:
+        """Return the cells of the table's tasks with options that it shows."""
         tasks = self.tasks(cells)
+        shown = {}
+        for key, cell in cells.items():
+            if key.task in tasks and self.shows(key.options):
+                shown[key] = cell
+        return shown
+
+    def subjects(self, shown: Cells, names: RunNames) -> Iterator[RowSubject]:
+        """Yield what each row is about, by policy run and options, given the cells of the table.
+
+        There is a row for what was planned, too.
+        """
         options_of_runs: dict[PolicyRun, set[InstructionOptions]] = {}
-        for policy_run, task, options in cells:
-            if task in tasks and self.shows(options):
-                options_of_runs.setdefault(policy_run, set()).add(options)
+        for policy_run, _, options in shown:
+            options_of_runs.setdefault(policy_run, set()).add(options)
         for policy_run, name in names.items():
             label = name
             if self.of_paper == "real" and policy_run.robot is None:
                 label += TWIN_MARK
             for options in sorted(options_of_runs.get(policy_run, ()), key=row_order):
-                yield RowPosition(policy_run, options, label)
+                yield RowSubject(policy_run, options, label)
 
     def row(self, options: InstructionOptions, policy: str, cells: Sequence[Entry]) -> Row:
         """Return a row with its labels."""
         if self.is_by_stages:
             return Row(policy, stages_text(options), cells)
         return Row(options.setting, policy, cells)
+
+    def reference_position(self, row: Row) -> tuple[str, str, Source]:
+        """Return the position of the row with the same policy and the reference's options."""
+        if self.is_by_stages:
+            return row.group, stages_text(self.reference()), row.source
+        return self.reference().setting, row.name, row.source
 
 
 PAPER_TABLES: Mapping[str, PaperTable] = {

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from roboirg.analysis.comparability import AllDifferences, comparison_notes
+from roboirg.analysis.comparability import comparison_notes
 from roboirg.analysis.measures.chance import unmeasured_note
 from roboirg.analysis.measures.headline import headline_notes
 from roboirg.analysis.published import NOTES
-from roboirg.analysis.results.frame import Frame, RunNames
+from roboirg.analysis.results.frame import Frame
 from roboirg.analysis.results.option_labels import (
     is_usual,
     options_label,
     options_sort_key,
 )
 from roboirg.analysis.results.policy_run import PolicyRun
-from roboirg.analysis.results.run_cells import CellKey, Cells
+from roboirg.analysis.results.run_cells import CellKey
 from roboirg.analysis.tables.table import (
     ERROR_MARK,
     MISSING_MARK,
@@ -26,7 +26,7 @@ from roboirg.analysis.tables.table import (
     Row,
     Table,
 )
-from roboirg.analysis.tables.table_kinds import TWIN_MARK, PaperTable
+from roboirg.analysis.tables.table_kinds import TWIN_MARK, PaperTable, TableResults
 from roboirg.core.plain_text import counted, verb_for
 from roboirg.records.mixing import mixtures
 from roboirg.stats.cells import Counts
@@ -49,28 +49,19 @@ def notes_of(
     table: PaperTable,
     columns: Sequence[Column],
     rows: Sequence[Row],
-    cells: Cells,
-    names: RunNames,
-    differences: AllDifferences,
+    results: TableResults,
     floors: Sequence[str],
 ) -> tuple[str, ...]:
     """Return the notes of a table of rates.
 
     Args:
         table: which one.
-        columns: of the table; the last is the average over all tasks.
+        columns: of the table.
         rows: of the table.
-        cells: of all runs.
-        names: labels of the policy runs.
-        differences: from published rates; none if these are not shown.
+        results: behind the table.
         floors: expected successes that are asked for.
     """
-    tasks = columns[-1].averages
-    shown_cells = {}
-    for key, cell in cells.items():
-        if key.task in tasks and table.shows(key.options):
-            shown_cells[key] = cell
-    policy_runs = list(dict.fromkeys(key.policy_run for key in shown_cells))
+    policy_runs = list(dict.fromkeys(key.policy_run for key in results.shown))
     entries: list[Entry] = []
     for row in rows:
         entries += row.entries
@@ -78,15 +69,15 @@ def notes_of(
     notes = [RATES_NOTE]
     notes += _sign_notes(table, entries)
     notes.append(where_played(policy_runs))
-    notes += _count_notes([cell.counts for cell in shown_cells.values()], entries)
+    notes += _count_notes([cell.counts for cell in results.shown.values()], entries)
     if len(policy_runs) == 1:
         notes.append("Only one policy was played; nothing is compared.")
     if table.name == "main":
-        notes += _omission_notes(table, cells, tasks)
-        notes += headline_notes(cells, names)
-    notes.append(_absent_tasks(shown_cells))
+        notes += _omission_notes(results)
+        notes += headline_notes(results.played, results.names)
+    notes.append(_absent_tasks(results.shown))
     notes += _origin_notes(table, rows, floors, policy_runs)
-    notes += comparison_notes({key: differences.get(key) for key in shown_cells}, names)
+    notes += comparison_notes(results.differences, results.names)
     notes += _average_notes(columns, rows)
     return tuple(filter(None, notes))  # some have nothing to say and are empty
 
@@ -204,17 +195,17 @@ def _count_notes(cells: Sequence[Counts], entries: Sequence[Entry]) -> Iterator[
         yield "Incomplete entries have no arrow, and their columns no best entry."
 
 
-def _omission_notes(table: PaperTable, cells: Cells, tasks: Sequence[str]) -> Iterator[str]:
+def _omission_notes(results: TableResults) -> Iterator[str]:
     """Yield what was played and is not in the table: other tasks, and other options.
 
     Options that belong into the table of harder settings are named apart.
     """
     other_tasks = set()
     hidden = set()
-    for key in cells:
-        if key.task not in tasks:
+    for key in results.played:
+        if key.task not in results.tasks:
             other_tasks.add(key.task)
-        elif not table.shows(key.options):
+        elif key not in results.shown:
             hidden.add(key.options)
     if other_tasks:
         yield f"Not in this table: the results of {', '.join(sorted(other_tasks))}."

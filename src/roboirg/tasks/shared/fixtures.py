@@ -6,18 +6,31 @@ What finds no free place raises `SceneRejectedError`: the seed gives no scene.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from roboirg.core import object_sizes
-from roboirg.core.episode import COLORS, Color, Goal, ObjectKind, Scene, SceneObject
+from roboirg.core.episode import (
+    COLORS,
+    Color,
+    Difficulty,
+    Goal,
+    ObjectKind,
+    Scene,
+    SceneObject,
+    SlotValue,
+)
 from roboirg.core.errors import SceneRejectedError
 from roboirg.core.footprints import Circle, Footprint, Line, Obstacle, Rectangle, Region, place
 from roboirg.core.motions import Point
 from roboirg.util.random_draws import shuffled
 
+CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
+"""Cubes of different colors on the table."""
+BUTTON_REGION = Region(-0.2, 0.0, 0.05, 0.2)
+"""Where the button of most tasks is."""
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
 
 BIN_YAW = math.radians(20.0)
@@ -43,9 +56,16 @@ def counted_goals(scene: Scene, kind: ObjectKind, most: int) -> tuple[Goal, ...]
 
     A red cube, at most twice -> *red once* and *red twice*.
     """
+    return goals_by_color(scene, kind, "repeats", range(1, most + 1))
+
+
+def goals_by_color(
+    scene: Scene, kind: ObjectKind, slot: str, values: Iterable[SlotValue]
+) -> tuple[Goal, ...]:
+    """Return a goal for every object of a kind, by color, with each value of another slot."""
     goals: list[Goal] = []
     for item in scene.of_kind(kind):
-        goals += [Goal.of(color=str(item.color), repeats=count) for count in range(1, most + 1)]
+        goals += [Goal.of(color=str(item.color), **{slot: value}) for value in values]
     return tuple(goals)
 
 
@@ -83,9 +103,9 @@ def footprint(item: SceneObject) -> Rectangle:
     return Rectangle(item.position.x, item.position.y, half, half, item.yaw)
 
 
-def disc_area(disc: SceneObject) -> Circle:
-    """Return the circle that a target disc or a site covers."""
-    return Circle(disc.position.x, disc.position.y, disc.half_width)
+def disc_area(disc: SceneObject, gap: float = 0.0) -> Circle:
+    """Return the circle that a target disc, a site or a tape covers, and `gap` meters around it."""
+    return Circle(disc.position.x, disc.position.y, disc.half_width + gap)
 
 
 def cube_obstacle(cube: SceneObject) -> Rectangle | Line:
@@ -121,10 +141,7 @@ def draw_cube(
         position = Point(x, y, object_sizes.CUBE_HALF)
         return SceneObject(name, "cube", position, yaw, color)
 
-    def clearance(cube: SceneObject) -> Rectangle:
-        return footprint(cube).grown(gap)
-
-    return placed(name, draw, clearance, obstacles)
+    return placed(name, draw, lambda cube: footprint(cube).grown(gap), obstacles)
 
 
 def draw_cubes(
@@ -157,15 +174,19 @@ def draw_colored_cubes(
 
 
 def draw_button_and_cubes(
-    rng: np.random.Generator, button_region: Region, count: int, region: Region, gap: float
+    rng: np.random.Generator,
+    difficulty: Difficulty,
+    region: Region,
+    gap: float,
+    button_region: Region = BUTTON_REGION,
 ) -> ButtonAndCubes:
-    """Draw a button, then `count` cubes away from it as `draw_colored_cubes` does.
+    """Draw a button, then `CUBES` away from it as `draw_colored_cubes` does.
 
     `region` and `gap` are those of the cubes.
     """
     button = draw_button(rng, button_region)
     keep_out = button_keep_out(button)
-    cubes = draw_colored_cubes(rng, count, region, gap, [keep_out])
+    cubes = draw_colored_cubes(rng, CUBES[difficulty], region, gap, [keep_out])
     around_cubes = [cube_obstacle(cube) for cube in cubes]
     return ButtonAndCubes(button, cubes, (keep_out, *around_cubes))
 
@@ -189,11 +210,25 @@ def draw_target(
         place = Point(x, y, object_sizes.TARGET_HEIGHT)
         return SceneObject(name, "target", place, radius=radius, rgb=rgb)
 
-    def clearance(target: SceneObject) -> Circle:
-        x, y, _ = target.position
-        return Circle(x, y, radius + gap)
+    return placed(name, draw, lambda target: disc_area(target, gap), obstacles)
 
-    return placed(name, draw, clearance, obstacles)
+
+def draw_targets(
+    rng: np.random.Generator,
+    regions: Mapping[str, Region],
+    radius: float,
+    gap: float,
+    obstacles: Sequence[Obstacle],
+    rgb: tuple[float, float, float] | None = None,
+) -> list[SceneObject]:
+    """Draw a target disc in each region, by its name, away from those before it."""
+    taken = list(obstacles)
+    targets: list[SceneObject] = []
+    for name, region in regions.items():
+        target = draw_target(rng, name, radius, region, gap, taken, rgb)
+        targets.append(target)
+        taken.append(disc_area(target))
+    return targets
 
 
 def marker_over(target: SceneObject, name: str) -> SceneObject:

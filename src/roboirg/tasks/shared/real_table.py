@@ -14,9 +14,9 @@ import numpy as np
 
 from roboirg.core import object_sizes
 from roboirg.core.episode import Color, ObjectKind, Scene, SceneObject
-from roboirg.core.footprints import Circle, Footprint, Region
+from roboirg.core.footprints import Footprint, Region
 from roboirg.core.motions import Point
-from roboirg.tasks.shared.fixtures import placed
+from roboirg.tasks.shared.fixtures import disc_area, placed
 from roboirg.util.random_draws import shuffled
 
 BOX_YAW = math.radians(15.0)
@@ -70,8 +70,4 @@ def draw_tape(
         position = Point(x, y, object_sizes.TAPE_HALF)
         return SceneObject(name, "tape", position, yaw, color)
 
-    def clearance(tape: SceneObject) -> Circle:
-        x, y, _ = tape.position
-        return Circle(x, y, object_sizes.TAPE_RADIUS + gap)
-
-    return placed(name, draw, clearance, obstacles)
+    return placed(name, draw, lambda tape: disc_area(tape, gap), obstacles)

@@ -1,10 +1,13 @@
-"""Stages of several tasks and of their videos."""
+"""Stages of several tasks and of their videos: what is expected, and how the oracle does it.
+
+They forbid nothing; a task adds what fails its episodes with `Stage.forbidding`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from roboirg.core.conditions import Condition, Fact, Rule
+from roboirg.core.conditions import Condition, Fact
 from roboirg.core.episode import Primitive, SceneObject, Stage
 from roboirg.core.fact_traits import FactKind
 from roboirg.tasks.shared.fixtures import ORDINALS
@@ -23,15 +26,11 @@ def facts_of_others(kind: FactKind, objects: Iterable[SceneObject], right: str) 
 
 
 def pick_stage(
-    name: str,
-    subgoal: str = "pick up the cube {at}",
-    forbids: tuple[Fact | Rule, ...] = (),
-    timer: str | None = None,
+    name: str, subgoal: str = "pick up the cube {at}", timer: str | None = None
 ) -> Stage:
     """Return the stage in which a cube or tape is picked up."""
     return Stage(
         expects=Fact("picked", name),
-        forbids=forbids,
         primitive=Primitive("pick_cube", name),
         subgoal=subgoal,
         points_at=name,
@@ -39,60 +38,44 @@ def pick_stage(
     )
 
 
-def place_stage(
-    name: str, place: str, subgoal: str, forbids: tuple[Fact | Rule, ...] = ()
-) -> Stage:
+def place_stage(name: str, place: str, subgoal: str) -> Stage:
     """Return the stage in which a cube or tape is placed on a target."""
     return Stage(
         expects=Fact("placed", name, place),
-        forbids=forbids,
         primitive=Primitive("place_on", name, place),
         subgoal=subgoal,
         points_at=place,
     )
 
 
-def put_down_stage(
-    put_down: Primitive,
-    subgoal: str,
-    forbids: tuple[Fact | Rule, ...] = (),
-    timer: str | None = None,
-) -> Stage:
+def put_down_stage(put_down: Primitive, subgoal: str, timer: str | None = None) -> Stage:
     """Return the stage in which a cube is put down on the table by a movement."""
     return Stage(
         expects=Fact("lying", put_down.subject),
-        forbids=forbids,
         primitive=put_down,
         subgoal=subgoal,
         timer=timer,
     )
 
 
-def placing_stages(
-    kind: str, color: str, repeats: int, forbids: tuple[Fact | Rule, ...]
-) -> tuple[Stage, ...]:
+def placing_stages(kind: str, color: str, repeats: int) -> list[Stage]:
     """Return the stages in which a cube or tape is placed on the target a number of times."""
     name = f"{kind}_{color}"
     plan: list[Stage] = []
     for ordinal in ORDINALS[:repeats]:
         pick = f"pick up the {color} {kind} {{at}} for the {ordinal} time"
         put = f"place the {color} {kind} onto the target {{at}}"
-        plan.append(pick_stage(name, pick, forbids))
-        plan.append(place_stage(name, "target", put, forbids))
-    return tuple(plan)
+        plan.append(pick_stage(name, pick))
+        plan.append(place_stage(name, "target", put))
+    return plan
 
 
 def press_stage(
-    subgoal: str = "press the button {at}",
-    forbids: tuple[Fact | Rule, ...] = (),
-    *,
-    expects: Condition = PRESSED,
-    button: str = "button",
+    subgoal: str = "press the button {at}", expects: Condition = PRESSED, button: str = "button"
 ) -> Stage:
     """Return the stage in which a button is pressed."""
     return Stage(
         expects=expects,
-        forbids=forbids,
         primitive=Primitive("press", button),
         subgoal=subgoal,
         points_at=button,
@@ -113,7 +96,6 @@ def _static(primitive: Primitive) -> Stage:
     """Return the stage of a movement that ends at rest, and lasts as long as it says."""
     return Stage(
         expects=Fact("still", "robot"),
-        forbids=(),
         primitive=primitive,
         subgoal="static",
         lasting=primitive.steps,
@@ -124,7 +106,6 @@ def go_home() -> Stage:
     """Return the stage after the video in which the robot goes to the policy's start pose."""
     return Stage(
         expects=Fact("home", "robot"),
-        forbids=(),
         primitive=Primitive("go_home", "robot"),
         subgoal="go home",
         in_video=False,

@@ -15,9 +15,9 @@ import numpy as np
 from roboirg.core import object_sizes
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Difficulty, Primitive, Scene, SceneObject, Stage
-from roboirg.core.footprints import Obstacle, Region
+from roboirg.core.footprints import Region
 from roboirg.core.motions import Point, Swap
-from roboirg.tasks.shared.fixtures import disc_area, draw_button_and_cubes, draw_target
+from roboirg.tasks.shared.fixtures import disc_area, draw_button_and_cubes, draw_targets
 from roboirg.tasks.shared.stages import (
     facts_of_others,
     go_home,
@@ -29,8 +29,6 @@ from roboirg.tasks.shared.stages import (
 )
 from roboirg.tasks.shared.swapping import SWAP_START, SWAP_STEPS
 from roboirg.util.random_draws import draw, shuffled
-
-CUBES: dict[Difficulty, int] = {"easy": 1, "medium": 3, "hard": 3}
 
 BUTTON_REGION = Region(0.1, 0.0, 0.025, 0.15)
 SITE_REGION = Region(-0.1, 0.0, 0.1, 0.1)
@@ -56,21 +54,19 @@ class PlaceTable(NamedTuple):
     cube: SceneObject
 
 
-def draw_table(rng: np.random.Generator, cubes: int, discs: int, site_radius: float) -> PlaceTable:
+def draw_table(
+    rng: np.random.Generator, difficulty: Difficulty, discs: int, site_radius: float
+) -> PlaceTable:
     """Draw site, button, cubes of different colors and target discs, and choose one of the cubes.
 
     The site is the round place for the cube at the end of the video; its radius is in meters.
     """
     site = _draw_site(rng, site_radius)
-    placed = draw_button_and_cubes(
-        rng,
-        button_region=BUTTON_REGION,
-        count=cubes,
-        region=WORK_REGION,
-        gap=GAP,
-    )
+    placed = draw_button_and_cubes(rng, difficulty, WORK_REGION, GAP, BUTTON_REGION)
     # As in RoboMME, cubes may lie on the site; discs may not.
-    targets = _draw_discs(rng, discs, [*placed.obstacles, disc_area(site)])
+    obstacles = [*placed.obstacles, disc_area(site)]
+    regions = {f"target_{number}": WORK_REGION for number in range(discs)}
+    targets = tuple(draw_targets(rng, regions, TARGET_RADIUS, GAP, obstacles))
     objects = (site, placed.button, *placed.cubes, *targets)
     return PlaceTable(objects, targets, cube=draw(rng, placed.cubes))
 
@@ -81,26 +77,6 @@ def _draw_site(rng: np.random.Generator, radius: float) -> SceneObject:
     # A site is as high as a disc: the release height of the hand follows from it.
     position = Point(x, y, object_sizes.TARGET_HEIGHT)
     return SceneObject("site", "site", position, radius=radius)
-
-
-def _draw_discs(
-    rng: np.random.Generator, count: int, obstacles: Sequence[Obstacle]
-) -> tuple[SceneObject, ...]:
-    """Draw target discs one after the other, each away from those before it."""
-    taken = list(obstacles)
-    discs: list[SceneObject] = []
-    for number in range(count):
-        disc = draw_target(
-            rng,
-            name=f"target_{number}",
-            radius=TARGET_RADIUS,
-            region=WORK_REGION,
-            gap=GAP,
-            obstacles=taken,
-        )
-        discs.append(disc)
-        taken.append(disc_area(disc))
-    return tuple(discs)
 
 
 def draw_scene(
@@ -159,7 +135,6 @@ def _demonstration_of(past: Sequence[Fact]) -> tuple[Stage, ...]:
             plan += [pick_stage(cube), place_stage(cube, str(fact.place), put)]
     put_back = Stage(
         expects=Fact("placed", cube, "site"),
-        forbids=(),
         primitive=Primitive("place_on", cube, "site"),
         subgoal="drop the cube onto table",
     )
@@ -180,12 +155,7 @@ def place_stages(scene: Scene, color: str, answer: str) -> tuple[Stage, ...]:
     """
     cube = f"cube_{color}"
     discs = [item.name for item in scene.of_kind("target")]
-    wrong_discs = tuple(Fact("placed", cube, disc) for disc in discs if disc != answer)
-    pick = pick_stage(cube, forbids=facts_of_others("picked", scene.of_kind("cube"), cube))
-    put = "place the cube onto the correct target {at}"
-    return pick, place_stage(cube, answer, put, wrong_discs)
-
-
-def colors_of(scene: Scene) -> tuple[str, ...]:
-    """Return the colors of the cubes on the table."""
-    return tuple(str(cube.color) for cube in scene.of_kind("cube"))
+    wrong_discs = [Fact("placed", cube, disc) for disc in discs if disc != answer]
+    wrong_picks = facts_of_others("picked", scene.of_kind("cube"), cube)
+    put = place_stage(cube, answer, "place the cube onto the correct target {at}")
+    return pick_stage(cube).forbidding(*wrong_picks), put.forbidding(*wrong_discs)

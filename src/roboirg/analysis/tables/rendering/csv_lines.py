@@ -5,15 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
-from roboirg.analysis.tables.table import (
-    ERROR_MARK,
-    MISSING_MARK,
-    PARTIAL_MARK,
-    Column,
-    Entry,
-    Row,
-    Table,
-)
+from roboirg.analysis.tables.table import MARK_NAMES, Column, Entry, Row, Table
 from roboirg.stats.cells import Counts
 from roboirg.util.csv_text import csv_lines
 
@@ -41,9 +33,6 @@ HEAD = (
     "differences",
 )
 """The columns. Unknown values are empty; notes are left out."""
-
-_MARK_NAMES = {ERROR_MARK: "errors", MISSING_MARK: "missing", PARTIAL_MARK: "partial"}
-
 
 _ASCII = str.maketrans({"−": "-", "±": None})
 """For programs, which read −0.5 and ±0.0 as no numbers."""
@@ -99,7 +88,7 @@ def _line(table: Table, row: Row, column: Column, entry: Entry) -> list[object]:
         _flag(entry.applies),
         _or_empty(entry.change),
         _flag(entry.best),
-        " ".join(_MARK_NAMES[mark] for mark in entry.marks),
+        " ".join(MARK_NAMES[mark] for mark in entry.marks),
         *counts,
         *ends,
         is_comparable,
