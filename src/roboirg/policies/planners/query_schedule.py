@@ -1,0 +1,80 @@
+"""When a planner queries its model: before each chunk, every N steps, or after news.
+
+*News* is that something was said, or that a subgoal ended.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Annotated
+
+from pydantic import Field
+
+from roboirg.core.subgoal_text import split_point
+from roboirg.policies.planners.planner import EACH_CHUNK, WHEN_DONE
+
+Asked = Annotated[str, Field(pattern=rf"^({EACH_CHUNK}|{WHEN_DONE}|every [1-9]\d* steps)$")]
+"""When a planner is asked, such as ``every 48 steps``."""
+MOST_USELESS = 5
+"""Unusable replies in a row after which a planner that is asked when done asks no more."""
+
+
+class QuerySchedule:
+    """Decides for each chunk of an episode whether a planner queries its model.
+
+    Args:
+        asked: when it is queried.
+        first_pause: control steps before which there is no second query.
+        holds: subgoals without points that are kept, and the last control steps at which they are.
+
+    Attributes:
+        has_news: whether there was news since the last query.
+        useless: replies in a row that were of no use.
+    """
+
+    def __init__(self, asked: Asked, first_pause: int, holds: Mapping[str, int]) -> None:
+        self._waits_for_news = asked == WHEN_DONE
+        # Such as "every 16 steps".
+        number = re.search(r"\d+", asked)
+        self._period = None if number is None else int(number[0])
+        """Control steps between two queries; None if these do not depend on the time."""
+        self._first_pause = first_pause
+        self._holds = holds
+        self._periods_begun = 0
+        self.has_news = False
+        self.useless = 0
+
+    def is_due(self, subgoal: str | None, step: int) -> bool:
+        """Return whether to query the model now; called once for each chunk.
+
+        A planner that is asked every N steps is due at the first chunk of each period; one that is
+        asked when a subgoal is done, after news. Without any subgoal yet, both are due.
+        """
+        begins_period = self._begins_period(step)
+        if self._waits_for_news and self.useless >= MOST_USELESS:
+            return False
+        if subgoal is None:
+            return True
+        if self._waits_for_news and not self.has_news:
+            return False
+        return begins_period and not self._is_held(subgoal, step)
+
+    def note_reply(self, *, is_useful: bool) -> None:
+        """Note a reply; one that was of no use leaves the news without an answer."""
+        self.has_news = not is_useful
+        self.useless = 0 if is_useful else self.useless + 1
+
+    def _begins_period(self, step: int) -> bool:
+        """Return whether the chunk at a control step is the first one of its period."""
+        if self._period is None:
+            return True
+        number = step // self._period
+        is_first = number > self._periods_begun
+        self._periods_begun = number
+        return is_first
+
+    def _is_held(self, subgoal: str, step: int) -> bool:
+        """Return whether a subgoal is kept at a control step, whatever the model would answer."""
+        words, _ = split_point(subgoal)
+        return step <= self._holds.get(words, -1) or step < self._first_pause
