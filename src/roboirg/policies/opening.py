@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
+from typing import NamedTuple
 
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError, RoboIRGError
@@ -11,12 +12,19 @@ from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
 from roboirg.policies.by_name.finding import declared_by, look_up, make_policy
 from roboirg.policies.by_name.policy_kinds import CLASS, LIVE
-from roboirg.policies.contract.base import close_policy
+from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_version import read_version
 from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes
 
 FIRST_WORDS = "Put the red cube on the target."
 VIDEO_STEPS = 4
+
+
+class _Made(NamedTuple):
+    """A policy that was made, and what it declares to need."""
+
+    policy: Policy
+    needs: PolicyNeeds
 
 
 def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
@@ -29,27 +37,41 @@ def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
         InvalidValueError: it cannot be made, or its version is no version; and as `make_policy`.
         MissingDependencyError: a library that it needs is not installed.
     """
-    declares_in_class = ref.kind in (CLASS, LIVE)
-    if declares_in_class:
-        ref = look_up(ref)
+    if ref.kind in (CLASS, LIVE):
+        ref = look_up(ref)  # a class declares before any object of it is made
+        made = _make(ref, seed)
+    else:
+        made = _make(ref, seed)
+        ref = declared_by(ref, made.policy)
+    try:
+        problem = _problem_of_reset(made)
+        if problem is not None:
+            return replace(ref, version=UNKNOWN_VERSION, problem=problem)
+        version = read_version(made.policy) or ref.version
+        return replace(ref, needs=made.needs, version=version)
+    finally:
+        with contextlib.suppress(Exception, SystemExit):  # how it ends does not count
+            close_policy(made.policy)
+
+
+def _make(ref: PolicyRef, seed: int) -> _Made:
+    """Return a policy and its needs; whatever its code raises becomes an InvalidValueError."""
     try:
         policy = make_policy(ref, seed)
-        needs = PolicyNeeds.of(policy)
+        return _Made(policy, PolicyNeeds.of(policy))
     except RoboIRGError:
         raise
-    except (Exception, SystemExit) as error:  # the policy's own code runs here
+    except (Exception, SystemExit) as error:
         raise InvalidValueError(
             f"Policy {ref.spec!r} cannot be made: {one_line(error)}."
         ) from error
-    if not declares_in_class:
-        ref = declared_by(ref, policy)
+
+
+def _problem_of_reset(made: _Made) -> str | None:
+    """Begin a synthetic episode; return in words what a policy's code raises, None if nothing."""
     try:
-        episode = SyntheticEpisodes(needs).episode(FIRST_WORDS, VIDEO_STEPS)
-        policy.reset(episode.instruction, episode.demonstration)
-    except (Exception, SystemExit) as error:  # noqa: BLE001 - likewise
-        return replace(ref, version=UNKNOWN_VERSION, problem=f"reset(): {one_line(error)}")
-    else:
-        return replace(ref, needs=needs, version=read_version(policy) or ref.version)
-    finally:
-        with contextlib.suppress(Exception, SystemExit):  # how it ends does not count
-            close_policy(policy)
+        episode = SyntheticEpisodes(made.needs).episode(FIRST_WORDS, VIDEO_STEPS)
+        made.policy.reset(episode.instruction, episode.demonstration)
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - the policy's own
+        return f"reset(): {one_line(error)}"
+    return None
