@@ -33,6 +33,10 @@ DRAWN = 0
 LEFT_OUT = 99
 """Shading modes; SAPIEN does not know the second."""
 
+PLANE = 0
+POINT = -1
+"""Axes of `_outside`; those between are of bodies."""
+
 Floats = NDArray[np.float64]
 
 
@@ -58,21 +62,22 @@ class CullableBodies:
         cullable_bodies: Mapping[sapien.render.RenderBodyComponent, CullableBody],
     ) -> None:
         self._bodies = _render_bodies(scene)
-        self._cullable = [cullable_bodies.get(body) for body in self._bodies]
+        self._hulls: dict[int, Floats] = {}  # by the number of the body
+        self._drawn_by = {camera: np.ones(len(self._bodies), dtype=bool) for camera in CAMERAS}
         boxes = []
-        for body, cullable in zip(self._bodies, self._cullable, strict=True):
-            points = _points(body) if cullable is None else cullable.hull
-            boxes.append(_box(points))
+        for number, body in enumerate(self._bodies):
+            cullable = cullable_bodies.get(body)
+            if cullable is None:
+                boxes.append(_box(_points(body)))
+                continue
+            boxes.append(_box(cullable.hull))
+            self._hulls[number] = _columns(cullable.hull)
+            for camera in CAMERAS:
+                self._drawn_by[camera][number] = camera in cullable.cameras
         self._boxes = np.stack(boxes)
-        self._drawn_by = {camera: self._may_be_drawn_by(camera) for camera in CAMERAS}
         # Which bodies have the shading mode of drawn ones now, and in each command buffer.
         self._drawn = np.ones(len(self._bodies), dtype=bool)
         self._buffered: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
-
-    def _may_be_drawn_by(self, camera: str) -> NDArray[np.bool_]:
-        """Return for each body whether a camera draws it when it is in view."""
-        may_be_drawn = [body is None or camera in body.cameras for body in self._cullable]
-        return np.array(may_be_drawn)
 
     def poses(self) -> Floats:
         """Return the current poses of the bodies, (n, 4, 4)."""
@@ -86,17 +91,16 @@ class CullableBodies:
             poses: poses of the bodies, (n, 4, 4).
             view: extrinsic matrix of the camera (3, 4).
         """
-        corners = np.einsum("bij,bkj->bki", poses, self._boxes) @ view.T
-        outside = _outside(corners)  # plane, body, corner
-        visible = self._drawn_by[camera] & ~outside.all(axis=-1).any(axis=0)
+        to_camera = view @ poses  # (n, 3, 4), from the frame of each body
+        outside = _outside(to_camera @ self._boxes)
+        visible = self._drawn_by[camera] & _reach_view(outside)
         # Boxes are larger than what they hold: where one crosses a plane, the hull decides.
-        for number in np.flatnonzero(visible & outside.any(axis=(0, -1))):
-            cullable = self._cullable[number]
-            if cullable is not None:
-                to_camera = view @ poses[number]
-                points = cullable.hull @ to_camera[:, :3].T + to_camera[:, 3]
-                visible[number] = not _outside(points, HULL_MARGIN).all(axis=-1).any()
-        return np.asarray(visible)
+        crosses_plane = outside.any(axis=(PLANE, POINT))
+        for number in np.flatnonzero(visible & crosses_plane):
+            hull = self._hulls.get(number)
+            if hull is not None:
+                visible[number] = _reach_view(_outside(to_camera[number] @ hull, HULL_MARGIN))
+        return visible
 
     def take_picture(
         self, camera: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]
@@ -124,18 +128,27 @@ def _render_bodies(scene: sapien.Scene) -> list[sapien.render.RenderBodyComponen
 
 
 def _outside(points: Floats, margin: float = 0.0) -> NDArray[np.bool_]:
-    """Return for each plane that bounds a view, (5, ...), which points are outside of it.
+    """Return for each plane that bounds a view, (5, ..., k), which points are outside of it.
 
-    The half angle of view is 45 degrees, so the planes are z = NEAR, |x| = z and |y| = z. A body
-    with all its points outside one plane cannot be seen.
+    The half angle of view is 45 degrees, so the planes are z = NEAR, |x| = z and |y| = z.
 
     Args:
-        points: (..., 3), m, in the camera's frame: x right, y down, z forward (OpenCV).
+        points: (..., 3, k), m, one a column, in the camera's frame: x right, y down, z forward
+            (OpenCV).
         margin: distance outside, m, that counts.
     """
-    x, y, z = np.moveaxis(points, -1, 0)
-    slack = math.sqrt(2.0) * margin
-    return np.stack([z < NEAR - margin, *(side > z + slack for side in (x, -x, y, -y))])
+    x, y, z = np.moveaxis(points, -2, 0)
+    edge = z + math.sqrt(2.0) * margin
+    return np.stack([z < NEAR - margin, x > edge, -x > edge, y > edge, -y > edge])
+
+
+def _reach_view(outside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return for each body whether it may be seen: no plane has all its points outside.
+
+    Args:
+        outside: as of `_outside`.
+    """
+    return ~outside.all(axis=POINT).any(axis=PLANE)
 
 
 def invalidate_command_buffers(body: sapien.render.RenderBodyComponent) -> None:
@@ -156,10 +169,13 @@ _bounds_of_files: dict[tuple[object, ...], _Bounds] = {}
 
 
 def _box(points: Floats) -> Floats:
-    """Return homogeneous corners (8, 4) of the box around points (n, 3), with the margin."""
-    low = points.min(axis=0) - MARGIN
-    high = points.max(axis=0) + MARGIN
-    return np.column_stack([_corners(low, high), np.ones(8)])
+    """Return the corners of the box around points (n, 3), with the margin, as `_columns`."""
+    return _columns(_corners(points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN))
+
+
+def _columns(points: Floats) -> Floats:
+    """Return points (n, 3) as homogeneous columns (4, n)."""
+    return np.stack([*points.T, np.ones(len(points))])
 
 
 def _corners(low: Floats, high: Floats) -> Floats:
