@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from dataclasses import replace
-from typing import NamedTuple
 
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError, RoboIRGError
@@ -20,13 +19,6 @@ FIRST_WORDS = "Put the red cube on the target."
 VIDEO_STEPS = 4
 
 
-class _Made(NamedTuple):
-    """A policy that was made, and what it declares to need."""
-
-    policy: Policy
-    needs: PolicyNeeds
-
-
 def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
     """Make a policy, begin a synthetic episode with it, and return what it then declares.
 
@@ -39,26 +31,25 @@ def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
     """
     if ref.kind in (CLASS, LIVE):
         ref = look_up(ref)  # a class declares before any object of it is made
-        made = _make(ref, seed)
+        policy, needs = _make(ref, seed)
     else:
-        made = _make(ref, seed)
-        ref = declared_by(ref, made.policy)
+        policy, needs = _make(ref, seed)
+        ref = declared_by(ref, policy)
     try:
-        problem = _problem_of_reset(made)
+        problem = _problem_of_reset(policy, needs)
         if problem is not None:
             return replace(ref, version=UNKNOWN_VERSION, problem=problem)
-        version = read_version(made.policy) or ref.version
-        return replace(ref, needs=made.needs, version=version)
+        return replace(ref, needs=needs, version=read_version(policy) or ref.version)
     finally:
         with contextlib.suppress(Exception, SystemExit):  # how it ends does not count
-            close_policy(made.policy)
+            close_policy(policy)
 
 
-def _make(ref: PolicyRef, seed: int) -> _Made:
+def _make(ref: PolicyRef, seed: int) -> tuple[Policy, PolicyNeeds]:
     """Return a policy and its needs; whatever its code raises becomes an InvalidValueError."""
     try:
         policy = make_policy(ref, seed)
-        return _Made(policy, PolicyNeeds.of(policy))
+        return policy, PolicyNeeds.of(policy)
     except RoboIRGError:
         raise
     except (Exception, SystemExit) as error:
@@ -67,11 +58,11 @@ def _make(ref: PolicyRef, seed: int) -> _Made:
         ) from error
 
 
-def _problem_of_reset(made: _Made) -> str | None:
+def _problem_of_reset(policy: Policy, needs: PolicyNeeds) -> str | None:
     """Begin a synthetic episode; return in words what a policy's code raises, None if nothing."""
     try:
-        episode = SyntheticEpisodes(made.needs).episode(FIRST_WORDS, VIDEO_STEPS)
-        made.policy.reset(episode.instruction, episode.demonstration)
+        episode = SyntheticEpisodes(needs).episode(FIRST_WORDS, VIDEO_STEPS)
+        policy.reset(episode.instruction, episode.demonstration)
     except (Exception, SystemExit) as error:  # noqa: BLE001 - the policy's own
         return f"reset(): {one_line(error)}"
     return None

@@ -35,13 +35,11 @@ class QuerySchedule:
 
     def __init__(self, asked: Asked, first_pause: int, holds: Mapping[str, int]) -> None:
         self._waits_for_news = asked == WHEN_DONE
-        # Such as "every 16 steps".
-        number = re.search(r"\d+", asked)
-        self._period = None if number is None else int(number[0])
-        """Control steps between two queries; None if these do not depend on the time."""
+        number = re.search(r"\d+", asked)  # of "every 16 steps"
+        self._period = int(number[0]) if number else 1  # control steps
+        self._last_period = -1
         self._first_pause = first_pause
         self._holds = holds
-        self._periods_begun = 0
         self.has_news = False
         self.useless = 0
 
@@ -51,7 +49,9 @@ class QuerySchedule:
         A planner that is asked every N steps is due at the first chunk of each period; one that is
         asked when a subgoal is done, after news. Without any subgoal yet, both are due.
         """
-        begins_period = self._begins_period(step)
+        period = step // self._period
+        begins_period = period > self._last_period
+        self._last_period = period
         if self._waits_for_news and self.useless >= MOST_USELESS:
             return False
         if subgoal is None:
@@ -64,15 +64,6 @@ class QuerySchedule:
         """Note a reply; one that was of no use leaves the news without an answer."""
         self.has_news = not is_useful
         self.useless = 0 if is_useful else self.useless + 1
-
-    def _begins_period(self, step: int) -> bool:
-        """Return whether the chunk at a control step is the first one of its period."""
-        if self._period is None:
-            return True
-        number = step // self._period
-        is_first = number > self._periods_begun
-        self._periods_begun = number
-        return is_first
 
     def _is_held(self, subgoal: str, step: int) -> bool:
         """Return whether a subgoal is kept at a control step, whatever the model would answer."""

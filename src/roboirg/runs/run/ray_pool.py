@@ -263,13 +263,11 @@ class RayPool:
     def _emptiest_machine(self) -> _Machine | None:
         """Return the fit machine with the fewest workers; None if none has room for one more."""
         counts = Counter(worker.machine.node for worker in self._workers)
-        emptiest: _Machine | None = None
-        for _, machine in sorted(self._machines.items()):
-            if not machine.is_fit or counts[machine.node] >= machine.slots:
-                continue
-            if emptiest is None or counts[machine.node] < counts[emptiest.node]:
-                emptiest = machine
-        return emptiest
+        with_room = []
+        for machine in self._machines.values():
+            if machine.is_fit and counts[machine.node] < machine.slots:
+                with_room.append(machine)
+        return min(with_room, key=lambda there: (counts[there.node], there.node), default=None)
 
     def _assign(self, jobs: deque[Job]) -> None:
         """Give each idle worker the first job that may be played there.
@@ -362,12 +360,8 @@ class RayPool:
             lost: the worker, or the machine whose agent was lost.
             reason: in words.
         """
-        if isinstance(lost, _Machine):
-            machine = lost
-            workers = [worker for worker in self._workers if worker.machine is lost]
-        else:
-            machine = lost.machine
-            workers = [worker for worker in self._workers if worker is lost]
+        machine = lost.machine if isinstance(lost, _Worker) else lost
+        workers = [worker for worker in self._workers if lost in (worker, worker.machine)]
         for worker in workers:
             self._end(worker)
         self._count_loss(machine, reason)

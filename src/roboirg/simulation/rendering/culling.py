@@ -10,10 +10,10 @@ recording. So each camera keeps the command buffer of its visible bodies until t
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import sapien
@@ -157,20 +157,13 @@ def invalidate_command_buffers(body: sapien.render.RenderBodyComponent) -> None:
     body.visibility = 1.0
 
 
-class _Bounds(NamedTuple):
-    """Lowest and highest coordinates, (3) each, m."""
-
-    low: Floats
-    high: Floats
-
-
-_bounds_of_files: dict[tuple[object, ...], _Bounds] = {}
-"""Bounds of meshes by file and scale."""
+_corners_of_files: dict[tuple[object, ...], Floats] = {}
+"""Corners of the boxes of meshes by file and scale."""
 
 
 def _box(points: Floats) -> Floats:
     """Return the corners of the box around points (n, 3), with the margin, as `_columns`."""
-    return _columns(_corners(points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN))
+    return _columns(_corners(points, MARGIN))
 
 
 def _columns(points: Floats) -> Floats:
@@ -178,10 +171,11 @@ def _columns(points: Floats) -> Floats:
     return np.stack([*points.T, np.ones(len(points))])
 
 
-def _corners(low: Floats, high: Floats) -> Floats:
-    """Return the corners (8, 3) of the box between two opposite ones (3)."""
-    grid = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1)
-    return grid.reshape(-1, 3)
+def _corners(points: NDArray[np.floating], margin: float = 0.0) -> Floats:
+    """Return the corners (8, 3) of the box around points (n, 3), grown by a margin."""
+    low = points.min(axis=0).astype(np.float64) - margin
+    high = points.max(axis=0).astype(np.float64) + margin
+    return np.array(list(itertools.product(*zip(low, high, strict=True))))
 
 
 def _points(body: sapien.render.RenderBodyComponent) -> Floats:
@@ -191,30 +185,21 @@ def _points(body: sapien.render.RenderBodyComponent) -> Floats:
 
 def _shape_corners(shape: sapien.render.RenderShape) -> Floats:
     """Return corners of a shape's box in its entity's frame, (8, 3)."""
-    bounds = _shape_bounds(shape)
-    corners = _corners(bounds.low, bounds.high)
     matrix = shape.local_pose.to_transformation_matrix()
-    return np.asarray(corners @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.asarray(_own_corners(shape) @ matrix[:3, :3].T + matrix[:3, 3])
 
 
-def _shape_bounds(shape: sapien.render.RenderShape) -> _Bounds:
-    """Return a shape's bounds in its own frame; those of a file are computed once per process."""
+def _own_corners(shape: sapien.render.RenderShape) -> Floats:
+    """Return corners (8, 3) of a shape's box in the shape's frame; of a file once per process."""
     if isinstance(shape, sapien.render.RenderShapeBox):
-        half = np.asarray(shape.half_size, dtype=np.float64)
-        return _Bounds(-half, half)
+        return _corners(np.array([shape.half_size, -shape.half_size]))
     if isinstance(shape, sapien.render.RenderShapeCylinder):
-        half = np.array([shape.half_length, shape.radius, shape.radius], dtype=np.float64)
-        return _Bounds(-half, half)
-    if not shape.filename:
-        return _mesh_bounds(shape)
+        half = np.array([shape.half_length, shape.radius, shape.radius])
+        return _corners(np.array([half, -half]))
     key = (shape.filename, *shape.scale)
-    if key not in _bounds_of_files:
-        _bounds_of_files[key] = _mesh_bounds(shape)
-    return _bounds_of_files[key]
-
-
-def _mesh_bounds(shape: sapien.render.RenderShapeTriangleMesh) -> _Bounds:
-    """Return the bounds of a mesh in its own frame."""
-    points = np.concatenate([part.vertices for part in shape.parts]) * shape.scale
-    low = points.min(axis=0).astype(np.float64)
-    return _Bounds(low, points.max(axis=0).astype(np.float64))
+    corners = _corners_of_files.get(key)
+    if corners is None:
+        corners = _corners(np.concatenate([part.vertices for part in shape.parts]) * shape.scale)
+        if shape.filename:
+            _corners_of_files[key] = corners
+    return corners

@@ -171,11 +171,6 @@ class _SentFrames:
             for image, state in zip(images, states, strict=True)
         ]
 
-    @property
-    def steps(self) -> int:
-        """Control steps of the policy; the first frame of its turn was seen before any."""
-        return max(self.count - self.turn_start - 1, 0)
-
 
 class MmeVlaService(Service):
     """Answers ``reset``, ``add_buffer`` and requests for actions, in that order of precedence."""
@@ -213,7 +208,9 @@ class MmeVlaService(Service):
             video = frames[: self._sent.turn_start]
             self.begin(instruction, _demonstration(video, observation))
             frames = []
-        self.hear(instruction, self._sent.steps)
+        # The first frame of the turn was seen before any step.
+        steps = self._sent.count - self._sent.turn_start - 1
+        self.hear(instruction, max(steps, 0))
 
         history = tuple({**frame, "instruction": instruction} for frame in frames)
         observation["history"] = history  # type: ignore[typeddict-item]
