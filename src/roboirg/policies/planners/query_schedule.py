@@ -58,14 +58,11 @@ class QuerySchedule:
             return True
         if self._waits_for_news and not self.has_news:
             return False
-        return begins_period and not self._is_held(subgoal, step)
+        words, _ = split_point(subgoal)
+        is_held = step <= self._holds.get(words, -1) or step < self._first_pause
+        return begins_period and not is_held
 
     def note_reply(self, *, is_useful: bool) -> None:
         """Note a reply; one that was of no use leaves the news without an answer."""
         self.has_news = not is_useful
         self.useless = 0 if is_useful else self.useless + 1
-
-    def _is_held(self, subgoal: str, step: int) -> bool:
-        """Return whether a subgoal is kept at a control step, whatever the model would answer."""
-        words, _ = split_point(subgoal)
-        return step <= self._holds.get(words, -1) or step < self._first_pause

@@ -180,16 +180,14 @@ def _corners(points: NDArray[np.floating], margin: float = 0.0) -> Floats:
 
 def _points(body: sapien.render.RenderBodyComponent) -> Floats:
     """Return corners (n, 3) of the boxes of a body's shapes in its entity's frame."""
-    return np.concatenate([_shape_corners(shape) for shape in body.render_shapes])
+    points = []
+    for shape in body.render_shapes:
+        matrix = shape.local_pose.to_transformation_matrix()
+        points.append(_shape_corners(shape) @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.concatenate(points)
 
 
 def _shape_corners(shape: sapien.render.RenderShape) -> Floats:
-    """Return corners of a shape's box in its entity's frame, (8, 3)."""
-    matrix = shape.local_pose.to_transformation_matrix()
-    return np.asarray(_own_corners(shape) @ matrix[:3, :3].T + matrix[:3, 3])
-
-
-def _own_corners(shape: sapien.render.RenderShape) -> Floats:
     """Return corners (8, 3) of a shape's box in the shape's frame; of a file once per process."""
     if isinstance(shape, sapien.render.RenderShapeBox):
         return _corners(np.array([shape.half_size, -shape.half_size]))

@@ -170,9 +170,9 @@ def _read_columns(message: Message) -> dict[str, list[Any]]:
         if name in message:
             fields[name] = field
     columns = {field: message.get(name) for name, field in fields.items()}
-    lengths = {len(column) for column in columns.values() if isinstance(column, list)}
-    are_lists = all(isinstance(column, list) for column in columns.values())
-    if not are_lists or len(lengths) > 1 or 0 in lengths:
+    # What is no list counts as an empty one.
+    lengths = {len(column) if isinstance(column, list) else 0 for column in columns.values()}
+    if len(lengths) > 1 or 0 in lengths:
         raise ValueError(f"{', '.join(fields)} must be lists of the same length, at least 1.")
     return cast("dict[str, list[Any]]", columns)
 

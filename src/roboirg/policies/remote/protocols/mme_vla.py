@@ -188,12 +188,14 @@ class MmeVlaService(Service):
         if message.get("reset"):
             self.forget()
             self._sent = _SentFrames()
-            return _confirmation("reset", begin)
-        if message.get("add_buffer"):
+            done = "reset"
+        elif message.get("add_buffer"):
             self._sent.add(message)
-            return _confirmation("add_buffer", begin)
-        actions, milliseconds = self._infer(message)
-        return {"actions": actions, "infer_time_ms": milliseconds}
+            done = "add_buffer"
+        else:
+            actions, milliseconds = self._infer(message)
+            return {"actions": actions, "infer_time_ms": milliseconds}
+        return {f"{done}_finished": True, f"{done}_time_ms": 1000 * (time.perf_counter() - begin)}
 
     def _infer(self, message: Message) -> tuple[NDArray[np.float64], float]:
         """Return the policy's actions and their milliseconds; the first request begins its episode.
@@ -219,17 +221,6 @@ class MmeVlaService(Service):
         if isinstance(self.policy, SubgoalFollower) and subgoal is not None:
             self.policy.follow(str(subgoal))
         return self.act(observation)
-
-
-def _confirmation(done: str, begin: float) -> dict[str, Any]:
-    """Return the reply to a message that asked for no actions.
-
-    Args:
-        done: ``reset`` or ``add_buffer``.
-        begin: when the message came, seconds of the performance counter.
-    """
-    milliseconds = 1000 * (time.perf_counter() - begin)
-    return {f"{done}_finished": True, f"{done}_time_ms": milliseconds}
 
 
 def _new_frames(demonstration: Demonstration | None, observation: Observation) -> Iterator[_Frame]:
