@@ -29,7 +29,7 @@ class RandomState:
         """PyTorch, once the episode has seeded its generators; None before."""
         self._torch_processor: Any = None
         """State of PyTorch's generator of the processor."""
-        self._torch_devices: list[Any] = []
+        self._torch_devices: Any = ()
         """States of PyTorch's generators of devices."""
 
     def keep(self) -> None:

@@ -70,9 +70,8 @@ class _LifeCheck:
             if self._answered_at > asked_at:  # to another world, meanwhile
                 return True
             # What it has sent before it is asked is no answer; it only shows that it has started.
-            if wait([self._line], 0.0):
-                unasked = self._line.recv(MAX_OUTPUT)
-                self._has_started |= bool(unasked)
+            if wait([self._line], 0.0) and self._line.recv(MAX_OUTPUT):
+                self._has_started = True
             ask(self._line, HostRequest("check"))
             patience_s = limit_s + MARGIN_S
             if not self._has_started:

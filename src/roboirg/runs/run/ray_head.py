@@ -36,12 +36,8 @@ class ClusterHead:
         self._answered_at = time.monotonic()
         return True
 
-    def has_answered(self) -> bool:
-        """Return whether it has answered within `POLL_S`, or does now."""
-        return time.monotonic() - self._answered_at <= POLL_S or self.answers()
-
     def wait(self, left: int) -> None:
-        """Wait a moment for it.
+        """Wait until it answers, unless it has within `POLL_S`.
 
         Args:
             left: episodes that were not played.
@@ -49,10 +45,11 @@ class ClusterHead:
         Raises:
             RoboIRGError: it has not answered for too long.
         """
-        if time.monotonic() - self._answered_at > HEAD_LOST_S:
-            raise RoboIRGError(
-                f"The head of the Ray cluster at {self._address} has not answered for "
-                f"{HEAD_LOST_S:g} s; run the same command again to play the remaining "
-                f"{counted(left, 'episode')}."
-            )
-        time.sleep(POLL_S)
+        while time.monotonic() - self._answered_at > POLL_S and not self.answers():
+            if time.monotonic() - self._answered_at > HEAD_LOST_S:
+                raise RoboIRGError(
+                    f"The head of the Ray cluster at {self._address} has not answered for "
+                    f"{HEAD_LOST_S:g} s; run the same command again to play the remaining "
+                    f"{counted(left, 'episode')}."
+                )
+            time.sleep(POLL_S)

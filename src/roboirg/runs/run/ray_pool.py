@@ -165,9 +165,7 @@ class RayPool:
         policies = dict.fromkeys(job.ref for job in jobs if job.ref is not None)
         versions = MachineVersions.expected(tuple(policies))
         while jobs or self._busy():
-            if not self._head.has_answered():
-                self._head.wait(len(jobs))
-                continue
+            self._head.wait(len(jobs))
             self._look_for_machines(versions)
             self._start_workers(len(jobs))
             self._assign(jobs)

@@ -68,12 +68,13 @@ class CullableBodies:
         for number, body in enumerate(self._bodies):
             cullable = cullable_bodies.get(body)
             if cullable is None:
-                boxes.append(_box(_points(body)))
-                continue
-            boxes.append(_box(cullable.hull))
-            self._hulls[number] = _columns(cullable.hull)
-            for camera in CAMERAS:
-                self._drawn_by[camera][number] = camera in cullable.cameras
+                points = _points(body)
+            else:
+                points = cullable.hull
+                self._hulls[number] = _columns(points)
+                for camera in CAMERAS:
+                    self._drawn_by[camera][number] = camera in cullable.cameras
+            boxes.append(_columns(_corners(points, MARGIN)))
         self._boxes = np.stack(boxes)
         # Which bodies have the shading mode of drawn ones now, and in each command buffer.
         self._drawn = np.ones(len(self._bodies), dtype=bool)
@@ -159,11 +160,6 @@ def invalidate_command_buffers(body: sapien.render.RenderBodyComponent) -> None:
 
 _corners_of_files: dict[tuple[object, ...], Floats] = {}
 """Corners of the boxes of meshes by file and scale."""
-
-
-def _box(points: Floats) -> Floats:
-    """Return the corners of the box around points (n, 3), with the margin, as `_columns`."""
-    return _columns(_corners(points, MARGIN))
 
 
 def _columns(points: Floats) -> Floats:

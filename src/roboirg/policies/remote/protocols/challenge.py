@@ -152,10 +152,9 @@ def _read_observations(message: Message) -> list[Observation]:
             in_all[field] = message[name]
 
     columns = _read_columns(message)
-    count = len(columns["front_rgb"])
     observations: list[Any] = []
-    for index in range(count):
-        observation = {field: column[index] for field, column in columns.items()}
+    for values in zip(*columns.values(), strict=True):
+        observation = dict(zip(columns, values, strict=True))
         observations.append(observation | in_all)
     return observations
 

@@ -249,8 +249,7 @@ def _demonstration(
         if frames:
             demonstration[name] = np.stack([frame[name] for frame in frames])
         else:  # an array of length 0, whose other sizes are those of a frame
-            now: NDArray[Any] = np.asarray(observation[name])
-            demonstration[name] = now[None][:0]
+            demonstration[name] = np.asarray(observation[name])[None][:0]
     return demonstration
 
 
