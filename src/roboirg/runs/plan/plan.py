@@ -98,8 +98,8 @@ class Plan(PlanFields):
         """Raise if the split lacks an episode, or a task has no setting of a name that is given."""
         for task in self.tasks:
             # If the first and the last exist, so do all between them.
-            splits.get_episode(task, self.split, min(self.episodes))
-            splits.get_episode(task, self.split, max(self.episodes))
+            for episode in (min(self.episodes), max(self.episodes)):
+                splits.get_episode(task, self.split, episode)
             if self._has_groups:  # a task may lack some settings of a group
                 continue
             for setting in self.setting_names:

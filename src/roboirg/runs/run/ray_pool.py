@@ -383,8 +383,8 @@ class RayPool:
         self._kill(worker.actor)
         agent = worker.machine.actor
         if worker.pid is not None and agent is not None and self._head.answers():
-            end = agent.end.options(concurrency_group="beat")
-            end.remote(worker.pid)  # Ray does not kill what is frozen
+            # Ray does not kill what is frozen.
+            agent.end.options(concurrency_group="beat").remote(worker.pid)
 
     def _forget_calls(self, called: _Worker | _Machine) -> None:
         """Wait no longer for the calls of an actor."""
