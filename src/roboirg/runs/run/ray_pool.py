@@ -261,10 +261,11 @@ class RayPool:
     def _emptiest_machine(self) -> _Machine | None:
         """Return the fit machine with the fewest workers; None if none has room for one more."""
         counts = Counter(worker.machine.node for worker in self._workers)
-        with_room = []
-        for machine in self._machines.values():
-            if machine.is_fit and counts[machine.node] < machine.slots:
-                with_room.append(machine)
+        with_room = [
+            machine
+            for machine in self._machines.values()
+            if machine.is_fit and counts[machine.node] < machine.slots
+        ]
         return min(with_room, key=lambda there: (counts[there.node], there.node), default=None)
 
     def _assign(self, jobs: deque[Job]) -> None:

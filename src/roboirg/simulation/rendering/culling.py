@@ -149,7 +149,7 @@ def _reach_view(outside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     Args:
         outside: as of `_outside`.
     """
-    return ~outside.all(axis=POINT).any(axis=PLANE)
+    return np.asarray(~np.any(np.all(outside, axis=POINT), axis=PLANE))
 
 
 def invalidate_command_buffers(body: sapien.render.RenderBodyComponent) -> None:
