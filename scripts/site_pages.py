@@ -12,7 +12,7 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 
 from roboirg.main import app
-from roboirg.runs.plan.plan import plan_options
+from roboirg.runs.plan.plan_fields import plan_options
 
 ROOT = Path(__file__).parents[1]
 COMMAND_LINE = "command-line.md"

@@ -16,7 +16,7 @@ from roboirg.core.instruction_options import (
     InstructionKeywords,
 )
 from roboirg.main import app
-from roboirg.runs.plan.plan import plan_options
+from roboirg.runs.plan.plan_fields import plan_options
 from roboirg.runs.plan.plan_file import plan_text, read_plan_file
 from roboirg.runs.plan.plan_maker import make_plan
 

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
 from types import FrameType
 
 
 def main() -> None:
     """Run the command; before and after it, Ctrl-C ends the process at once."""
-    is_handled = signal.getsignal(signal.SIGINT) is not signal.SIG_IGN
-    if is_handled:
-        signal.signal(signal.SIGINT, _stop)
+    _on_ctrl_c(_stop)
     from roboirg.main import main as run
 
     try:
-        if is_handled:
-            signal.signal(signal.SIGINT, _interrupt)
+        _on_ctrl_c(_interrupt)
         run()
     except BaseException as error:
         # Python 3.11 wraps what interrupts a class definition in a RuntimeError.
@@ -24,8 +22,13 @@ def main() -> None:
             _stop()
         raise
     finally:
-        if is_handled:
-            signal.signal(signal.SIGINT, _stop)
+        _on_ctrl_c(_stop)
+
+
+def _on_ctrl_c(handler: Callable[[int, FrameType | None], None]) -> None:
+    """Set what Ctrl-C does, unless it is ignored, as in a shell's background."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, handler)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:

@@ -17,7 +17,8 @@ from made_records import make_record
 from roboirg.core.errors import RenderDeviceError
 from roboirg.records.record import NON_DETERMINISTIC_FIELDS, EventRecord, Job, Record
 from roboirg.records.store import RECORDS_FILE, read_records
-from roboirg.runs.plan.plan import SECTION_KEYS, Plan
+from roboirg.runs.plan.plan import Plan
+from roboirg.runs.plan.plan_fields import SECTION_KEYS
 from roboirg.runs.run.executor import InProcess, LocalProcesses
 from roboirg.runs.run.runner import RunSummary, run_plan
 

@@ -26,7 +26,7 @@ from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.planners import make_planner as make_by_kind
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.planners.oracle_planner import OraclePlanner
-from roboirg.policies.planners.vlm_planner import MOST_USELESS
+from roboirg.policies.planners.query_schedule import MOST_USELESS
 from roboirg.policies.vlm.models import ModelOptions
 
 CHUNK = 16

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.policies.contract.random_state import RandomState
+from roboirg.policies.contract.random_state import RandomState, RandomTurns
 
 NOBODY = None
 
@@ -16,23 +16,21 @@ def draw():
 
 
 def drawn_alone(seed, count):
-    state, numbers = RandomState(seed), []
-    for _ in range(count):
-        with state:
-            numbers.append(draw())
-    return numbers
+    RandomTurns().begin(RandomState(seed))
+    return [draw() for _ in range(count)]
 
 
 @given(st.lists(st.sampled_from([0, 1, 2, NOBODY]), max_size=30))
 def test_the_order_of_turns_changes_no_episode_s_numbers(turns):
     states = [RandomState(seed) for seed in range(3)]
+    random_turns = RandomTurns()
     found = [[], [], []]
     for turn in turns:
         if turn is NOBODY:  # a call for several episodes
-            RandomState.set_aside()
+            random_turns.end()
             draw()
         else:
-            with states[turn]:
-                found[turn].append(draw())
+            random_turns.begin(states[turn])
+            found[turn].append(draw())
     for seed, numbers in enumerate(found):
         assert numbers == drawn_alone(seed, len(numbers))

@@ -21,7 +21,7 @@ from run_fakes import FakePlayer, changed, line_count, small_plan
 from roboirg.core.errors import InvalidValueError, RoboIRGError
 from roboirg.records.store import RECORDS_FILE, read_records
 from roboirg.runs.plan.plan_sections import WorkerNeeds
-from roboirg.runs.run import ray_pool
+from roboirg.runs.run import ray_head, ray_pool
 from roboirg.runs.run.progress import Reporter
 from roboirg.runs.run.ray_cluster import RayCluster
 from roboirg.runs.run.runner import run_plan
@@ -182,7 +182,7 @@ def test_a_worker_gets_what_the_plan_asks_for(
 def test_the_loss_of_the_head_is_one_sentence(
     cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(ray_pool, "HEAD_LOST_S", 5.0)
+    monkeypatch.setattr(ray_head, "HEAD_LOST_S", 5.0)
     gcs = cluster.head_node.all_processes["gcs_server"][0].process.pid
 
     def kill() -> None:

@@ -63,7 +63,7 @@ def evaluate(
     """
     from roboirg.analysis.run_results import Results
     from roboirg.api.python_run import play_plan, python_plan
-    from roboirg.runs.plan.plan import PLAN_KEYS
+    from roboirg.runs.plan.plan_fields import PLAN_KEYS
 
     # The nearest name may be a parameter's, too.
     known = (*inspect.signature(evaluate).parameters, *PLAN_KEYS)

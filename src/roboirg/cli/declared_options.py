@@ -101,7 +101,7 @@ class RunCommand(DeclaredCommand):
 
         The help of each ends with its default.
         """
-        from roboirg.runs.plan.plan import plan_options
+        from roboirg.runs.plan.plan_fields import plan_options
 
         options = {option.name: option for option in plan_options()}
         for panel, names in _PANELS.items():

@@ -119,7 +119,7 @@ class PlanWords:
         of instructions. Options may stand alone in the plan, or in its section ``instruction``.
         Each is checked by itself; `check_options` checks whether they go together.
         """
-        from roboirg.runs.plan.plan import FLAT
+        from roboirg.runs.plan.plan_fields import FLAT
         from roboirg.runs.plan.plan_maker import word_options
 
         names = {"stages", "wordings", "instruction"}

@@ -199,7 +199,7 @@ def _plan(name: str | None, typed: dict[str, Any], usual: Sequence[str]) -> Plan
         typed: options by name.
         usual: the policies of a plan that names none; empty to refuse such a plan.
     """
-    from roboirg.runs.plan.plan import FLAT
+    from roboirg.runs.plan.plan_fields import FLAT
     from roboirg.runs.plan.plan_file import read_plan_file
     from roboirg.runs.plan.plan_maker import make_plan
     from roboirg.tasks.splits.private_splits import drawn_split

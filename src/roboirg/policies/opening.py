@@ -11,7 +11,7 @@ from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import UNKNOWN_VERSION, PolicyRef
 from roboirg.policies.by_name.finding import declared_by, look_up, make_policy
 from roboirg.policies.by_name.policy_kinds import CLASS, LIVE
-from roboirg.policies.contract.base import close_policy
+from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.policy_version import read_version
 from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes
 
@@ -29,27 +29,40 @@ def opened(ref: PolicyRef, seed: int = 0) -> PolicyRef:
         InvalidValueError: it cannot be made, or its version is no version; and as `make_policy`.
         MissingDependencyError: a library that it needs is not installed.
     """
-    declares_in_class = ref.kind in (CLASS, LIVE)
-    if declares_in_class:
-        ref = look_up(ref)
-    try:
-        policy = make_policy(ref, seed)
-        needs = PolicyNeeds.of(policy)
-    except RoboIRGError:
-        raise
-    except (Exception, SystemExit) as error:  # the policy's own code runs here
-        raise InvalidValueError(
-            f"Policy {ref.spec!r} cannot be made: {one_line(error)}."
-        ) from error
-    if not declares_in_class:
+    if ref.kind in (CLASS, LIVE):
+        ref = look_up(ref)  # a class declares before any object of it is made
+        policy, needs = _make(ref, seed)
+    else:
+        policy, needs = _make(ref, seed)
         ref = declared_by(ref, policy)
     try:
-        episode = SyntheticEpisodes(needs).episode(FIRST_WORDS, VIDEO_STEPS)
-        policy.reset(episode.instruction, episode.demonstration)
-    except (Exception, SystemExit) as error:  # noqa: BLE001 - likewise
-        return replace(ref, version=UNKNOWN_VERSION, problem=f"reset(): {one_line(error)}")
-    else:
+        problem = _problem_of_reset(policy, needs)
+        if problem is not None:
+            return replace(ref, version=UNKNOWN_VERSION, problem=problem)
         return replace(ref, needs=needs, version=read_version(policy) or ref.version)
     finally:
         with contextlib.suppress(Exception, SystemExit):  # how it ends does not count
             close_policy(policy)
+
+
+def _make(ref: PolicyRef, seed: int) -> tuple[Policy, PolicyNeeds]:
+    """Return a policy and its needs; whatever its code raises becomes an InvalidValueError."""
+    try:
+        policy = make_policy(ref, seed)
+        return policy, PolicyNeeds.of(policy)
+    except RoboIRGError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise InvalidValueError(
+            f"Policy {ref.spec!r} cannot be made: {one_line(error)}."
+        ) from error
+
+
+def _problem_of_reset(policy: Policy, needs: PolicyNeeds) -> str | None:
+    """Begin a synthetic episode; return in words what a policy's code raises, None if nothing."""
+    try:
+        episode = SyntheticEpisodes(needs).episode(FIRST_WORDS, VIDEO_STEPS)
+        policy.reset(episode.instruction, episode.demonstration)
+    except (Exception, SystemExit) as error:  # noqa: BLE001 - the policy's own
+        return f"reset(): {one_line(error)}"
+    return None

@@ -90,7 +90,11 @@ class AttemptDetector:
             found.append(Fact("lingering", "robot"))
         if tool.z <= HAND_HIGH:
             if opening > FINGERS_OPEN:
-                self._open_gaps = self._gaps_below(tool)
+                self._open_gaps = {
+                    near.item.name: near.gap
+                    for near in self.near
+                    if tool.z - near.position.z <= HAND_LOWERED
+                }
             if is_shut and not peak:
                 found += self._missed_objects()
             found += self._hand_at_objects(tool)
@@ -109,14 +113,6 @@ class AttemptDetector:
             self._lingers_at = tool
             self._lingering_steps = 0
         return self._lingering_steps >= LINGER_STEPS
-
-    def _gaps_below(self, tool: Point) -> dict[str, float]:
-        """Return the gaps to the near objects that the hand is low over, by name."""
-        return {
-            near.item.name: near.gap
-            for near in self.near
-            if tool.z - near.position.z <= HAND_LOWERED
-        }
 
     def _missed_objects(self) -> Iterator[Fact]:
         """Yield what fingers that have just closed on nothing may have been meant to grasp.

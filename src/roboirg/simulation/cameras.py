@@ -48,11 +48,13 @@ class _View:
     Attributes:
         state: everything that determines the picture.
         bodies: for each body of the scene, whether it is drawn.
+        poses: of all bodies, so of the wrist camera, when this last was the view.
         fetched: shader outputs that have been fetched, by name.
     """
 
     state: bytes
     bodies: NDArray[np.bool_]
+    poses: bytes
     fetched: dict[str, NDArray[np.integer[Any]]] = field(default_factory=dict)
 
 
@@ -66,27 +68,11 @@ class Cameras:
         self, scene: sapien.Scene, robot: Panda, rendering: RenderSettings = FAITHFUL
     ) -> None:
         self._scene = scene
-        self._color = STOCK_COLOR
-        shader = ""  # SAPIEN's own
-        if rendering.slim_shader:
-            self._color = COLOR
-            shader = slim_shader()
-        self._components = {name: _make_camera(name, shader) for name in CAMERAS}
-        fixed = sapien.Entity()
-        fixed.name = "front_camera"
-        fixed.add_component(self._components[FRONT])
-        fixed.set_pose(front_camera_pose())
-        scene.add_entity(fixed)
-        robot.links[CAMERA_LINK].entity.add_component(self._components[WRIST])
-        if rendering.quick_start:
-            for component in self._components.values():
-                component.set_texture("BRDFLUT", placeholder_brdf_table())
-
+        self._color = COLOR if rendering.slim_shader else STOCK_COLOR
+        self._components = _add_cameras(scene, robot, rendering)
         self._bodies = CullableBodies(scene, robot.cullable_bodies)
         self._has_culling = rendering.culling
-        self._last: dict[str, _View] = {}
-        # All poses, the wrist camera's included, for which each camera's last picture is valid.
-        self._last_poses: dict[str, bytes] = {}
+        self._last: dict[str, _View] = {}  # by camera: what it has drawn last
         self._is_frozen = False
 
     def picture(self, camera: str) -> Pixels:
@@ -131,16 +117,18 @@ class Cameras:
             return
         poses = self._bodies.poses()
         poses_bytes = poses.tobytes()
-        stale = [camera for camera in cameras if self._last_poses.get(camera) != poses_bytes]
         changed: dict[str, _View] = {}
-        for camera in stale:
+        for camera in cameras:
+            last = self._last.get(camera)
+            if last is not None and last.poses == poses_bytes:
+                continue
             view = self._view_of(camera, poses)
-            if self._is_new(camera, view):
+            if last is not None and last.state == view.state:
+                last.poses = poses_bytes
+            else:
                 changed[camera] = view
         if changed:
             self._take_pictures(changed)
-        for camera in stale:
-            self._last_poses[camera] = poses_bytes
 
     def _take_pictures(self, views: Mapping[str, _View]) -> None:
         """Start drawing views of cameras."""
@@ -164,12 +152,8 @@ class Cameras:
             bodies = np.ones(len(poses), dtype=bool)
         eye = component.entity.pose
         eye_bytes = eye.p.tobytes() + eye.q.tobytes()
-        return _View(eye_bytes + bodies.tobytes() + poses[bodies].tobytes(), bodies)
-
-    def _is_new(self, camera: str, view: _View) -> bool:
-        """Return whether a camera has drawn no picture like this last."""
-        last = self._last.get(camera)
-        return last is None or last.state != view.state
+        state = eye_bytes + bodies.tobytes() + poses[bodies].tobytes()
+        return _View(state, bodies, poses.tobytes())
 
     @contextmanager
     def frozen(self) -> Iterator[None]:
@@ -194,7 +178,31 @@ class Cameras:
         return fetched[output]
 
 
+def _add_cameras(
+    scene: sapien.Scene, robot: Panda, rendering: RenderSettings
+) -> dict[str, sapien.render.RenderCameraComponent]:
+    """Add the front camera to a scene and the wrist camera to the robot; return them by name."""
+    shader = slim_shader() if rendering.slim_shader else ""  # SAPIEN's own
+    cameras = {name: _make_camera(name, shader) for name in CAMERAS}
+    fixed = sapien.Entity()
+    fixed.name = "front_camera"
+    fixed.add_component(cameras[FRONT])
+    fixed.set_pose(front_camera_pose())
+    scene.add_entity(fixed)
+    robot.links[CAMERA_LINK].entity.add_component(cameras[WRIST])
+    if rendering.quick_start:
+        for component in cameras.values():
+            component.set_texture("BRDFLUT", placeholder_brdf_table())
+    return cameras
+
+
 def _make_camera(name: str, shader: str) -> sapien.render.RenderCameraComponent:
+    """Return a camera that is in no scene yet.
+
+    Args:
+        name: of the camera.
+        shader: folder of its shader; empty for SAPIEN's own.
+    """
     component = sapien.render.RenderCameraComponent(SIZE, SIZE, shader)
     component.set_fovy(FIELD_OF_VIEW, compute_x=True)
     component.near = NEAR

@@ -17,7 +17,7 @@ from sapien.wrapper.urdf_loader import URDFLoader
 
 from roboirg.core.actions import ARM_JOINTS, Actions
 from roboirg.core.episode import ROBOT_BASE
-from roboirg.core.observations import CAMERAS, FRONT
+from roboirg.core.observations import CAMERAS, FRONT, WRIST
 from roboirg.simulation import physics_settings
 from roboirg.simulation.model_files import ROBOT_FILE, find_model_files
 from roboirg.simulation.rendering.culling import CullableBody
@@ -96,25 +96,18 @@ class Panda:
             rendering: how pictures are drawn.
         """
         hull = _hull(records, rendering)
-        cameras: Sequence[str] = CAMERAS
+        bodies = {}  # by the cameras that draw them
+        cameras: tuple[str, ...] = CAMERAS
         if link == BASE_LINK and rendering.culling:
-            # The base never moves; the front camera draws only what reaches a pixel.
-            front_body = _render_body(records, rendering, fixed_at=sapien.Pose(ROBOT_BASE))
-            self._add_body(link, front_body, rendering, CullableBody(hull, (FRONT,)))
-            cameras = [camera for camera in CAMERAS if camera != FRONT]
-        body = _render_body(records, rendering)
-        self._add_body(link, body, rendering, CullableBody(hull, cameras))
-
-    def _add_body(
-        self,
-        link: str,
-        body: sapien.render.RenderBodyComponent,
-        rendering: RenderSettings,
-        cullable: CullableBody,
-    ) -> None:
-        self.links[link].entity.add_component(body)
-        apply_shading(body, rendering)
-        self.cullable_bodies[body] = cullable
+            # The base never moves; of it the front camera draws only what reaches a pixel.
+            cameras = (FRONT,)
+            bodies[cameras] = _render_body(records, rendering, fixed_at=sapien.Pose(ROBOT_BASE))
+            cameras = (WRIST,)
+        bodies[cameras] = _render_body(records, rendering)
+        for drawn_by, body in bodies.items():
+            self.links[link].entity.add_component(body)
+            apply_shading(body, rendering)
+            self.cullable_bodies[body] = CullableBody(hull, drawn_by)
 
     def reset(self) -> None:
         """Put the robot at home, at rest."""

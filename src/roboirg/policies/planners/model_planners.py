@@ -14,12 +14,8 @@ from roboirg.core.subgoal_text import split_point
 from roboirg.policies.contract.base import SubgoalEnd
 from roboirg.policies.planners.planner import WHEN_DONE
 from roboirg.policies.planners.points import normalize_subgoal, parse_points
-from roboirg.policies.planners.vlm_planner import (
-    FINISHED,
-    Asked,
-    PlannerOptions,
-    VLMPlanner,
-)
+from roboirg.policies.planners.query_schedule import Asked
+from roboirg.policies.planners.vlm_planner import FINISHED, PlannerOptions, VLMPlanner
 from roboirg.policies.vlm.goal_schema import object_schema
 from roboirg.policies.vlm.model_content import ChatTurn, Part
 from roboirg.policies.vlm.models import ModelQuery

@@ -88,16 +88,16 @@ def find_system(name_or_file: str, overrides: Mapping[str, str]) -> System:
         else:
             planner_overrides[option] = value
 
-    if system.planner is not None:
+    planner = system.planner
+    if planner is not None:
         # Other hands replace the whole policy, whatever its URL has become.
         policy = planner_overrides.pop(HANDS, policy)
-        planner = with_options(system.planner, planner_overrides)
-        return System(name=system.name, policy=policy, planner=planner)
-    if planner_overrides:
+        planner = with_options(planner, planner_overrides)
+    elif planner_overrides:
         unknown = min(planner_overrides)
         known = [SERVER, f"{POLICY}OPTION"]
         raise UnknownNameError(f"option of {origin}, which has no planner,", unknown, known)
-    return System(name=system.name, policy=policy)
+    return System(name=system.name, policy=policy, planner=planner)
 
 
 def _read_entries(name_or_file: str) -> dict[str, Any]:

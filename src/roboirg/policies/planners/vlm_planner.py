@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Annotated, Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from pydantic import Field
 
 from roboirg.core.environment_options import DemonstrationFrames
 from roboirg.core.observations import Demonstration, Observation, Pixels
-from roboirg.core.subgoal_text import split_point
 from roboirg.policies.contract.base import SubgoalEnd
-from roboirg.policies.planners.planner import EACH_CHUNK, WHEN_DONE, SubgoalOptions
+from roboirg.policies.planners.planner import EACH_CHUNK, SubgoalOptions
 from roboirg.policies.planners.points import says_finished
+from roboirg.policies.planners.query_schedule import Asked, QuerySchedule
 from roboirg.policies.vlm.model_content import ChatTurn, Part, summary_clip
 from roboirg.policies.vlm.models import ModelOptions, ModelQuery
 from roboirg.policies.vlm.models.model import config_version
@@ -25,12 +24,6 @@ from roboirg.util.reply_reading import UnparsableReplyError
 
 FINISHED = ""
 """Stands for the answer that the task is complete."""
-MOST_USELESS = 5
-"""Unusable replies in a row after which a planner that is asked when done asks no more."""
-
-
-Asked = Annotated[str, Field(pattern=rf"^({EACH_CHUNK}|{WHEN_DONE}|every [1-9]\d* steps)$")]
-"""When a planner is asked, such as ``every 48 steps``."""
 
 
 class PlannerOptions(SubgoalOptions):
@@ -84,10 +77,6 @@ class VLMPlanner(ABC, Generic[Options]):
         self.options = options
         self.kind = kind
         self.asked = options.asked
-        # Such as "every 16 steps".
-        number = re.search(r"\d+", options.asked)
-        self._period = None if number is None else int(number[0])
-        """Control steps between two queries; None if these do not depend on the time."""
         self.observe_every: int | None = getattr(options, "observe_every", None)
         self.prompts = load_prompts(kind, options.prompts)
         self.shared = load_prompts(SHARED)
@@ -116,11 +105,7 @@ class VLMPlanner(ABC, Generic[Options]):
         self.instruction = instruction
         self.subgoal: str | None = None
         self.ends: list[SubgoalEnd] = []
-        self._periods_begun = 0
-        self._useless = 0
-        """Replies in a row that were of no use."""
-        self._has_news = False
-        """Whether something was said or a subgoal ended since the last query."""
+        self._schedule = QuerySchedule(self.asked, self.options.first_pause, self.holds)
         self._was_refused = False
         self._is_finished = False
         self.video: Pixels | None = None
@@ -135,11 +120,11 @@ class VLMPlanner(ABC, Generic[Options]):
     def hear(self, text: str, step: int) -> None:  # noqa: ARG002
         """Remember an utterance; the next query quotes everything that was said."""
         self.instruction = f"{self.instruction} {text}"
-        self._has_news = True
+        self._schedule.has_news = True
 
     def learn(self, end: SubgoalEnd) -> None:
         """Remember how a subgoal ended; the same end several times in a row counts once."""
-        self._has_news = True
+        self._schedule.has_news = True
         self._was_refused = end.how == "refused"
         if self.ends:
             last = self.ends[-1]
@@ -155,16 +140,12 @@ class VLMPlanner(ABC, Generic[Options]):
         """
         if not self._was_refused:
             self.watch(observation, step)
-            if self._is_finished or not self._is_due(step):
+            if self._is_finished or not self._schedule.is_due(self.subgoal, step):
                 return self.subgoal
-        self._has_news = False
         self._was_refused = False
         subgoal = self.vlm.ask(self.query(observation), self.take)
-        if subgoal is None:
-            self._useless += 1
-            self._has_news = True
-        else:
-            self._useless = 0
+        self._schedule.note_reply(is_useful=subgoal is not None)
+        if subgoal is not None:
             self._is_finished = subgoal == FINISHED
             self.subgoal = subgoal or None
         return self.subgoal
@@ -178,7 +159,7 @@ class VLMPlanner(ABC, Generic[Options]):
         usage = self.vlm.usage()
         if self._is_finished:
             usage["finished"] = 1.0
-        if self._useless > 0:
+        if self._schedule.useless > 0:
             usage["unreadable"] = 1.0
         return usage
 
@@ -228,29 +209,3 @@ class VLMPlanner(ABC, Generic[Options]):
         if is_end and self.subgoal is None:
             raise UnparsableReplyError("Nothing has been done yet.")
         return is_end
-
-    def _is_due(self, step: int) -> bool:
-        """Return whether to query the model now; called once for each chunk.
-
-        A planner that is asked every N steps is due at the first chunk of each period; one that is
-        asked when a subgoal is done, after news. Without any subgoal yet, both are due.
-        """
-        begins_period = True
-        if self._period is not None:
-            number = step // self._period
-            begins_period = number > self._periods_begun
-            self._periods_begun = number
-        waits = self.asked == WHEN_DONE
-        if waits and self._useless >= MOST_USELESS:
-            return False
-        if self.subgoal is None:
-            return True
-        if waits and not self._has_news:
-            return False
-        return begins_period and not self._is_held(self.subgoal, step)
-
-    def _is_held(self, subgoal: str, step: int) -> bool:
-        """Return whether a subgoal is kept at a control step, whatever the model would answer."""
-        words, _ = split_point(subgoal)
-        is_kept = words in self.holds and step <= self.holds[words]
-        return is_kept or step < self.options.first_pause

@@ -44,7 +44,7 @@ from roboirg.policies.contract.policy_calls import (
     policy_usage,
 )
 from roboirg.policies.contract.policy_version import read_version
-from roboirg.policies.contract.random_state import RandomState
+from roboirg.policies.contract.random_state import RandomState, RandomTurns
 from roboirg.policies.opening import opened
 from roboirg.runs.episode_errors import describe_error
 from roboirg.runs.hosting.messages import (
@@ -107,6 +107,7 @@ class HostProcess:
         self._waiting: dict[HostedEpisode, Call] = {}  # the oldest call first
         self._under_way: Sequence[HostedEpisode] = ()
         self._read_fields: dict[str, None] = {}  # of videos; a set that keeps its order
+        self._random_turns = RandomTurns()
         self._home = os.getcwd()  # noqa: PTH109
         self._thread = threading.get_ident()
         self._output = os.dup(1)  # the policy may close it
@@ -235,8 +236,8 @@ class HostProcess:
         ref = _policy(call)
         episode.random = RandomState(call.seed)
         episode.alone = call.alone
-        with episode.random:
-            policy: Any = make_policy(ref, call.seed)
+        self._random_turns.begin(episode.random)
+        policy: Any = make_policy(ref, call.seed)
         # Pixels of subgoals are for privileged policies, and those have no process of their own.
         needs = replace(PolicyNeeds.of(policy), grounded=False)
         episode.policy = policy
@@ -247,25 +248,25 @@ class HostProcess:
     def _call(self, episode: HostedEpisode, call: Call) -> Outcome:
         """Call a method of a policy; `reset` and `hear` return its metadata."""
         policy = episode.policy
-        with episode.random:
-            match call.method:
-                case "reset":
-                    policy.reset(call.value["instruction"], self._demonstration(episode, call))
-                    return Outcome(
-                        metadata=dump_metadata(policy),
-                        inference=inference_facts(policy),
-                        version=read_version(policy) or "",
-                    )
-                case "hear":
-                    tell_policy(policy, call.value)
-                case "act":
-                    return _acted(episode, policy.act(_observation(call)))
-                case "usage":
-                    return Outcome(usage=policy_usage(policy))
-                case "close":
-                    close_policy(policy)
-                    return Outcome()
-            return Outcome(metadata=dump_metadata(policy))
+        self._random_turns.begin(episode.random)
+        match call.method:
+            case "reset":
+                policy.reset(call.value["instruction"], self._demonstration(episode, call))
+                return Outcome(
+                    metadata=dump_metadata(policy),
+                    inference=inference_facts(policy),
+                    version=read_version(policy) or "",
+                )
+            case "hear":
+                tell_policy(policy, call.value)
+            case "act":
+                return _acted(episode, policy.act(_observation(call)))
+            case "usage":
+                return Outcome(usage=policy_usage(policy))
+            case "close":
+                close_policy(policy)
+                return Outcome()
+        return Outcome(metadata=dump_metadata(policy))
 
     def _demonstration(self, episode: HostedEpisode, call: Call) -> FetchedDemonstration:
         """Return the video of an episode; what did not come with the call is fetched when read."""
@@ -280,7 +281,7 @@ class HostProcess:
         try:
             policies = [episode.policy for episode in calls]
             observations = [_observation(call) for call in calls.values()]
-            RandomState.set_aside()
+            self._random_turns.end()
             answers = policies[0].act_together(policies, observations)
             return [_acted(episode, rows) for episode, rows in zip(calls, answers, strict=True)]
         except BaseException as error:  # noqa: BLE001 - policies may raise anything

@@ -45,6 +45,43 @@ PERIOD_S = 0.25
 """How often the size of its output is checked."""
 
 
+class _LifeCheck:
+    """What a policy's process answers when it is asked, which it does only between two calls.
+
+    Several worlds may ask at the same time; one answer is for all that wait for it.
+
+    Args:
+        line: to the process, on which it also sends a byte when it has started.
+    """
+
+    def __init__(self, line: socket.socket) -> None:
+        self._line = line
+        self._asking = threading.Lock()
+        self._answered_at = 0.0
+        self._has_started = False
+
+    def passes(self, limit_s: float) -> bool:
+        """Ask the process, and return whether it answers in time.
+
+        A process that has not started gets `GRACE_S` at least.
+        """
+        asked_at = time.monotonic()
+        with self._asking, contextlib.suppress(OSError):
+            if self._answered_at > asked_at:  # to another world, meanwhile
+                return True
+            # What it has sent before it is asked is no answer; it only shows that it has started.
+            if wait([self._line], 0.0) and self._line.recv(MAX_OUTPUT):
+                self._has_started = True
+            ask(self._line, HostRequest("check"))
+            patience_s = limit_s + MARGIN_S
+            if not self._has_started:
+                patience_s = max(limit_s, GRACE_S)
+            if wait([self._line], patience_s) and self._line.recv(1):
+                self._answered_at = time.monotonic()
+                return True
+        return False
+
+
 class PolicyChild:
     """A policy process in an interpreter that knows nothing of this one, and the line to it.
 
@@ -62,15 +99,13 @@ class PolicyChild:
         self.worlds = 0
         self._most_worlds = 0
         self._fault: str | None = None
-        self._has_started = False
         self._was_ended = False
-        self._asking = threading.Lock()
-        self._answered_at = 0.0
         self._output = _new_output()
         weakref.finalize(self, os.close, self._output)
         self._line, theirs = socket.socketpair()
         self._line.settimeout(GRACE_S)  # for one that reads nothing
         weakref.finalize(self, self._line.close)  # not before: another thread may wait for it
+        self._life_check = _LifeCheck(self._line)
         with theirs, without_interrupts():
             number = theirs.fileno()
             arguments = (str(number), str(os.getpid()), _MODULE, json.dumps(sys.path))
@@ -106,34 +141,12 @@ class PolicyChild:
             waited longest, so at most one of each world comes before, in which that may have to
             draw. None if the process is over.
         """
-        if self._answers(limit_s):
+        if self._life_check.passes(limit_s):
             return self._most_worlds * (limit_s + DRAW_S)
         if not self.is_over:
             self._fault = f"the process began no call within {limit_s:g} s"
             self.kill()
         return None
-
-    def _answers(self, limit_s: float) -> bool:
-        """Return whether the process answers in time; it does so only between two calls.
-
-        A process that has not started gets `GRACE_S` at least.
-        """
-        asked_at = time.monotonic()
-        with self._asking, contextlib.suppress(OSError):
-            if self._answered_at > asked_at:  # to another world, meanwhile
-                return True
-            # What it has sent before it is asked is no answer; it only shows that it has started.
-            if wait([self._line], 0.0):
-                unasked = self._line.recv(MAX_OUTPUT)
-                self._has_started |= bool(unasked)
-            ask(self._line, HostRequest("check"))
-            patience_s = limit_s + MARGIN_S
-            if not self._has_started:
-                patience_s = max(limit_s, GRACE_S)
-            if wait([self._line], patience_s) and self._line.recv(1):
-                self._answered_at = time.monotonic()
-                return True
-        return False
 
     @property
     def is_over(self) -> bool:

@@ -14,7 +14,8 @@ import msgspec
 import yaml
 
 from roboirg.core.errors import InvalidValueError, check_names
-from roboirg.runs.plan.plan import PLAN_KEYS, Plan, plan_options
+from roboirg.runs.plan.plan import Plan
+from roboirg.runs.plan.plan_fields import PLAN_KEYS, plan_options
 from roboirg.util.discovery import entry_names, entry_points_of, load_entry
 from roboirg.util.regular_file import read_regular
 

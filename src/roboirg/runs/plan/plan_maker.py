@@ -12,7 +12,8 @@ from roboirg.core.errors import InvalidValueError
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.policy_ref import PolicyRef
 from roboirg.policies.contract.option_checking import plain_complaint
-from roboirg.runs.plan.plan import FLAT, Plan
+from roboirg.runs.plan.plan import Plan
+from roboirg.runs.plan.plan_fields import FLAT
 
 
 def make_plan(policies: str | Iterable[str | PolicyRef], **options: object) -> Plan:

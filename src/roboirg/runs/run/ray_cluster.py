@@ -2,7 +2,8 @@
 
 Each remote worker is an actor that supervises a process of its own, as `LocalProcesses` does, so
 that policies and simulator are isolated in the same way; the workers on a machine share its policy
-hosts. `ray_pool` has the driver's loop, `ray_machines` what runs on the machines.
+hosts. `ray_pool` has the driver's loop, `ray_head` whether the cluster's head answers, and
+`ray_machines` what runs on the machines.
 """
 
 from __future__ import annotations

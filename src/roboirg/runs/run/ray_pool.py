@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import functools
 import secrets
-import socket
 import time
 from collections import Counter, deque
 from collections.abc import Iterator, Mapping
@@ -25,6 +24,7 @@ from roboirg.runs.plan.plan_sections import WorkerNeeds
 from roboirg.runs.play.episode_record import lost_record
 from roboirg.runs.play.rollout import EpisodeRunner, PlayJob
 from roboirg.runs.run.executor import Warn
+from roboirg.runs.run.ray_head import POLL_S, ClusterHead
 from roboirg.runs.run.ray_machines import (
     CheckedMachine,
     MachineAgent,
@@ -34,7 +34,6 @@ from roboirg.runs.run.ray_machines import (
 )
 from roboirg.tasks.splits.private_splits import known_salt
 
-POLL_S = 1.0
 LOOK_S = 2.0
 """How often the cluster is asked for its machines."""
 BEAT_S = 10.0
@@ -47,8 +46,6 @@ WAIT_S = 10.0
 """How long a run waits for CPUs before the user is warned."""
 NO_CPU_TIMEOUT_S = 300.0
 """How long a cluster may have no free CPU before the run stops."""
-HEAD_LOST_S = 20.0
-"""How long the head of the cluster may not answer; after a minute Ray would end this process."""
 CLOSE_S = 10.0
 """How long the agents of all machines may take to end before they are killed."""
 MAX_LOSSES = 3
@@ -145,7 +142,7 @@ class RayPool:
         self._remote = functools.partial(
             ray.remote, runtime_env=environment, max_restarts=0, concurrency_groups={"beat": 1}
         )
-        self._address = ray.get_runtime_context().gcs_address
+        self._head = ClusterHead(ray.get_runtime_context().gcs_address)
         self._run = secrets.token_hex(8)
 
         self._machines: dict[str, _Machine] = {}  # by node
@@ -156,7 +153,6 @@ class RayPool:
 
         now = time.monotonic()
         self._looked_at = 0.0  # for machines
-        self._reached_at = now  # the head
         self._played_at = now  # something
         self._warned_at = now  # the user, that nothing is played
 
@@ -169,9 +165,7 @@ class RayPool:
         policies = dict.fromkeys(job.ref for job in jobs if job.ref is not None)
         versions = MachineVersions(tuple(policies))
         while jobs or self._busy():
-            if time.monotonic() - self._reached_at > POLL_S and not self._is_reachable():
-                self._check_head(len(jobs))
-                continue
+            self._head.wait(len(jobs))
             self._look_for_machines(versions)
             self._start_workers(len(jobs))
             self._assign(jobs)
@@ -182,7 +176,7 @@ class RayPool:
 
     def close(self) -> None:
         """Kill all workers, and end the agents."""
-        if not self._is_reachable():
+        if not self._head.answers():
             return
         for worker in self._workers:
             self._ray.kill(worker.actor)
@@ -207,34 +201,10 @@ class RayPool:
         finished, _ = self._ray.wait(list(self._calls), num_returns=1, timeout=POLL_S)
         return finished
 
-    def _is_reachable(self) -> bool:
-        """Whether the head answers: without it Ray's calls block, and then end this process."""
-        host, _, port = self._address.rpartition(":")
-        try:
-            socket.create_connection((host, int(port)), timeout=LOOK_S).close()
-        except OSError:
-            return False
-        self._reached_at = time.monotonic()
-        return True
-
-    def _check_head(self, left: int) -> None:
-        """Wait for the head; an error ends the run if it has not answered for too long.
-
-        Args:
-            left: episodes that were not played.
-        """
-        if time.monotonic() - self._reached_at > HEAD_LOST_S:
-            raise RoboIRGError(
-                f"The head of the Ray cluster at {self._address} has not answered for "
-                f"{HEAD_LOST_S:g} s; run the same command again to play the remaining "
-                f"{counted(left, 'episode')}."
-            )
-        time.sleep(POLL_S)
-
     def _look_for_machines(self, versions: MachineVersions) -> None:
         """Start the check of machines that have joined, and note those that have left."""
         now = time.monotonic()
-        if now - self._looked_at < LOOK_S or not self._is_reachable():
+        if now - self._looked_at < LOOK_S or not self._head.answers():
             return
         self._looked_at = now
         alive = {node["NodeID"]: node for node in self._ray.nodes() if node["Alive"]}
@@ -291,13 +261,12 @@ class RayPool:
     def _emptiest_machine(self) -> _Machine | None:
         """Return the fit machine with the fewest workers; None if none has room for one more."""
         counts = Counter(worker.machine.node for worker in self._workers)
-        emptiest: _Machine | None = None
-        for _, machine in sorted(self._machines.items()):
-            if not machine.is_fit or counts[machine.node] >= machine.slots:
-                continue
-            if emptiest is None or counts[machine.node] < counts[emptiest.node]:
-                emptiest = machine
-        return emptiest
+        with_room = [
+            machine
+            for machine in self._machines.values()
+            if machine.is_fit and counts[machine.node] < machine.slots
+        ]
+        return min(with_room, key=lambda there: (counts[there.node], there.node), default=None)
 
     def _assign(self, jobs: deque[Job]) -> None:
         """Give each idle worker the first job that may be played there.
@@ -321,9 +290,6 @@ class RayPool:
     def _receive(self, call: object, jobs: deque[Job]) -> Iterator[Record]:
         """Take the reply of a finished call; yield the records that come of it.
 
-        What was called shows in the reply: `beat` returns seconds, an agent's check a result, a
-        worker's `play` a `RemoteResult`, and its `pid` a number.
-
         Args:
             call: that has finished.
             jobs: that wait; gets those back that cannot be played there.
@@ -336,7 +302,7 @@ class RayPool:
         except self._ray.exceptions.RayError as error:
             yield from self._lose(called, _reason(error))
             return
-        if isinstance(reply, float):  # of `beat`: seconds that its job has taken
+        if call == called.question:  # the reply is the seconds that its job has taken
             called.heard_at = time.monotonic()
             called.question = None
             if reply > self._episode_timeout_s + LATE_S:
@@ -346,13 +312,13 @@ class RayPool:
             called.checked = reply
             if reply.fault is not None:
                 self._leave_out(called, reply.fault)
-        elif isinstance(reply, RemoteResult):
-            yield from self._finish(called, reply, jobs)
-        else:
+        elif called.pid is None:
             called.pid = reply
             started = sum(worker.pid is not None for worker in self._workers)
             if self._most is not None and started > self._most:
                 self._end(called)  # others have taken its place while it waited
+        else:
+            yield from self._finish(called, reply, jobs)
         # A machine that was left out gets no more jobs, so its workers end once they are idle.
         if isinstance(called, _Worker) and called.job is None and called.machine.fault is not None:
             self._end(called)
@@ -393,12 +359,8 @@ class RayPool:
             lost: the worker, or the machine whose agent was lost.
             reason: in words.
         """
-        if isinstance(lost, _Machine):
-            machine = lost
-            workers = [worker for worker in self._workers if worker.machine is lost]
-        else:
-            machine = lost.machine
-            workers = [worker for worker in self._workers if worker is lost]
+        machine = lost.machine if isinstance(lost, _Worker) else lost
+        workers = [worker for worker in self._workers if lost in (worker, worker.machine)]
         for worker in workers:
             self._end(worker)
         self._count_loss(machine, reason)
@@ -421,9 +383,9 @@ class RayPool:
         self._forget_calls(worker)
         self._kill(worker.actor)
         agent = worker.machine.actor
-        if worker.pid is not None and agent is not None and self._is_reachable():
-            end = agent.end.options(concurrency_group="beat")
-            end.remote(worker.pid)  # Ray does not kill what is frozen
+        if worker.pid is not None and agent is not None and self._head.answers():
+            # Ray does not kill what is frozen.
+            agent.end.options(concurrency_group="beat").remote(worker.pid)
 
     def _forget_calls(self, called: _Worker | _Machine) -> None:
         """Wait no longer for the calls of an actor."""
@@ -433,7 +395,7 @@ class RayPool:
 
     def _kill(self, actor: Any) -> None:  # noqa: ANN401 - a handle of Ray
         """Let Ray kill an actor, if its head answers."""
-        if self._is_reachable():
+        if self._head.answers():
             self._ray.kill(actor)
 
     def _count_loss(self, machine: _Machine, reason: str) -> None:

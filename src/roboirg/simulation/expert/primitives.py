@@ -98,7 +98,7 @@ class MotionPrimitives:
         yield self._grip(opening)
         yield self._move(self._position(cube), approach.rotation)
         yield self._grip(CLOSED)
-        yield self._move(_above(start, CUBE_HOVER), approach.rotation)
+        yield self._move_over(start, CUBE_HOVER, approach.rotation)
 
     def _do_place_on(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         """Yield the trajectories that let go of a thing over a place, at its kind's height."""
@@ -106,26 +106,26 @@ class MotionPrimitives:
         rotation = self._rotation()
         kind = self._world.bodies[str(primitive.place)].item.kind
         height = RELEASES.get(kind, TARGET_RELEASE)
-        yield self._move(_above(place, CUBE_HOVER), rotation)
-        yield self._move(_above(place, height), rotation)
+        yield self._move_over(place, CUBE_HOVER, rotation)
+        yield self._move_over(place, height, rotation)
         yield self._grip(OPEN)
-        yield self._move(_above(place, CUBE_HOVER), rotation)
+        yield self._move_over(place, CUBE_HOVER, rotation)
 
     _do_put_into = _do_place_on
 
     def _do_drop_into(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         place = self._place(primitive)
         rotation = self._rotation()
-        yield self._move(_above(place, BIN_RELEASE), rotation)
+        yield self._move_over(place, BIN_RELEASE, rotation)
         yield self._grip(OPEN)
         back = place._replace(x=place.x - BIN_RETREAT)
-        yield self._move(_above(back, BIN_RELEASE), rotation)
+        yield self._move_over(back, BIN_RELEASE, rotation)
 
     def _do_move_over(self, primitive: Primitive) -> Iterator[JointTrajectory]:
-        yield self._move(_above(self._place(primitive), OVER_TARGET), self._rotation())
+        yield self._move_over(self._place(primitive), OVER_TARGET, self._rotation())
 
     def _do_press(self, primitive: Primitive) -> Iterator[JointTrajectory]:
-        yield self._move(_above(self._position(primitive.subject), CUBE_HOVER), STRAIGHT_DOWN)
+        yield self._move_over(self._position(primitive.subject), CUBE_HOVER, STRAIGHT_DOWN)
         yield from self._do_press_below(primitive)
 
     def _do_press_below(self, primitive: Primitive) -> Iterator[JointTrajectory]:
@@ -135,13 +135,13 @@ class MotionPrimitives:
         """
         button = self._position(primitive.subject)
         yield self._grip(CLOSED)
-        down = self._move(_above(button, BUTTON_PRESS), STRAIGHT_DOWN)
+        down = self._move_over(button, BUTTON_PRESS, STRAIGHT_DOWN)
         steps_left = primitive.steps - self._world.elapsed
         waiting_steps = steps_left - self._steps_to_press(down)
         if waiting_steps > 0:
             yield np.tile(down[0], (waiting_steps, 1))
         yield down
-        yield self._move(_above(button, CUBE_HOVER), STRAIGHT_DOWN)
+        yield self._move_over(button, CUBE_HOVER, STRAIGHT_DOWN)
 
     def _steps_to_press(self, down: JointTrajectory) -> int:
         """Return the number of control steps of a descent until the button is pressed."""
@@ -153,19 +153,18 @@ class MotionPrimitives:
         return steps_above + ARM_LAG
 
     def _do_hover(self, primitive: Primitive) -> Iterator[JointTrajectory]:
-        yield self._move(_above(self._position(primitive.subject), CUBE_HOVER), STRAIGHT_DOWN)
+        yield self._move_over(self._position(primitive.subject), CUBE_HOVER, STRAIGHT_DOWN)
         yield self._grip(CLOSED)
 
     def _do_pick_container(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         yield self._grip(OPEN)
         container = self._position(primitive.subject)
-        knob = _above(container, container.z + CONTAINER_GRASP)
         approach = self._approach(primitive.subject, CONTAINER_HOVER)
         yield approach.trajectory
         yield self._grip(OPEN)
-        yield self._move(knob, approach.rotation)
+        yield self._move_over(container, container.z + CONTAINER_GRASP, approach.rotation)
         yield self._grip(CLOSED)
-        yield self._move(_above(container, CONTAINER_HOVER), approach.rotation)
+        yield self._move_over(container, CONTAINER_HOVER, approach.rotation)
 
     def _do_put_down(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         """Yield the trajectories that let go of what the hand holds where it is.
@@ -177,9 +176,9 @@ class MotionPrimitives:
         else:
             start = self._position(primitive.subject)
         rotation = self._rotation()
-        yield self._move(_above(start, primitive.height), rotation)
+        yield self._move_over(start, primitive.height, rotation)
         yield self._grip(OPEN)
-        yield self._move(_above(start, CUBE_HOVER), rotation)
+        yield self._move_over(start, CUBE_HOVER, rotation)
 
     def _do_hold(self, primitive: Primitive) -> Iterator[JointTrajectory]:
         for _ in range(0, primitive.steps, GRIPPER_STEPS):
@@ -215,6 +214,10 @@ class MotionPrimitives:
     def _move(self, position: Point, rotation: Rotation) -> JointTrajectory:
         """Plan a straight move to a pose, via home if the straight line is not feasible."""
         return self._plan_any(position, [rotation]).trajectory
+
+    def _move_over(self, place: Point, height: float, rotation: Rotation) -> JointTrajectory:
+        """Plan a straight move to a point over a place, m above the table."""
+        return self._move(_above(place, height), rotation)
 
     def _plan_any(self, position: Point, rotations: Sequence[Rotation]) -> Approach:
         """Plan a move with the first of some rotations that the wrist can take.

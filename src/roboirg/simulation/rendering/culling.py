@@ -10,10 +10,10 @@ recording. So each camera keeps the command buffer of its visible bodies until t
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 import sapien
@@ -32,6 +32,10 @@ outside the wrist camera's view, so a larger margin would draw it."""
 DRAWN = 0
 LEFT_OUT = 99
 """Shading modes; SAPIEN does not know the second."""
+
+PLANE = 0
+POINT = -1
+"""Axes of `_outside`; those between are of bodies."""
 
 Floats = NDArray[np.float64]
 
@@ -58,21 +62,23 @@ class CullableBodies:
         cullable_bodies: Mapping[sapien.render.RenderBodyComponent, CullableBody],
     ) -> None:
         self._bodies = _render_bodies(scene)
-        self._cullable = [cullable_bodies.get(body) for body in self._bodies]
+        self._hulls: dict[int, Floats] = {}  # by the number of the body
+        self._drawn_by = {camera: np.ones(len(self._bodies), dtype=bool) for camera in CAMERAS}
         boxes = []
-        for body, cullable in zip(self._bodies, self._cullable, strict=True):
-            points = _points(body) if cullable is None else cullable.hull
-            boxes.append(_box(points))
+        for number, body in enumerate(self._bodies):
+            cullable = cullable_bodies.get(body)
+            if cullable is None:
+                points = _points(body)
+            else:
+                points = cullable.hull
+                self._hulls[number] = _columns(points)
+                for camera in CAMERAS:
+                    self._drawn_by[camera][number] = camera in cullable.cameras
+            boxes.append(_columns(_corners(points, MARGIN)))
         self._boxes = np.stack(boxes)
-        self._drawn_by = {camera: self._may_be_drawn_by(camera) for camera in CAMERAS}
         # Which bodies have the shading mode of drawn ones now, and in each command buffer.
         self._drawn = np.ones(len(self._bodies), dtype=bool)
         self._buffered: dict[sapien.render.RenderCameraComponent, NDArray[np.bool_]] = {}
-
-    def _may_be_drawn_by(self, camera: str) -> NDArray[np.bool_]:
-        """Return for each body whether a camera draws it when it is in view."""
-        may_be_drawn = [body is None or camera in body.cameras for body in self._cullable]
-        return np.array(may_be_drawn)
 
     def poses(self) -> Floats:
         """Return the current poses of the bodies, (n, 4, 4)."""
@@ -86,17 +92,16 @@ class CullableBodies:
             poses: poses of the bodies, (n, 4, 4).
             view: extrinsic matrix of the camera (3, 4).
         """
-        corners = np.einsum("bij,bkj->bki", poses, self._boxes) @ view.T
-        outside = _outside(corners)  # plane, body, corner
-        visible = self._drawn_by[camera] & ~outside.all(axis=-1).any(axis=0)
+        to_camera = view @ poses  # (n, 3, 4), from the frame of each body
+        outside = _outside(to_camera @ self._boxes)
+        visible = self._drawn_by[camera] & _reach_view(outside)
         # Boxes are larger than what they hold: where one crosses a plane, the hull decides.
-        for number in np.flatnonzero(visible & outside.any(axis=(0, -1))):
-            cullable = self._cullable[number]
-            if cullable is not None:
-                to_camera = view @ poses[number]
-                points = cullable.hull @ to_camera[:, :3].T + to_camera[:, 3]
-                visible[number] = not _outside(points, HULL_MARGIN).all(axis=-1).any()
-        return np.asarray(visible)
+        crosses_plane = outside.any(axis=(PLANE, POINT))
+        for number in np.flatnonzero(visible & crosses_plane):
+            hull = self._hulls.get(number)
+            if hull is not None:
+                visible[number] = _reach_view(_outside(to_camera[number] @ hull, HULL_MARGIN))
+        return visible
 
     def take_picture(
         self, camera: sapien.render.RenderCameraComponent, visible: NDArray[np.bool_]
@@ -124,18 +129,27 @@ def _render_bodies(scene: sapien.Scene) -> list[sapien.render.RenderBodyComponen
 
 
 def _outside(points: Floats, margin: float = 0.0) -> NDArray[np.bool_]:
-    """Return for each plane that bounds a view, (5, ...), which points are outside of it.
+    """Return for each plane that bounds a view, (5, ..., k), which points are outside of it.
 
-    The half angle of view is 45 degrees, so the planes are z = NEAR, |x| = z and |y| = z. A body
-    with all its points outside one plane cannot be seen.
+    The half angle of view is 45 degrees, so the planes are z = NEAR, |x| = z and |y| = z.
 
     Args:
-        points: (..., 3), m, in the camera's frame: x right, y down, z forward (OpenCV).
+        points: (..., 3, k), m, one a column, in the camera's frame: x right, y down, z forward
+            (OpenCV).
         margin: distance outside, m, that counts.
     """
-    x, y, z = np.moveaxis(points, -1, 0)
-    slack = math.sqrt(2.0) * margin
-    return np.stack([z < NEAR - margin, *(side > z + slack for side in (x, -x, y, -y))])
+    x, y, z = np.moveaxis(points, -2, 0)
+    edge = z + math.sqrt(2.0) * margin
+    return np.stack([z < NEAR - margin, x > edge, -x > edge, y > edge, -y > edge])
+
+
+def _reach_view(outside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return for each body whether it may be seen: no plane has all its points outside.
+
+    Args:
+        outside: as of `_outside`.
+    """
+    return np.asarray(~np.any(np.all(outside, axis=POINT), axis=PLANE))
 
 
 def invalidate_command_buffers(body: sapien.render.RenderBodyComponent) -> None:
@@ -144,61 +158,42 @@ def invalidate_command_buffers(body: sapien.render.RenderBodyComponent) -> None:
     body.visibility = 1.0
 
 
-class _Bounds(NamedTuple):
-    """Lowest and highest coordinates, (3) each, m."""
-
-    low: Floats
-    high: Floats
+_corners_of_files: dict[tuple[object, ...], Floats] = {}
+"""Corners of the boxes of meshes by file and scale."""
 
 
-_bounds_of_files: dict[tuple[object, ...], _Bounds] = {}
-"""Bounds of meshes by file and scale."""
+def _columns(points: Floats) -> Floats:
+    """Return points (n, 3) as homogeneous columns (4, n)."""
+    return np.stack([*points.T, np.ones(len(points))])
 
 
-def _box(points: Floats) -> Floats:
-    """Return homogeneous corners (8, 4) of the box around points (n, 3), with the margin."""
-    low = points.min(axis=0) - MARGIN
-    high = points.max(axis=0) + MARGIN
-    return np.column_stack([_corners(low, high), np.ones(8)])
-
-
-def _corners(low: Floats, high: Floats) -> Floats:
-    """Return the corners (8, 3) of the box between two opposite ones (3)."""
-    grid = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1)
-    return grid.reshape(-1, 3)
+def _corners(points: NDArray[np.floating], margin: float = 0.0) -> Floats:
+    """Return the corners (8, 3) of the box around points (n, 3), grown by a margin."""
+    low = points.min(axis=0).astype(np.float64) - margin
+    high = points.max(axis=0).astype(np.float64) + margin
+    return np.array(list(itertools.product(*zip(low, high, strict=True))))
 
 
 def _points(body: sapien.render.RenderBodyComponent) -> Floats:
     """Return corners (n, 3) of the boxes of a body's shapes in its entity's frame."""
-    return np.concatenate([_shape_corners(shape) for shape in body.render_shapes])
+    points = []
+    for shape in body.render_shapes:
+        matrix = shape.local_pose.to_transformation_matrix()
+        points.append(_shape_corners(shape) @ matrix[:3, :3].T + matrix[:3, 3])
+    return np.concatenate(points)
 
 
 def _shape_corners(shape: sapien.render.RenderShape) -> Floats:
-    """Return corners of a shape's box in its entity's frame, (8, 3)."""
-    bounds = _shape_bounds(shape)
-    corners = _corners(bounds.low, bounds.high)
-    matrix = shape.local_pose.to_transformation_matrix()
-    return np.asarray(corners @ matrix[:3, :3].T + matrix[:3, 3])
-
-
-def _shape_bounds(shape: sapien.render.RenderShape) -> _Bounds:
-    """Return a shape's bounds in its own frame; those of a file are computed once per process."""
+    """Return corners (8, 3) of a shape's box in the shape's frame; of a file once per process."""
     if isinstance(shape, sapien.render.RenderShapeBox):
-        half = np.asarray(shape.half_size, dtype=np.float64)
-        return _Bounds(-half, half)
+        return _corners(np.array([shape.half_size, -shape.half_size]))
     if isinstance(shape, sapien.render.RenderShapeCylinder):
-        half = np.array([shape.half_length, shape.radius, shape.radius], dtype=np.float64)
-        return _Bounds(-half, half)
-    if not shape.filename:
-        return _mesh_bounds(shape)
+        half = np.array([shape.half_length, shape.radius, shape.radius])
+        return _corners(np.array([half, -half]))
     key = (shape.filename, *shape.scale)
-    if key not in _bounds_of_files:
-        _bounds_of_files[key] = _mesh_bounds(shape)
-    return _bounds_of_files[key]
-
-
-def _mesh_bounds(shape: sapien.render.RenderShapeTriangleMesh) -> _Bounds:
-    """Return the bounds of a mesh in its own frame."""
-    points = np.concatenate([part.vertices for part in shape.parts]) * shape.scale
-    low = points.min(axis=0).astype(np.float64)
-    return _Bounds(low, points.max(axis=0).astype(np.float64))
+    corners = _corners_of_files.get(key)
+    if corners is None:
+        corners = _corners(np.concatenate([part.vertices for part in shape.parts]) * shape.scale)
+        if shape.filename:
+            _corners_of_files[key] = corners
+    return corners

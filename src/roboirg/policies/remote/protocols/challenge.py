@@ -152,10 +152,9 @@ def _read_observations(message: Message) -> list[Observation]:
             in_all[field] = message[name]
 
     columns = _read_columns(message)
-    count = len(columns["front_rgb"])
     observations: list[Any] = []
-    for index in range(count):
-        observation = {field: column[index] for field, column in columns.items()}
+    for values in zip(*columns.values(), strict=True):
+        observation = dict(zip(columns, values, strict=True))
         observations.append(observation | in_all)
     return observations
 
@@ -170,9 +169,9 @@ def _read_columns(message: Message) -> dict[str, list[Any]]:
         if name in message:
             fields[name] = field
     columns = {field: message.get(name) for name, field in fields.items()}
-    lengths = {len(column) for column in columns.values() if isinstance(column, list)}
-    are_lists = all(isinstance(column, list) for column in columns.values())
-    if not are_lists or len(lengths) > 1 or 0 in lengths:
+    # What is no list counts as an empty one.
+    lengths = {len(column) if isinstance(column, list) else 0 for column in columns.values()}
+    if len(lengths) > 1 or 0 in lengths:
         raise ValueError(f"{', '.join(fields)} must be lists of the same length, at least 1.")
     return cast("dict[str, list[Any]]", columns)
 

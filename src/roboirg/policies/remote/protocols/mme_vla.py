@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import itertools
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -25,7 +26,7 @@ from pydantic import Field
 from roboirg.core.actions import Actions
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.observations import Demonstration, Observation, proprioception
-from roboirg.policies.contract.base import SubgoalFollower
+from roboirg.policies.contract.base import Policy, SubgoalFollower
 from roboirg.policies.contract.option_checking import NOT_COMPARED, Seconds
 from roboirg.policies.remote.endpoints import MIB, RemoteOptions
 from roboirg.policies.remote.protocols import Protocol
@@ -144,46 +145,57 @@ class MmeVlaPolicy(RemotePolicy):
             part = list(itertools.islice(frames, self.options.part))
 
 
+@dataclass
+class _SentFrames:
+    """What the client has sent since the reset.
+
+    Attributes:
+        new: frames since the last request for actions.
+        count: of all frames.
+        turn_start: number of the first frame of the policy's turn; 0 until a message has one.
+    """
+
+    new: list[dict[str, NDArray[Any]]] = field(default_factory=list)
+    count: int = 0
+    turn_start: int = 0
+
+    def add(self, message: Message) -> None:
+        """Add the frames in a message, and the number of the first one of the policy's turn."""
+        images = read_array(message, "images", "uint8", ("T", 1, "H", "W", 3))
+        states = read_array(message, "state", "real numbers", ("T", 8))
+        self.count += len(images)
+        if self.turn_start == 0:
+            self.turn_start = int(message.get("exec_start_idx", 0))
+        self.new += [
+            {"front_rgb": image[0], **split_state(state)}
+            for image, state in zip(images, states, strict=True)
+        ]
+
+
 class MmeVlaService(Service):
     """Answers ``reset``, ``add_buffer`` and requests for actions, in that order of precedence."""
 
     # The original client sends a video in one message, with the pictures of the front camera.
     max_request_bytes: ClassVar[int] = 284 * MIB
-    _frames: tuple[dict[str, NDArray[Any]], ...] = ()
-    """Added since the last request for actions."""
-    _count = 0
-    """Frames added since the reset."""
-    _turn_start = 0
-    """Number of the first frame of the policy's turn; 0 as long as no message has one."""
+
+    def __init__(self, make_policy: Callable[[], Policy]) -> None:
+        super().__init__(make_policy)
+        self._sent = _SentFrames()
 
     def handle(self, message: Message) -> dict[str, Any]:
         """Return the reply to a reset, to frames for the memory, or to a request for actions."""
         begin = time.perf_counter()
         if message.get("reset"):
             self.forget()
-            self._frames = ()
-            self._count = 0
-            self._turn_start = 0
+            self._sent = _SentFrames()
             done = "reset"
         elif message.get("add_buffer"):
-            self._add_frames(message)
+            self._sent.add(message)
             done = "add_buffer"
         else:
             actions, milliseconds = self._infer(message)
             return {"actions": actions, "infer_time_ms": milliseconds}
         return {f"{done}_finished": True, f"{done}_time_ms": 1000 * (time.perf_counter() - begin)}
-
-    def _add_frames(self, message: Message) -> None:
-        """Keep the frames in a message, and the number of the first one of the policy's turn."""
-        images = read_array(message, "images", "uint8", ("T", 1, "H", "W", 3))
-        states = read_array(message, "state", "real numbers", ("T", 8))
-        self._count += len(images)
-        if self._turn_start == 0:
-            self._turn_start = int(message.get("exec_start_idx", 0))
-        self._frames += tuple(
-            {"front_rgb": image[0], **split_state(state)}
-            for image, state in zip(images, states, strict=True)
-        )
 
     def _infer(self, message: Message) -> tuple[NDArray[np.float64], float]:
         """Return the policy's actions and their milliseconds; the first request begins its episode.
@@ -193,17 +205,18 @@ class MmeVlaService(Service):
         """
         observation = read_request(message)
         instruction = observation["instruction"]
+        frames = self._sent.new
         if self.policy is None:
-            video = self._frames[: self._turn_start]
+            video = frames[: self._sent.turn_start]
             self.begin(instruction, _demonstration(video, observation))
-            self._frames = ()
+            frames = []
         # The first frame of the turn was seen before any step.
-        steps = self._count - self._turn_start - 1
+        steps = self._sent.count - self._sent.turn_start - 1
         self.hear(instruction, max(steps, 0))
 
-        history = tuple({**frame, "instruction": instruction} for frame in self._frames)
+        history = tuple({**frame, "instruction": instruction} for frame in frames)
         observation["history"] = history  # type: ignore[typeddict-item]
-        self._frames = ()
+        self._sent.new = []
         subgoal = message.get("grounded_subgoal") or message.get("simple_subgoal")
         if isinstance(self.policy, SubgoalFollower) and subgoal is not None:
             self.policy.follow(str(subgoal))
@@ -232,12 +245,11 @@ def _demonstration(
 ) -> Demonstration:
     """Return the frames before the policy's turn; the protocol has no wrist pictures of them."""
     demonstration: dict[str, NDArray[Any]] = {}
-    for field in ("front_rgb", "joint_positions", "gripper"):
+    for name in ("front_rgb", "joint_positions", "gripper"):
         if frames:
-            demonstration[field] = np.stack([frame[field] for frame in frames])
+            demonstration[name] = np.stack([frame[name] for frame in frames])
         else:  # an array of length 0, whose other sizes are those of a frame
-            now: NDArray[Any] = np.asarray(observation[field])
-            demonstration[field] = now[None][:0]
+            demonstration[name] = np.asarray(observation[name])[None][:0]
     return demonstration
 
 

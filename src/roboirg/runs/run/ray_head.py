@@ -1,0 +1,55 @@
+"""The head of a Ray cluster: without it Ray's calls block, and after a minute end this process."""
+
+from __future__ import annotations
+
+import socket
+import time
+
+from roboirg.core.errors import RoboIRGError
+from roboirg.core.plain_text import counted
+
+POLL_S = 1.0
+ANSWER_S = 2.0
+"""How long the head may take to answer."""
+HEAD_LOST_S = 20.0
+"""How long it may not answer before the run stops."""
+
+
+class ClusterHead:
+    """Notes when the head of a cluster last answered.
+
+    Args:
+        address: ``host:port``.
+    """
+
+    def __init__(self, address: str) -> None:
+        self._address = address
+        self._answered_at = time.monotonic()
+
+    def answers(self) -> bool:
+        """Return whether it answers now."""
+        host, _, port = self._address.rpartition(":")
+        try:
+            socket.create_connection((host, int(port)), timeout=ANSWER_S).close()
+        except OSError:
+            return False
+        self._answered_at = time.monotonic()
+        return True
+
+    def wait(self, left: int) -> None:
+        """Wait until it answers, unless it has within `POLL_S`.
+
+        Args:
+            left: episodes that were not played.
+
+        Raises:
+            RoboIRGError: it has not answered for too long.
+        """
+        while time.monotonic() - self._answered_at > POLL_S and not self.answers():
+            if time.monotonic() - self._answered_at > HEAD_LOST_S:
+                raise RoboIRGError(
+                    f"The head of the Ray cluster at {self._address} has not answered for "
+                    f"{HEAD_LOST_S:g} s; run the same command again to play the remaining "
+                    f"{counted(left, 'episode')}."
+                )
+            time.sleep(POLL_S)
