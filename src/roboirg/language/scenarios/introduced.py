@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from roboirg.language.instruction import REFERENCE, Expression
@@ -84,11 +84,9 @@ class Introduced:
 
     Attributes:
         values: one or several for each slot; those of a list in its order.
-        notes: entries of the metadata.
     """
 
     values: Values
-    notes: Mapping[str, object] = field(default_factory=dict)
 
     def count(self, controller: str) -> int:
         """Return the number with which words agree: that of a slot, or how many values it has."""
@@ -144,7 +142,7 @@ class Introduced:
 
     def with_values(self, **added: tuple[IntroducedValue, ...]) -> Introduced:
         """Return the same with further slots."""
-        return Introduced({**self.values, **added}, self.notes)
+        return Introduced({**self.values, **added})
 
 
 class Offer(NamedTuple):

@@ -191,7 +191,7 @@ def _scenario_words(
     scenario = chosen.scenario
     speech = Speech(request, words, chosen.introduced, scenario)
     utterances = [UtteranceSpec("introduction", speech.phrase(scenario.text("introduction")))]
-    notes: dict[str, object] = {**chosen.introduced.notes, "scenario": scenario.fields.frame}
+    notes: dict[str, object] = {**chosen.offer.notes, "scenario": scenario.fields.frame}
     if _setting_of(request).offers == _CONTEXTUAL:
         utterances += _stages(request, speech, scenario)
         notes |= _stage_notes(request.options)
@@ -246,11 +246,12 @@ def _lead(request: InstructionRequest, chosen: Chosen) -> _Lead:
         # It names what is meant, so no remark has to choose.
         return _Lead(scenario.text("resolved.lead"))
     lead = scenario.text("lead")
-    if not chosen.remark:
+    remark = chosen.offer.remark
+    if not remark:
         return _Lead(lead)
-    text = request.sampler.pick("remark", scenario.texts[f"remarks.{chosen.remark}"])
+    text = request.sampler.pick("remark", scenario.texts[f"remarks.{remark}"])
     pointer = next(pointers_in(text))
-    sets_aside = chosen.remark.startswith("not_")
+    sets_aside = remark.startswith("not_")
     return _Lead((*lead, *text), ChoosingRemark(pointer, sets_aside))
 
 
