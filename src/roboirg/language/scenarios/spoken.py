@@ -163,8 +163,8 @@ def _with_log(request: InstructionRequest, log: list[str]) -> InstructionRequest
 def say_explicit(request: InstructionRequest, words: TaskScenarios) -> InstructionSpec:
     """Return a command that states the goal."""
     speech = Speech(request, words, Introduced(goal_values(request)))
-    command = UtteranceSpec("command", speech.command({}, ()))
-    return InstructionSpec((command,), speech.meaning())
+    command = speech.command({}, ())
+    return InstructionSpec((UtteranceSpec("command", command),), speech.meaning(command))
 
 
 def say_chosen(
@@ -195,8 +195,9 @@ def _scenario_words(
     if _setting_of(request).offers == _CONTEXTUAL:
         utterances += _stages(request, speech, scenario)
         notes |= _stage_notes(request.options)
-    utterances.append(UtteranceSpec("command", _command(request, speech, chosen)))
-    return InstructionSpec(tuple(utterances), speech.meaning(), notes)
+    command = _command(request, speech, chosen)
+    utterances.append(UtteranceSpec("command", command))
+    return InstructionSpec(tuple(utterances), speech.meaning(command), notes)
 
 
 def _stage_notes(options: InstructionOptions) -> dict[str, object]:
