@@ -155,6 +155,10 @@ class _SplitEntry(NamedTuple):
     rivals: frozenset[_SlotValue]
     rival: str | int | None = None
 
+    def is_of(self, episode: Episode) -> bool:
+        """Return whether it is about an episode; another one may have the same index."""
+        return self.episode.split == episode.split and self.episode.seed == episode.seed
+
     def is_partner(self, other: _SplitEntry) -> bool:
         """Return whether the value of each episode can be the rival in the other."""
         return other.meant in self.rivals and self.meant in other.rivals
@@ -179,17 +183,13 @@ def _likely_rivals(request: InstructionRequest, meant: GoalValue) -> list[str | 
     split = episode.split if episode.split in SPLITS else REFERENCE_SPLIT
     entries = _entries_in(request.task.name, split)
     entry = entries.get(episode.index)
-    # The episode itself is in the split; another one may have the same index.
-    if entry and entry.episode.split == episode.split and entry.episode.seed == episode.seed:
-        return [] if entry.rival is None else [entry.rival]
-
-    wanted = _SlotValue(meant.slot, meant.value)
-    likely: list[str | int] = []
-    for other in entries.values():
-        is_alike = other.episode.difficulty == episode.difficulty and other.meant == wanted
-        if is_alike and other.rival is not None:
-            likely.append(other.rival)
-    return likely
+    if entry is not None and entry.is_of(episode):
+        alike = [entry]
+    else:
+        wanted = _SlotValue(meant.slot, meant.value)
+        of_value = [entry for entry in entries.values() if entry.meant == wanted]
+        alike = [entry for entry in of_value if entry.episode.difficulty == episode.difficulty]
+    return [entry.rival for entry in alike if entry.rival is not None]
 
 
 @functools.cache

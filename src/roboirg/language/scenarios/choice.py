@@ -77,15 +77,7 @@ def choose(
     matches = list(_matches(request, setting, scenarios))
     if not matches:
         return None
-    if all_settings()[setting].offers == "reasoning":
-        derivation = _in_turn(request, matches)
-        matches = [match for match in matches if match.offer is derivation]
-    by_frame: dict[str, _Match] = {}
-    for match in matches:
-        by_frame.setdefault(match.scenario.fields.frame, match)
-    purpose = setting.removeprefix("direct-")  # part of the key of a draw, so it has to stay
-    scenario, offer = request.sampler.pick_named(f"{purpose} scenario", by_frame)
-
+    scenario, offer = _drawn(request, setting, matches)
     values = {**goal_values(request), **offer.values}
     if offer.listed is None and scenario.fields.list:
         values |= several("list", _list(request, scenario))
@@ -109,6 +101,18 @@ def _matches(
         for scenario in by_hidden.get(frozenset(offer.fields), []):
             if _says(scenario, offer):
                 yield _Match(scenario, offer)
+
+
+def _drawn(request: InstructionRequest, setting: str, matches: Sequence[_Match]) -> _Match:
+    """Draw a scenario, with the first offer that it can say; in reasoning, of those in turn."""
+    if all_settings()[setting].offers == "reasoning":
+        derivation = _in_turn(request, matches)
+        matches = [match for match in matches if match.offer is derivation]
+    by_frame: dict[str, _Match] = {}
+    for match in matches:
+        by_frame.setdefault(match.scenario.fields.frame, match)
+    purpose = setting.removeprefix("direct-")  # part of the key of a draw, so it has to stay
+    return request.sampler.pick_named(f"{purpose} scenario", by_frame)
 
 
 def _offers_of(setting: str) -> Callable[[InstructionRequest], Iterable[Offer]]:
@@ -168,10 +172,10 @@ def _people(request: InstructionRequest, scenario: Scenario) -> Values:
     others = [person for person in scenario.people if person is not first]
     second = request.sampler.pick("other person", others)
     values: dict[str, tuple[IntroducedValue, ...]] = {}
-    # Each person is a row of words in the order of `PERSON`: "Leo", "he", "him" …
-    for slot, first_word, second_word in zip(PERSON, first, second, strict=True):
-        values[slot] = (IntroducedValue("", "person", first_word, first_word),)
-        values[f"{slot}.2"] = (IntroducedValue("", "person", second_word, second_word),)
+    for number, person in (("", first), (".2", second)):
+        # Each person is a row of words in the order of `PERSON`: "Leo", "he", "him" …
+        for slot, word in zip(PERSON, person, strict=True):
+            values[f"{slot}{number}"] = (IntroducedValue("", "person", word),)
     return values
 
 

@@ -38,7 +38,7 @@ from roboirg.language.scenarios.amounts import (
 )
 from roboirg.language.scenarios.choice import rival_values
 from roboirg.language.scenarios.declared import ChoosingRemark, SaidValues
-from roboirg.language.scenarios.introduced import Introduced
+from roboirg.language.scenarios.introduced import Introduced, PointedValue
 from roboirg.language.scenarios.markup import (
     Agreement,
     Pointer,
@@ -230,17 +230,14 @@ class Speech:
 
         A field is also settled if the command names its value, whatever points back.
         """
-        named_values: set[tuple[str, str | int]] = set()  # with the slot of each
-        for piece in command:
-            if piece.tag and piece.tag.role == "antecedent":
-                named_values.add((piece.tag.slot, piece.tag.value))
-        terms: dict[str, Term] = {}
-        settled: set[str] = set()
-        for field in [value.field for value in self._request.goal_values]:
-            terms[field] = self._terms[field]
-            is_hidden = field in self._hidden and not self._request.resolved
-            (value,) = self._introduced.values[field]
-            if not is_hidden or (value.slot, value.value) in named_values:
+        fields = [value.field for value in self._request.goal_values]
+        terms = {field: self._terms[field] for field in fields}
+        settled = set(fields)
+        if not self._request.resolved:
+            settled -= self._hidden
+        named_values = _named_values(command)
+        for field in fields:
+            if self._introduced.referent(field) in named_values:
                 settled.add(field)
         return Meaning(terms, frozenset(settled), agrees=dict(self._agrees))
 
@@ -322,6 +319,15 @@ class Speech:
 def _fields_in(command: str) -> frozenset[str]:
     """Return the fields that a command says."""
     return frozenset(slots_in(parse(command)))
+
+
+def _named_values(words: Phrase) -> set[PointedValue]:
+    """Return the values that words name, each with its slot."""
+    found: set[PointedValue] = set()
+    for piece in words:
+        if piece.tag and piece.tag.role == "antecedent":
+            found.add(PointedValue(piece.tag.slot, piece.tag.value))
+    return found
 
 
 def _begun(words: Phrase, case: Callable[[str], str]) -> Phrase:
