@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from roboirg.reader.phrases import Chunks, Rewrites, Token, Value, compiled
-from roboirg.reader.series import read_targets, read_times
+from roboirg.reader.phrases import Chunks, Found, Rewrites, Rule, Token, Value, compiled
+from roboirg.reader.series import TARGET_RULES, TIMES_RULES
 from roboirg.reader.things import Description, read_things
 from roboirg.reader.tokens import Sentence, word_set
 from roboirg.reader.vocabulary import LOWERING, VERB_OF
@@ -233,33 +233,41 @@ def read_command(words: Sentence) -> Reading:
     if _COVERS.search(text) is not None:
         text = _ORDER.apply(text)
     chunks = Chunks(text)
-
-    # The order counts: each phrase takes its words away from the later ones, and some are made of
-    # earlier chunks, "on target#1" of a target.
-    read_targets(chunks)
-    chunks.replace("button", _BUTTON, lambda found: found[0])
+    chunks.apply(TARGET_RULES)
+    chunks.apply(_BUTTON_RULES)
     chunks.text = _PRESSING.apply(chunks.text)
-    read_times(chunks)
+    chunks.apply(TIMES_RULES)
     read_things(chunks)
-    chunks.replace("goal", _GOAL, lambda found: _goal(found["goal"], chunks))
-    chunks.replace("down", _DOWN, lambda found: found[0])
-    chunks.replace("again", _AGAIN, lambda found: found[0])
-    chunks.replace("it", _IT, lambda found: found[0])
+    chunks.apply(_REST_RULES)
     return _acts(chunks)
 
 
-def _goal(words: str, chunks: Chunks) -> Value:
+def _words(found: Found) -> str:
+    """Return the words themselves, where the kind of the chunk says enough."""
+    return found.words
+
+
+def _goal(found: Found) -> Value:
     """Return where something goes: a target, a way over targets, a box, or a noun such as ``bin``.
 
-    `words` are those after *on* or *to*: ``target#1``, ``the same bin``. None if they are a thing
-    that is no box.
+    None if the words are a thing that is no box.
     """
+    words = found["goal"]  # after "on" or "to": "target#1", "the same bin"
     if "#" not in words:
         return words.rpartition(" ")[2]  # of "the same bin", the noun
-    value = chunks.value(words)
+    value = found.value("goal")
     if isinstance(value, Description) and (value.noun not in ("box", "one") or value.is_open):
         return None
     return value
+
+
+_BUTTON_RULES = (Rule("button", _BUTTON, _words),)
+_REST_RULES = (
+    Rule("goal", _GOAL, _goal),
+    Rule("down", _DOWN, _words),
+    Rule("again", _AGAIN, _words),
+    Rule("it", _IT, _words),
+)
 
 
 def _acts(chunks: Chunks) -> Reading:
