@@ -85,11 +85,11 @@ class Found:
     """A phrase that a rule has found in a sentence.
 
     Attributes:
-        words: all of it.
+        text: all of it.
     """
 
     def __init__(self, match: re.Match[str], chunks: Chunks) -> None:
-        self.words = match[0]
+        self.text = match[0]
         self._groups = match.groupdict()
         self._chunks = chunks
 

@@ -1,4 +1,9 @@
-"""Series: how often, at which visit, at which of the targets that the video shows."""
+"""Series: how often, at which visit, at which of the targets that the video shows.
+
+- *visit*: the moving cube is on its target; *passed*: visits to let go by before acting.
+- *placement*: the robot puts a cube on a target in the video; a rank counts these.
+- *way*: over which targets something swings, by their sides.
+"""
 
 from __future__ import annotations
 
@@ -217,17 +222,23 @@ def _relation(word: str) -> Relation | None:
 
 
 TARGET_RULES = (
+    # Before single targets: "from your right to your left target".
     Rule("way", _WAY, _way),
     Rule("target", _SIDE_TARGET, _side_target),
     Rule("target", _PRESS_TARGET, _target),
     Rule("target", _WHERE, _target),
+    # Before single placements: "the target of the last placement".
     Rule("target", _TARGET, _target),
     Rule("target", _PLACING, _target),
+    # After targets, which these may hold: "the second time it passes target#1".
     Rule("passed", _PASSED, _times),
     Rule("visit", _VISIT, _visit),
     Rule("visit", _NEXT, _next_visit),
 )
+"""Targets, and visits of a cube to one; where nothing is said, the order does not matter."""
 TIMES_RULES = (
+    # Before other numbers: "three times more".
     Rule("more", _MORE, _times),
     Rule("times", _TIMES, _times),
 )
+"""Repetitions."""

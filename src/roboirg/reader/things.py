@@ -1,4 +1,9 @@
-"""Things: the words for a cube, a tape, a box or a container, and for where it stands."""
+"""Things: the words for a cube, a tape, a box or a container, and for where it stands.
+
+- *description*: all that words say of a thing, ``Description``.
+- *place*: words for where it stands; *anchor*: another thing in them, *next to the button*.
+- *chunk*: what has been read stands in the patterns as ``thing#3``, ``place#4``.
+"""
 
 from __future__ import annotations
 
@@ -210,7 +215,7 @@ def _place(found: Found, place: Place) -> Place | None:
     return place._replace(
         side=cast("Side | None", found["side"] or None),
         rank=ordinal_of(found["rank"]) or 1,
-        is_mirrored="picture" in found.words or "camera" in found.words,
+        is_mirrored="picture" in found.text or "camera" in found.text,
         anchors=anchors,
     )
 
@@ -255,7 +260,7 @@ def _named(found: Found) -> Description:
     if found["count"]:
         number = number_of(found["count"])
     else:
-        number = _number_by(determiner, is_plural=found.words.endswith("s"))
+        number = _number_by(determiner, is_plural=found.text.endswith("s"))
     return Description(
         found["noun"] or "one",
         color_of(found["color"]),
@@ -345,8 +350,10 @@ def _moment(*words: str) -> Moment | None:
 
 
 _NAMES = (
+    # "two of each color" and "blue's container" hold a number, a color or a noun of their own.
     Rule("each", _EACH, _number_of_each),
     Rule("thing", _OWNED, _owned),
+    # With a noun before those without: "red cube", then "red".
     Rule("thing", _NAMED, _named),
     Rule("thing", _COLORED, _named),
 )
@@ -358,6 +365,7 @@ _PLACE_RULES = [
 _DESCRIPTIONS = (
     *_PLACE_RULES,
     Rule("place", _AMONG, _member),
+    # A place goes to the nearest thing: "the container over the cube in the middle".
     Rule("thing", _STANDING, _standing),
     Rule("thing", _COVERING, _covering),
     Rule("thing", _COVERING_PLACE, _covering_place),
@@ -367,3 +375,4 @@ _DESCRIPTIONS = (
 )
 """Places, and words that describe a thing and stand behind it."""
 _LIKENESSES = (Rule("thing", _LIKE, _like),)
+"""Things of the color of another one, whose description has been read."""
