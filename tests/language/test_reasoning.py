@@ -81,7 +81,7 @@ def test_of_two_colors_that_are_both_wanted_none_is_excluded():
 
 def test_a_step_leaves_the_position_open():
     def names(known, position, length):
-        choices = [[number] for number in range(1, length + 1)]
+        choices = [[number + 1] for number in range(length)]
         return [step.name for step, _ in deductions([position], choices, known, length)]
 
     assert not names(STEPS, 1, 2)  # of two, the one before another is always the first

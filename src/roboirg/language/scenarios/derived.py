@@ -1,5 +1,10 @@
 """Every way in which the goal of an episode can follow from something else, for reasoning.
 
+- *pattern*: the kind of reasoning, ``number deduction``.
+- *relation*: how a number, or a position in a series, follows from another: *one fewer*.
+- *reference*: the number, position or value from which the goal follows; it is introduced.
+- *complement*: a value as the other one of two, of which one is taken.
+
 No derivation gives a value away: a relation is not used if its words spell the result, *one fewer*
 for one, or if it can lead to a single goal of the scene only.
 """

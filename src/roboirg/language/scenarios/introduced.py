@@ -1,4 +1,10 @@
-"""What a scenario's words can name: the values that its slots stand for, and how they are said."""
+"""What a scenario's words can name: the values that its slots stand for, and how they are said.
+
+- *introduced value*: a value with its type, which says how it is put into words; a place or a
+  person has words of its own.
+- *kind*: that type: ``color``, ``number``, ``visit``, ``place``, ``clue``, ``person`` …
+- *referent*: the value for which words stand that point back.
+"""
 
 from __future__ import annotations
 

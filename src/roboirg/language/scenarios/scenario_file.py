@@ -1,4 +1,10 @@
-"""Read the data files of words; every mistake of a file is named by scenario and field."""
+"""Read the data files of words; every mistake of a file is named by scenario and field.
+
+- *head*: the content of a file with its tables as they were written.
+- *commands*: skeletons of a task, *Pick up {color}*; *stated*: the words that state each field.
+- *frame*: the short name of a scenario; *sentence*: one of its texts, with marks.
+- *table of pointers*: ``pointers.toml``, with a row for all words that may point back.
+"""
 
 from __future__ import annotations
 
