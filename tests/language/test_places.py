@@ -338,7 +338,7 @@ def test_a_scenario_with_a_spot_fits_only_what_has_one():
         }
         assert bool(chosen) == bool(known)
         if chosen:
-            (landmark,) = chosen.introduced.notes["landmarks"]
+            (landmark,) = chosen.offer.notes["landmarks"]
             assert landmark in known
             fitting += 1
     assert fitting
@@ -354,7 +354,7 @@ def test_any_place_is_a_spot_where_there_is_one_and_fits_all_others_too():
         request = request_of(get_episode("PickXtimes", "train", index), options)
         spot = choose(request, "spatial", [scenario])
         found = choose(request, "spatial", [any_place])
-        assert spot is None or spot.introduced == found.introduced
+        assert spot is None or spot.offer == found.offer
         forms.add(found.introduced.values["place"][0].form)
     assert forms == {"spot", None}
 

@@ -96,23 +96,33 @@ def attribute_failure(
         return None
 
     # The first deviation comes before the end, as what follows it can no longer succeed.
-    place = None
-    first = min(_deviations(replay), key=lambda deviation: deviation.step, default=None)
-    if first is not None and first.act is not None:
-        found = _attribute_act(replay, first, first.act)
-        place = first.act.place
-    elif first is not None:
-        found = _attribute_time(replay, first)
-    elif timed_out:
-        found = describe_end_state(replay)
+    deviation = min(_deviations(replay), key=lambda deviation: deviation.step, default=None)
+    act = None if deviation is None else deviation.act
+    if deviation is None:
+        found = _attribute_end(replay, timed_out=timed_out, cause=cause)
+    elif act is None:
+        found = _attribute_time(replay, deviation)
     else:
-        words = f"could not reach a pose: {cause}"
-        found = FailureAttribution.of("unreachable", None, replay.last_step, words)
+        found = _attribute_act(replay, deviation, act)
 
+    place = None if act is None else act.place
     found = refine_wrong_object(found, replay, mirrored or {}, place)
     # Up to here, steps count since the world began; a declaration counts them in the policy's turn.
     found = found._replace(step=found.step - policy_start_step)
     return found if intent is None else intent.revise(found, episode)
+
+
+def _attribute_end(
+    replay: EpisodeReplay, *, timed_out: bool, cause: str | None
+) -> FailureAttribution:
+    """Return the failure of an episode without a deviation: what the policy had not done yet.
+
+    If the time was not over, the environment ended the episode, with a cause.
+    """
+    if timed_out:
+        return describe_end_state(replay)
+    words = f"could not reach a pose: {cause}"
+    return FailureAttribution.of("unreachable", None, replay.last_step, words)
 
 
 def _attribute_time(replay: EpisodeReplay, deviation: _Deviation) -> FailureAttribution:

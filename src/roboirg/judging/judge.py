@@ -3,6 +3,10 @@
 As in RoboMME, each evaluation first tests what the current stage forbids, then what it expects.
 It completes at most one stage, so an act that completes one never violates the next in the same
 step.
+
+*Fact*: what the world reports, the red cube is up. *Stage*: what has to happen next, and what must
+not. *Evaluation*: a step at which the judge looks at the facts. `Judge` has the state of the
+episode, `_StageWatch` the rules of the current stage.
 """
 
 from __future__ import annotations
@@ -29,15 +33,16 @@ class Status(StrEnum):
 
 
 class Judge:
-    """Judges one episode.
+    """Judges one episode: where it stands, and how each evaluation moves it on.
 
     Args:
         stages: what has to happen, in order, the demonstration's stages included.
         scene: lets the cause describe objects instead of naming them.
 
     Attributes:
+        stages: as given.
         status: success and failure are final.
-        index: number of completed stages.
+        index: number of completed stages, and so that of the current one.
         published: the current stage when the last evaluation began, or None when all are
             completed: labels change one step after the stage (RoboMME).
         cause: why the episode failed; None before that.
@@ -47,21 +52,24 @@ class Judge:
 
     def __init__(self, stages: Sequence[Stage], scene: Scene | None = None) -> None:
         self.stages = tuple(stages)
-        self._scene = scene or Scene(())
         self.status = Status.SUCCESS if not self.stages else Status.ONGOING
         self.index = 0
         self.published = self.current
         self.cause: str | None = None
         self.violation: Fact | Rule | None = None
-        self._history = FactHistory()
-        self._met_since: int | None = None
-        self._evaluated = -1
-        self._elapsed: tuple[Elapsed, ...] = ()
+        self._scene = scene or Scene(())
+        self._history = FactHistory()  # of the whole episode
+        self._watch: _StageWatch | None = None  # None until the current stage is first evaluated
 
     @classmethod
     def of(cls, episode: Episode) -> Judge:
         """Return a judge of an episode, which follows its demonstration, too."""
         return cls((*episode.demonstration, *episode.stages), episode.scene)
+
+    @property
+    def current(self) -> Stage | None:
+        """The stage to complete next, or None when all are completed."""
+        return self.stages[self.index] if self.index < len(self.stages) else None
 
     def next_change(self) -> float:
         """Return the next step at which an evaluation may change something though no fact does.
@@ -69,22 +77,11 @@ class Judge:
         A stage that expects 100 steps to pass, evaluated at step 20 -> 100. Infinity if only facts
         can change anything.
         """
-        stage = self.current
-        if self.status is not Status.ONGOING or stage is None:
+        if self.status is not Status.ONGOING:
             return math.inf
-        if self._evaluated != self.index:
+        if self._watch is None:
             return self._history.step + 1  # a new stage, which the next step evaluates first
-        if not self._elapsed and not stage.lasting:
-            return math.inf
-        changes = [self._history.next_change(condition) for condition in self._elapsed]
-        if stage.lasting and self._met_since is not None:
-            changes.append(self._met_since + stage.lasting)
-        return min(changes, default=math.inf)
-
-    @property
-    def current(self) -> Stage | None:
-        """The stage to complete next, or None when all are completed."""
-        return self.stages[self.index] if self.index < len(self.stages) else None
+        return self._watch.next_change(self._history)
 
     def update(self, step: int, facts: AbstractSet[Fact]) -> Status:
         """Evaluate the facts that hold `step` control steps after reset, and return the status.
@@ -99,17 +96,15 @@ class Judge:
         self._history.update(step, facts)
         if stage.timer is not None:
             self._history.start_timer(stage.timer)
-        is_first = self._evaluated != self.index
-        if is_first:
-            self._evaluated = self.index
-            self._met_since = None
-            self._elapsed = tuple(_elapsed_parts(stage))
+        if self._watch is None:
+            self._watch = _StageWatch(stage, step)
 
-        self.violation = self._first_violated(stage)
+        self.violation = self._watch.first_violated(self._history)
         if self.violation is not None:
             self.fail(describe_violation(self.violation, stage, self._scene))
-        elif self._completes(step, stage, is_first=is_first):
+        elif self._watch.completes(self._history):
             self.index += 1
+            self._watch = None
             if self.index == len(self.stages):
                 self.status = Status.SUCCESS
                 self.published = None
@@ -121,31 +116,54 @@ class Judge:
             self.status = Status.FAILURE
             self.cause = cause
 
-    def _first_violated(self, stage: Stage) -> Fact | Rule | None:
+
+class _StageWatch:
+    """The rules of one stage, from its first evaluation until it is completed.
+
+    The history, which each method gets, has the facts of the last evaluation and its step.
+    """
+
+    def __init__(self, stage: Stage, first_step: int) -> None:
+        self._stage = stage
+        self._first_step = first_step
+        self._elapsed = tuple(_elapsed_parts(stage))
+        # Since which step all evaluations have met what the stage expects; None if the last one
+        # did not. Only of a stage that has to last.
+        self._met_since: int | None = None
+
+    def next_change(self, history: FactHistory) -> float:
+        """Return the next step at which time alone may complete or violate the stage."""
+        changes = [history.next_change(condition) for condition in self._elapsed]
+        if self._met_since is not None:
+            changes.append(self._met_since + self._stage.lasting)
+        return min(changes, default=math.inf)
+
+    def first_violated(self, history: FactHistory) -> Fact | Rule | None:
         """Return the first forbidden fact or rule that holds; None if none does."""
-        for forbidden in stage.forbids:
-            if self._history.holds(_condition_of(forbidden)):
+        for forbidden in self._stage.forbids:
+            if history.holds(_condition_of(forbidden)):
                 return forbidden
         return None
 
-    def _completes(self, step: int, stage: Stage, *, is_first: bool) -> bool:
-        """Return whether a step completes a stage, and remember since when it has been met.
+    def completes(self, history: FactHistory) -> bool:
+        """Return whether the stage is complete, and remember since when it has been met.
 
         A stage with `lasting` is complete when what it expects has held for so many steps on end.
         """
-        is_met = self._history.holds(stage.expects)
-        if stage.lasting == 0:
+        is_met = history.holds(self._stage.expects)
+        if self._stage.lasting == 0:
             return is_met
         if not is_met:
             self._met_since = None
             return False
         if self._met_since is None:
-            # Later than at the stage's first evaluation, it has been met for one step already.
-            self._met_since = step if is_first else step - 1
-        return step - self._met_since >= stage.lasting
+            # Later than at the first evaluation, it has been met for one step already.
+            self._met_since = max(history.step - 1, self._first_step)
+        return history.step - self._met_since >= self._stage.lasting
 
 
 def _condition_of(forbidden: Fact | Rule) -> Condition:
+    """Return what must not hold, of a rule without its words."""
     return forbidden.condition if isinstance(forbidden, Rule) else forbidden
 
 

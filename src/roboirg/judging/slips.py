@@ -1,7 +1,12 @@
 """What the hands tried and failed to do: misses, drops, releases and passes next to a place.
 
-A *slip* is one such try. An object is *lost* if it had been up, was let go, and did not come to a
-place where it was expected.
+- *slip*: one such try.
+- *hold*: from when the fingers close on an object until they let it go; a *raise* is while it is
+  up. In one hold an object may be raised several times.
+- *lost*: of an object that had been up, was let go, and did not come to a place where it was
+  expected.
+- *attempt*: what only the world can see, such as fingers that close on nothing (``clutched``), a
+  hand that puts something down (``lowered``), or an object next to a place (``beside``).
 """
 
 from __future__ import annotations
@@ -105,8 +110,8 @@ def _missed_grasps(replay: EpisodeReplay) -> Iterator[Slip]:
     were at what is expected and did not close.
     """
     missed = [*replay.tried("clutched"), *_fruitless_holds(replay)]
-    grips = replay.started(FactRole.GRIP, after=0)
-    closing_steps = [interval.start for interval in (*missed, *grips)]
+    closing_steps = [interval.start for interval in missed]
+    closing_steps += [grip.start for grip in replay.started(FactRole.GRIP, after=0)]
     missed += _idle_touches(replay, closing_steps)
 
     # Several objects that were missed at the same step are one try: it is not clear at which.
@@ -233,14 +238,18 @@ def _releases(replay: EpisodeReplay) -> Iterator[_Release]:
             continue
         step = replay.end_of(hold)
         name = hold.subject
-        is_lowered = any(
-            lowered.start < step and lowered.lasts_until(step)
-            for lowered in replay.tried("lowered", name)
-        )
-        is_in_air = raises[-1].lasts_until(step) and not is_lowered
+        is_in_air = raises[-1].lasts_until(step) and not _is_lowered(replay, name, step)
         expected_facts = facts_of(replay.stage_at(step).expects)
         of_object = tuple(fact for fact in expected_facts if fact.subject == name)
         yield _Release(step, name, is_in_air, of_object)
+
+
+def _is_lowered(replay: EpisodeReplay, name: str, step: int) -> bool:
+    """Return whether the hand has lowered an object, to put it down, when it lets go."""
+    for lowered in replay.tried("lowered", name):
+        if lowered.start < step and lowered.lasts_until(step):
+            return True
+    return False
 
 
 def _has_landed(replay: EpisodeReplay, release: _Release) -> bool:

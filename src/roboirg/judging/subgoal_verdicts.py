@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Collection, Sequence
 from collections.abc import Set as AbstractSet
@@ -49,12 +50,12 @@ def judge_subgoal(
     """
     if due is None:
         return "lost"
-    said = _without_point(subgoal)
-    right = plain_subgoal(due)
+    said = _Subgoal(_without_point(subgoal))
+    right = _Subgoal(plain_subgoal(due))
     is_placing = due.primitive.kind in HANDLES_HELD
-    if not _is_same_act(said, right):
+    if not said.is_same_act(right):
         # To put the right thing somewhere else is another act, too, but not an unrelated one.
-        return "wrong_place" if is_placing and _is_placing(said) else "lost"
+        return "wrong_place" if is_placing and said.is_placing else "lost"
 
     index = episode.stages.index(due) if due in episode.stages else 0
     right_things = meant_objects(episode.stages, index, episode.scene, facts)
@@ -62,13 +63,68 @@ def judge_subgoal(
     if pointed_at is not None and _is_elsewhere(pointed_at, due, right_targets):
         return "wrong_place" if is_placing else "wrong_thing"
 
-    if said == right:
+    if said.words == right.words:
         return "right"
     meant = _objects(episode.scene, {*right_things, due.points_at})
     # "Pick up the cube" without a color or a point does not name one of several cubes.
-    if pointed_at is None and _is_vague(said, right) and _have_alike(meant, episode.scene):
+    if pointed_at is None and said.is_vaguer(right) and _have_alike(meant, episode.scene):
         return "wrong_thing"
     return _judge_words(said, right, meant)
+
+
+class _Subgoal:
+    """A subgoal, by what its words ask for.
+
+    Attributes:
+        words: in lower case, without a point.
+        colors: that they name.
+    """
+
+    def __init__(self, words: str) -> None:
+        self.words = words
+        self.colors = set(words.split()) & set(ALL_COLORS)
+
+    @functools.cached_property
+    def request(self) -> Request | None:
+        """What the words ask for, whatever their ordinal; None if they are no subgoal."""
+        return read_subgoal(_ORDINAL.sub("", self.words))
+
+    @property
+    def is_placing(self) -> bool:
+        """Whether it is to put what is in the hand somewhere."""
+        return self.request is not None and self.request.kind in HANDLES_HELD
+
+    @property
+    def side(self) -> str | None:
+        """The side of the target that the words ask for, if any."""
+        return None if self.request is None else self.request.side
+
+    def is_same_act(self, other: _Subgoal) -> bool:
+        """Return whether both ask for the same kind of movement, with whatever object."""
+        if self.words == other.words:
+            return True
+        if self.request is None or other.request is None:
+            return False
+        return self.request.kind == other.request.kind
+
+    def is_vaguer(self, right: _Subgoal) -> bool:
+        """Return whether the words for a pick leave out the color that the right ones have."""
+        return self.words.startswith("pick") and not self.colors and bool(right.colors)
+
+    def is_other_time(self, right: _Subgoal) -> bool:
+        """Return whether the words have another ordinal than the right ones, of the same thing.
+
+        *For the second time* where *for the first time* is right; *again* fits any time. The
+        ordinals of buttons do not count: both have to be pressed, in any order.
+        """
+        ordinal = _ORDINAL.search(self.words)
+        right_ordinal = _ORDINAL.search(right.words)
+        if ordinal is None or right_ordinal is None:
+            return False
+        stands_for_any = ordinal[1] is None
+        if stands_for_any or "button" in self.words:
+            return False
+        return ordinal[1] != right_ordinal[1] and self.colors == right.colors
 
 
 def _is_elsewhere(
@@ -80,17 +136,17 @@ def _is_elsewhere(
     return right_targets.isdisjoint(pointed_at)
 
 
-def _judge_words(said: str, right: str, meant: Sequence[SceneObject]) -> SubgoalVerdict:
+def _judge_words(said: _Subgoal, right: _Subgoal, meant: Sequence[SceneObject]) -> SubgoalVerdict:
     """Compare the words of a subgoal with the right ones for the same act.
 
     `meant` are the objects with which the stage can rightly be completed. The order matters: a
     wrong color weighs more than a wrong side, and that more than a wrong ordinal.
     """
-    if not _colors(said) <= {item.color for item in meant}:
-        return "wrong_place" if "box" in said else "wrong_thing"
-    if _side(said) != _side(right):
+    if not said.colors <= {item.color for item in meant}:
+        return "wrong_place" if "box" in said.words else "wrong_thing"
+    if said.side != right.side:
         return "wrong_place"
-    return "wrong_count" if _is_other_time(said, right) else "right"
+    return "wrong_count" if said.is_other_time(right) else "right"
 
 
 def _without_point(subgoal: str) -> str:
@@ -105,34 +161,6 @@ def _without_point(subgoal: str) -> str:
     return words
 
 
-def _request(words: str) -> Request | None:
-    """Return what words ask for, whatever their ordinal; None if they are no subgoal."""
-    return read_subgoal(_ORDINAL.sub("", words))
-
-
-def _is_same_act(said: str, right: str) -> bool:
-    """Return whether two subgoals ask for the same kind of movement, with whatever object."""
-    if said == right:
-        return True
-    said_request = _request(said)
-    right_request = _request(right)
-    if said_request is None or right_request is None:
-        return False
-    return said_request.kind == right_request.kind
-
-
-def _is_placing(said: str) -> bool:
-    """Return whether words ask to put what is in the hand somewhere."""
-    request = _request(said)
-    return request is not None and request.kind in HANDLES_HELD
-
-
-def _side(words: str) -> str | None:
-    """Return the side of the target that words ask for, if any."""
-    request = _request(words)
-    return None if request is None else request.side
-
-
 def _places(stage: Stage) -> frozenset[str | None]:
     """Return the places in what a stage expects."""
     return frozenset(fact.place for fact in facts_of(stage.expects))
@@ -143,33 +171,7 @@ def _objects(scene: Scene, names: Collection[str | None]) -> list[SceneObject]:
     return [item for item in scene.objects if item.name in names or item.inside in names]
 
 
-def _is_vague(said: str, right: str) -> bool:
-    """Return whether words for a pick leave out the color that the right ones have."""
-    return said.startswith("pick") and not _colors(said) and bool(_colors(right))
-
-
 def _have_alike(meant: Sequence[SceneObject], scene: Scene) -> bool:
     """Return whether the scene has other objects of the same kinds."""
     kinds = {item.kind for item in meant}
     return any(item.kind in kinds and item not in meant for item in scene.objects)
-
-
-def _is_other_time(said: str, right: str) -> bool:
-    """Return whether words have another ordinal than the right ones, of the same thing.
-
-    *For the second time* where *for the first time* is right; *again* fits any time. The ordinals
-    of buttons do not count: both have to be pressed, in any order.
-    """
-    said_ordinal = _ORDINAL.search(said)
-    right_ordinal = _ORDINAL.search(right)
-    if said_ordinal is None or right_ordinal is None:
-        return False
-    stands_for_any = said_ordinal[1] is None
-    if stands_for_any or "button" in said:
-        return False
-    return said_ordinal[1] != right_ordinal[1] and _colors(said) == _colors(right)
-
-
-def _colors(words: str) -> set[str]:
-    """Return the colors that words name."""
-    return set(words.split()) & set(ALL_COLORS)

@@ -164,7 +164,7 @@ def _notes_to_keep(instruction: Instruction) -> list[object]:
 def _silence(instruction: Instruction, text: str) -> Instruction:
     """Return a text that says nothing about the goal; it leaves all goals of the scene."""
     meaning = None if instruction.meaning is None else Meaning({})
-    return _with_texts(instruction, (text,), meaning)
+    return _with_texts(instruction, [text], meaning)
 
 
 def _scramble(episode: Episode, instruction: Instruction) -> Instruction:
@@ -181,18 +181,9 @@ def _scramble(episode: Episode, instruction: Instruction) -> Instruction:
     order = words
     while order == words:
         order = shuffled(rng, words)
-    return _with_texts(instruction, _cut(order, [len(turn_words) for turn_words in by_turn]))
-
-
-def _cut(words: Sequence[str], lengths: Sequence[int]) -> tuple[str, ...]:
-    """Return words as texts of some lengths: ``a b c`` with 1 and 2 becomes ``a`` and ``b c``."""
-    texts: list[str] = []
-    start = 0
-    for length in lengths:
-        end = start + length
-        texts.append(" ".join(words[start:end]))
-        start = end
-    return tuple(texts)
+    left = iter(order)  # each turn takes the next of them
+    texts = [" ".join(itertools.islice(left, len(turn_words))) for turn_words in by_turn]
+    return _with_texts(instruction, texts)
 
 
 def _content_words(text: str) -> list[str]:
@@ -203,7 +194,7 @@ def _content_words(text: str) -> list[str]:
 
 
 def _with_texts(
-    instruction: Instruction, texts: tuple[str, ...], meaning: Meaning | None = None
+    instruction: Instruction, texts: Sequence[str], meaning: Meaning | None = None
 ) -> Instruction:
     """Return an instruction of other texts, which mention nothing; the last is the command.
 

@@ -1,5 +1,8 @@
 """The goals that the declared meaning of an instruction leaves open in a scene.
 
+A *term* says how the value of a field follows from its *operands*, the values and descriptions that
+were said; `Term` lists its operations.
+
 The listener, the chance level, the checker of scenarios, the floors and the exports ask here what
 an instruction means. Places and what there is to see are looked up in the scene,
 with their margins; the goal of the episode is never read.

@@ -3,6 +3,11 @@
 RoboMME's goals are given and uneven; the rivals are ours. Two episodes of a split with different
 values, each possible in the other, are partners: the value of one is the rival in the other. So of
 two values each is the meant one in half of a split's episodes.
+
+- *meant*: the value that the goal has. *rival*: another one that the goal could have there.
+- *pair*: a meant value with a rival. `possible_pairs` finds all, `rival_pairs` those of one slot,
+  and `balanced_rival` the one that is said.
+- *entry*: an episode of a split with all that may be its rival.
 """
 
 from __future__ import annotations
@@ -35,7 +40,8 @@ class ValuePair(NamedTuple):
 
     Attributes:
         meant: a value of the goal; of two colors in order, the one that comes first.
-        rival: the other value; its slot is ``reference`` unless the goal has it too.
+        rival: the other value. It has the slot ``reference`` and no field, but of two colors in
+            order it is the goal's second one.
     """
 
     meant: GoalValue
@@ -87,19 +93,16 @@ def possible_pairs(request: InstructionRequest) -> Iterator[ValuePair]:
     for slot, _ in request.episode.goal.slots:
         meant = request.values_in(slot)
         if len(meant) == 1:
-            yield from _single_pairs(request, meant[0])
-            continue
-        # Several values have one rival only: the same values in the opposite order.
-        values = tuple(value.value for value in meant)
-        swapped = values[::-1]
-        if swapped != values and swapped in request.alternatives(slot):
+            for value in _other_values(request, meant[0]):
+                yield ValuePair(meant[0], GoalValue("", REFERENCE, meant[0].slot_type, value))
+        elif _has_opposite_order(request, slot):
             yield ValuePair(meant[0], meant[1])
 
 
-def _single_pairs(request: InstructionRequest, meant: GoalValue) -> Iterator[ValuePair]:
-    """Yield a pair for every other value that a slot with one value can have.
+def _other_values(request: InstructionRequest, meant: GoalValue) -> Iterator[str | int]:
+    """Yield every other value that the slot of a single value can have.
 
-    A number is a rival only if other episodes of the same difficulty ask for it.
+    A number only if other episodes of the same difficulty ask for it.
     """
     usual = _usual_numbers(request.task.name, request.episode.difficulty, meant.slot)
     for content in request.alternatives(meant.slot):
@@ -107,7 +110,14 @@ def _single_pairs(request: InstructionRequest, meant: GoalValue) -> Iterator[Val
             continue  # it is no single value, or the one that is meant
         (value,) = content
         if meant.slot not in NUMBER_SLOTS or value in usual:
-            yield ValuePair(meant, meant._replace(field="rival", slot=REFERENCE, value=value))
+            yield value
+
+
+def _has_opposite_order(request: InstructionRequest, slot: str) -> bool:
+    """Return whether a slot can have its values in the opposite order, as another goal."""
+    values = tuple(value.value for value in request.values_in(slot))
+    swapped = values[::-1]
+    return swapped != values and swapped in request.alternatives(slot)
 
 
 @functools.cache
@@ -137,27 +147,21 @@ class _SplitEntry(NamedTuple):
         episode: the episode.
         meant: its value.
         rivals: each value that it may have instead.
+        rival: the value of its partner; None if it has none.
     """
 
     episode: Episode
     meant: _SlotValue
     rivals: frozenset[_SlotValue]
+    rival: str | int | None = None
+
+    def is_of(self, episode: Episode) -> bool:
+        """Return whether it is about an episode; another one may have the same index."""
+        return self.episode.split == episode.split and self.episode.seed == episode.seed
 
     def is_partner(self, other: _SplitEntry) -> bool:
         """Return whether the value of each episode can be the rival in the other."""
         return other.meant in self.rivals and self.meant in other.rivals
-
-
-class _SplitRivals(NamedTuple):
-    """The rivals in a split, by index of the episode.
-
-    Attributes:
-        entries: the episodes that can have a rival.
-        values: the rivals of those that have a partner, in the order in which partners were found.
-    """
-
-    entries: Mapping[int, _SplitEntry]
-    values: Mapping[int, str | int]
 
 
 def balanced_rival(request: InstructionRequest, pairs: list[ValuePair]) -> ValuePair:
@@ -177,32 +181,26 @@ def _likely_rivals(request: InstructionRequest, meant: GoalValue) -> list[str | 
     """
     episode = request.episode
     split = episode.split if episode.split in SPLITS else REFERENCE_SPLIT
-    split_rivals = _rivals_in(request.task.name, split)
-    entry = split_rivals.entries.get(episode.index)
-    # The episode itself is in the split; another one may have the same index.
-    if entry and entry.episode.split == episode.split and entry.episode.seed == episode.seed:
-        if episode.index in split_rivals.values:
-            return [split_rivals.values[episode.index]]
-        return []
-
-    wanted = _SlotValue(meant.slot, meant.value)
-    likely: list[str | int] = []
-    for index, rival in split_rivals.values.items():
-        other = split_rivals.entries[index]
-        if other.episode.difficulty == episode.difficulty and other.meant == wanted:
-            likely.append(rival)
-    return likely
+    entries = _entries_in(request.task.name, split)
+    entry = entries.get(episode.index)
+    if entry is not None and entry.is_of(episode):
+        alike = [entry]
+    else:
+        wanted = _SlotValue(meant.slot, meant.value)
+        of_value = [entry for entry in entries.values() if entry.meant == wanted]
+        alike = [entry for entry in of_value if entry.episode.difficulty == episode.difficulty]
+    return [entry.rival for entry in alike if entry.rival is not None]
 
 
 @functools.cache
-def _rivals_in(task: str, split: Split) -> _SplitRivals:
-    """Return the episodes of a split that can have a rival, and the values of their partners."""
+def _entries_in(task: str, split: Split) -> Mapping[int, _SplitEntry]:
+    """Return the episodes of a split that can have a rival, by index, as partners were found."""
     entries: dict[int, _SplitEntry] = {}
     for episode in split_episodes([task], [split]):
         entry = _entry_of(episode, get_task(task))
         if entry is not None:
             entries[episode.index] = entry
-    return _SplitRivals(entries, _partner_values(entries))
+    return {entry.episode.index: entry for entry in _with_partners(entries)}
 
 
 def _entry_of(episode: Episode, task: Task) -> _SplitEntry | None:
@@ -216,27 +214,25 @@ def _entry_of(episode: Episode, task: Task) -> _SplitEntry | None:
     return _SplitEntry(episode, meant, frozenset(rivals))
 
 
-def _partner_values(entries: Mapping[int, _SplitEntry]) -> dict[int, str | int]:
-    """Pair the episodes of a split, and return for each index the value of its partner.
+def _with_partners(entries: Mapping[int, _SplitEntry]) -> Iterator[_SplitEntry]:
+    """Pair the episodes of a split, and yield each with the value of its partner as its rival.
 
-    If episode 3 means red and its partner, 7, means blue: ``{3: "blue", 7: "red"}``. Partners are
+    If episode 3 means red and its partner, 7, means blue, 3 gets blue and 7 gets red. Partners are
     found among the values that are left most often, so that few episodes remain without one.
     """
-    values: dict[int, str | int] = {}
     unmatched = dict(entries)
     while unmatched:
         frequency = Counter(entry.meant for entry in unmatched.values())
         # The most frequent value goes first; of its episodes, the one with the lowest index.
         ranks = {index: (frequency[entry.meant], -index) for index, entry in unmatched.items()}
-        first = max(unmatched, key=ranks.__getitem__)
-        entry = unmatched.pop(first)
+        entry = unmatched.pop(max(ranks, key=ranks.__getitem__))
         partners = [index for index, other in unmatched.items() if entry.is_partner(other)]
-        if partners:
-            second = max(partners, key=ranks.__getitem__)
-            partner = unmatched.pop(second)
-            values[first] = partner.meant.value
-            values[second] = entry.meant.value
-    return values
+        if not partners:
+            yield entry
+            continue
+        partner = unmatched.pop(max(partners, key=ranks.__getitem__))
+        yield entry._replace(rival=partner.meant.value)
+        yield partner._replace(rival=entry.meant.value)
 
 
 class PairOrder(NamedTuple):
@@ -269,7 +265,8 @@ def draw_order(request: InstructionRequest) -> PairOrder:
     episode = request.episode
     block, place = divmod(episode.index, BLOCK)
     # The block has its own sampler, so that its four episodes share one shuffled row of orders.
-    cycle = sampler_for(f"{episode.task}|{episode.split}|{block}").cycle("rival order", _ORDERS)
-    order = next(itertools.islice(cycle, place, None))
+    sampler = sampler_for(f"{episode.task}|{episode.split}|{block}")
+    shuffled = list(itertools.islice(sampler.cycle("rival order", _ORDERS), BLOCK))
+    order = shuffled[place]
     request.sampler.log.append(f"rival order/{_ORDERS.index(order)}")
     return order

@@ -2,6 +2,11 @@
 
 It reads commands that state their values, in our words or in other people's. It does not read what
 comes before a command. `docs/interpreter.md` says more.
+
+A text is split into *sentences* (`tokens`). Each becomes a *reading* (`command`): *acts*, such as
+to lift, with what is said of them, and the words that no rule reads. The last run of readings that
+command is the *command*, and what is before it *remarks*. The acts then leave some of the scene's
+*goals* (`constraints`).
 """
 
 from __future__ import annotations
@@ -58,14 +63,12 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
     """
     goals = _possible_goals(scene, task)
     split = _split_off_command(split_sentences(text))
-    refused = [reading for reading in split.command if not reading.is_command]
-    if refused or not split.command:
-        return _refused(refused)
+    unread = [reading for reading in split.command if not reading.is_command]
     acts: list[Act] = []
     for reading in split.command:
         acts += reading.acts
-    if not any(act.verb or act.has("thing", "each") for act in acts):
-        return _refused([])
+    if unread or not _ask_for_something(acts):
+        return _refused(unread)
     # "Lift it." means once only if nothing before it says how often.
     is_alone = not any(map(_counts, split.remarks))
     try:
@@ -73,6 +76,11 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
     except UnfitWordsError as error:
         return Interpretation((), (str(error),))
     return Interpretation(fitting, _complaints_about(fitting))
+
+
+def _ask_for_something(acts: Iterable[Act]) -> bool:
+    """Return whether any of some acts has a verb, or a thing to handle."""
+    return any(act.verb or act.has("thing", "each") for act in acts)
 
 
 def _complaints_about(fitting: Sequence[Goal]) -> tuple[str, ...]:

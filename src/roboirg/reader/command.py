@@ -1,4 +1,8 @@
-"""Commands: a sentence as acts, each with its things, places to go and repetitions."""
+"""Commands: a sentence as acts, each with its things, places to go and repetitions.
+
+*Put the red cube on the target twice* is one act: the verb ``put`` and three parts, of the kinds
+``thing``, ``goal`` and ``times``. What is left when all rules have been applied is *unread*.
+"""
 
 from __future__ import annotations
 
@@ -7,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from roboirg.reader.phrases import Chunks, Rewrites, Token, Value, compiled
-from roboirg.reader.series import read_targets, read_times
+from roboirg.reader.phrases import Chunks, Found, Rewrites, Rule, Token, Value, compiled
+from roboirg.reader.series import TARGET_RULES, TIMES_RULES
 from roboirg.reader.things import Description, read_things
 from roboirg.reader.tokens import Sentence, word_set
 from roboirg.reader.vocabulary import LOWERING, VERB_OF
@@ -233,33 +237,45 @@ def read_command(words: Sentence) -> Reading:
     if _COVERS.search(text) is not None:
         text = _ORDER.apply(text)
     chunks = Chunks(text)
-
-    # The order counts: each phrase takes its words away from the later ones, and some are made of
-    # earlier chunks, "on target#1" of a target.
-    read_targets(chunks)
-    chunks.replace("button", _BUTTON, lambda found: found[0])
-    chunks.text = _PRESSING.apply(chunks.text)
-    read_times(chunks)
+    # Each step takes its words away from those after it, and some are made of earlier chunks.
+    chunks.apply(TARGET_RULES)  # may hold a button: "the target used after pressing the button"
+    chunks.apply(_BUTTON_RULES)
+    chunks.text = _PRESSING.apply(chunks.text)  # is about buttons
+    chunks.apply(TIMES_RULES)  # before things: of "one time", "one" could be a thing
     read_things(chunks)
-    chunks.replace("goal", _GOAL, lambda found: _goal(found["goal"], chunks))
-    chunks.replace("down", _DOWN, lambda found: found[0])
-    chunks.replace("again", _AGAIN, lambda found: found[0])
-    chunks.replace("it", _IT, lambda found: found[0])
+    chunks.apply(_REST_RULES)  # goals are targets and things
     return _acts(chunks)
 
 
-def _goal(words: str, chunks: Chunks) -> Value:
+def _words(found: Found) -> str:
+    """Return the words themselves, where the kind of the chunk says enough."""
+    return found.text
+
+
+def _goal(found: Found) -> Value:
     """Return where something goes: a target, a way over targets, a box, or a noun such as ``bin``.
 
-    `words` are those after *on* or *to*: ``target#1``, ``the same bin``. None if they are a thing
-    that is no box.
+    None if the words are a thing that is no box.
     """
+    words = found["goal"]  # after "on" or "to": "target#1", "the same bin"
     if "#" not in words:
         return words.rpartition(" ")[2]  # of "the same bin", the noun
-    value = chunks.value(words)
+    value = found.value("goal")
     if isinstance(value, Description) and (value.noun not in ("box", "one") or value.is_open):
         return None
     return value
+
+
+_BUTTON_RULES = (Rule("button", _BUTTON, _words),)
+_REST_RULES = (
+    # Before what begins one: "back on target#1".
+    Rule("goal", _GOAL, _goal),
+    # Before what ends one: "down again".
+    Rule("down", _DOWN, _words),
+    # Before what it may begin with: "repeat it again".
+    Rule("again", _AGAIN, _words),
+    Rule("it", _IT, _words),
+)
 
 
 def _acts(chunks: Chunks) -> Reading:
@@ -317,19 +333,25 @@ class _ActBuilder:
 
     def add_chunk(self, chunk: Token) -> None:
         """Add a chunk, such as a thing or a number of times, to the act that it is said of."""
-        kind = chunk.kind
-        act = self._act_for(kind)
-        if kind == "place" and act.verb and not act.parts:  # "Take on the left"
-            thing = Description("one", is_definite=True, place=chunk.value)
-            act.parts.append(ActPart("thing", thing))
-        elif kind == "place":
-            self.unread += chunk.text.split()  # a place without a thing that stands there
-        elif kind == "more" and not self._is_joined and act.verb != "repeat":
-            # "Lift it twice more" may mean twice in all, or twice after once.
-            act.parts.append(ActPart("extra", chunk.value))
+        act = self._act_for(chunk.kind)
+        part = self._part_of(act, chunk)
+        if part is None:
+            self.unread += chunk.text.split()
         else:
-            act.parts.append(ActPart(kind, chunk.value))
+            act.parts.append(part)
         self._is_joined = False
+
+    def _part_of(self, act: Act, chunk: Token) -> ActPart | None:
+        """Return what a chunk says of an act; None of a place at which no thing is said to be."""
+        if chunk.kind == "place":
+            if not act.verb or act.parts:
+                return None
+            # "Take on the left": what is there.
+            return ActPart("thing", Description("one", is_definite=True, place=chunk.value))
+        if chunk.kind == "more" and not self._is_joined and act.verb != "repeat":
+            # "Lift it twice more" may mean twice in all, or twice after once.
+            return ActPart("extra", chunk.value)
+        return ActPart(chunk.kind, chunk.value)
 
     def _act_for(self, kind: str) -> Act:
         """Return the act of which something is said: the last one, or a new one without a verb.

@@ -173,13 +173,7 @@ class _Command:
 
     def _check_act(self, act: Act, slots: Mapping[str, SlotValue]) -> None:
         """Refuse an act that cannot be done, or is repeated where goals have no number of times."""
-        if act.verb == "put" and not act.has(*_GOING):
-            raise UnfitWordsError("does not understand where to put it")
-        kinds_there = {item.kind for item in self._scene.objects} | {"table"}
-        for goal in act.values("goal"):
-            kind = _kind_of(goal)
-            if kind not in kinds_there:
-                raise UnfitWordsError(f"there is no {kind} in the scene")
+        self._check_goals(act)
         if act.verb in ("press", "stop"):
             is_once = all(number == 1 for number in act.values("times"))
             if not is_once or act.has("more", "extra"):
@@ -188,6 +182,16 @@ class _Command:
             raise UnfitWordsError("does not understand when to act")
         if act.verb in _HANDLING and act.has(*_NUMBERS) and "repeats" not in slots:
             raise UnfitWordsError("does not understand how often to act")
+
+    def _check_goals(self, act: Act) -> None:
+        """Refuse to put something nowhere, or on or in what is not there."""
+        if act.verb == "put" and not act.has(*_GOING):
+            raise UnfitWordsError("does not understand where to put it")
+        kinds_there = {item.kind for item in self._scene.objects} | {"table"}
+        for goal in act.values("goal"):
+            kind = _kind_of(goal)
+            if kind not in kinds_there:
+                raise UnfitWordsError(f"there is no {kind} in the scene")
 
     def _check_uncolored(self, is_shown: bool) -> None:
         """Refuse descriptions that choose among things where there is only one to handle.

@@ -1,9 +1,15 @@
-"""Tables of regular expressions, and a sentence whose phrases are replaced by what they mean."""
+"""Tables of regular expressions, and a sentence whose phrases are replaced by what they mean.
+
+- *phrase*: words that mean one thing together, *the red cube*.
+- *chunk*: the word that takes the place of a phrase that is read, ``thing#3``.
+- *rule*: which phrases become chunks of a kind. Rules apply one after the other to what is left.
+"""
 
 from __future__ import annotations
 
+import functools
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from roboirg.reader.tokens import COLOR, NUMBER, ORDINAL
@@ -75,6 +81,41 @@ class Token(NamedTuple):
     text: str
 
 
+class Found:
+    """A phrase that a rule has found in a sentence.
+
+    Attributes:
+        text: all of it.
+    """
+
+    def __init__(self, match: re.Match[str], chunks: Chunks) -> None:
+        self.text = match[0]
+        self._groups = match.groupdict()
+        self._chunks = chunks
+
+    def __getitem__(self, name: str) -> str:
+        """Return the words of a group; empty if it has none, or if the rule has no such group."""
+        return self._groups.get(name) or ""
+
+    def value(self, name: str) -> Value:
+        """Return what the chunk means that a group has found, by its word or its number."""
+        return self._chunks.value(self[name])
+
+
+class Rule(NamedTuple):
+    """How phrases of one pattern are read.
+
+    Attributes:
+        kind: of the chunks that take their place, ``thing``.
+        pattern: of their words.
+        read: returns what one of them means; None leaves its words as they are.
+    """
+
+    kind: str
+    pattern: re.Pattern[str]
+    read: Callable[[Found], Value]
+
+
 class Chunks:
     """A sentence in which phrases are replaced, step by step, by chunks: words such as ``thing#3``.
 
@@ -87,38 +128,31 @@ class Chunks:
         self._values: list[Value] = []
         self._words: list[str] = []
 
-    def replace(
-        self, kind: str, pattern: re.Pattern[str], read: Callable[[re.Match[str]], Value]
-    ) -> bool:
-        """Replace each match of a pattern by a chunk: *the red cube* by ``thing#3``.
+    def apply(self, rules: Iterable[Rule]) -> bool:
+        """Replace the phrases of each rule by chunks, and return whether there were any.
 
-        Args:
-            kind: of the chunk, ``thing``.
-            pattern: of the words.
-            read: returns what the words mean; None leaves them as they are.
-
-        Returns:
-            Whether something was replaced.
+        *The red cube* becomes ``thing#3``.
         """
-
-        def chunk(found: re.Match[str]) -> str:
-            words = found[0]
-            value = read(found)
-            if value is None:
-                return words
-            number = len(self._values)
-            self._values.append(value)
-            self._words.append(words)
-            space = " " if words.endswith(" ") else ""  # which the match has taken
-            return f"{kind}#{number}{space}"
-
         before = self.text
-        self.text = pattern.sub(chunk, self.text)
+        for rule in rules:
+            self.text = rule.pattern.sub(functools.partial(self._chunk, rule), self.text)
         return self.text != before
 
+    def _chunk(self, rule: Rule, match: re.Match[str]) -> str:
+        """Return the chunk for a phrase, or its words if the rule does not read them."""
+        words = match[0]
+        value = rule.read(Found(match, self))
+        if value is None:
+            return words
+        number = len(self._values)
+        self._values.append(value)
+        self._words.append(words)
+        space = " " if words.endswith(" ") else ""  # which the match has taken
+        return f"{rule.kind}#{number}{space}"
+
     def value(self, word: str) -> Value:
-        """Return the value of a chunk."""
-        return self._values[int(word.partition("#")[2])]
+        """Return the value of a chunk, by its word or its number alone."""
+        return self._values[int(word.rpartition("#")[2])]
 
     def tokens(self) -> Iterator[Token]:
         """Yield each chunk and each other word, in order.

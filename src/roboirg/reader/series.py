@@ -1,11 +1,15 @@
-"""Series: how often, at which visit, at which of the targets that the video shows."""
+"""Series: how often, at which visit, at which of the targets that the video shows.
+
+- *visit*: the moving cube is on its target; *passed*: visits to let go by before acting.
+- *placement*: the robot puts a cube on a target in the video; a rank counts these.
+- *way*: over which targets something swings, by their sides.
+"""
 
 from __future__ import annotations
 
-import re
 from typing import Literal, NamedTuple
 
-from roboirg.reader.phrases import Chunks, compiled
+from roboirg.reader.phrases import Found, Rule, compiled
 from roboirg.reader.tokens import ADVERBS, number_of, ordinal_of
 
 Relation = Literal["before", "after"]
@@ -14,23 +18,14 @@ LAST_BUT_ONE = -2
 """Ranks from the end of a series."""
 
 
-class Times(NamedTuple):
-    """A number of repetitions, or how many more there are."""
-
-    number: int
-    is_more: bool = False
-
-
 class Visit(NamedTuple):
     """A visit of the cube to the target.
 
     Attributes:
         rank: 1 for the first, negative from the end; None for the next one.
-        passed: how many pass before it, as the words say; None if they do not.
     """
 
     rank: int | None
-    passed: int | None = None
 
 
 class TargetWay(NamedTuple):
@@ -158,39 +153,19 @@ _WAY = compiled(
 )  # fmt: skip
 
 
-def read_targets(chunks: Chunks) -> None:
-    """Replace the words for targets, and for the visits of a cube to one, by chunks."""
-    # The more special phrases come first: a later pattern would take a part of their words.
-    chunks.replace("way", _WAY, _way)
-    chunks.replace("target", _SIDE_TARGET, lambda found: Target(found["side"] or found["on"]))
-    for pattern in (_PRESS_TARGET, _WHERE, _TARGET, _PLACING):
-        chunks.replace("target", pattern, _target)
-    chunks.replace("passed", _PASSED, lambda found: _times(found, "many"))
-    chunks.replace("visit", _VISIT, _visit)
-    chunks.replace("visit", _NEXT, lambda _found: Visit(None))
-
-
-def read_times(chunks: Chunks) -> None:
-    """Replace the words for repetitions by chunks."""
-    chunks.replace("more", _MORE, lambda found: _times(found, "number", "another"))
-    chunks.replace("times", _TIMES, lambda found: _times(found, "number", "x"))
-
-
-def _times(found: re.Match[str], *names: str) -> int:
+def _times(found: Found) -> int:
     """Return the number of repetitions that a phrase names: 3 for *three times*, 2 for *twice*.
 
-    `names` are the groups of the match that may hold a number; without one, it is an adverb, or
-    once.
+    Without a number it is once.
     """
-    named = found.groupdict()
-    for name in names:
-        if named.get(name):
-            return number_of(named[name]) or 0
-    return ADVERBS[named.get("adverb") or "once"]
+    for name in ("number", "many", "another", "x"):
+        if found[name]:
+            return number_of(found[name]) or 0
+    return ADVERBS[found["adverb"] or "once"]
 
 
-def _rank(words: list[str | None]) -> int | None:
-    """Return the only rank that ordinals name: 2 for ``["second", None]``, -1 for ``["last"]``.
+def _rank(words: list[str]) -> int | None:
+    """Return the only rank that ordinals name: 2 for ``["second", ""]``, -1 for ``["last"]``.
 
     None if they name none or two that differ.
     """
@@ -198,7 +173,7 @@ def _rank(words: list[str | None]) -> int | None:
     return ranks.pop() if len(ranks) == 1 else None
 
 
-def _visit(found: re.Match[str]) -> Visit | None:
+def _visit(found: Found) -> Visit | None:
     """Return the visit that a phrase names; None if it names several."""
     if found["number"]:
         return Visit(number_of(found["number"]))
@@ -206,33 +181,64 @@ def _visit(found: re.Match[str]) -> Visit | None:
     return None if rank is None else Visit(rank)
 
 
-def _way(found: re.Match[str]) -> TargetWay:
+def _next_visit(_found: Found) -> Visit:
+    """Return the next visit, whichever that is."""
+    return Visit(None)
+
+
+def _way(found: Found) -> TargetWay:
     """Return the sides that a phrase names, in its order."""
-    return TargetWay(tuple(side for side in found.groups() if side))
+    sides = (found["start"], found["end"], found["over"], found["then"])
+    return TargetWay(tuple(side for side in sides if side))
 
 
-def _target(found: re.Match[str]) -> Target | None:
+def _side_target(found: Found) -> Target:
+    """Return the target on a side."""
+    return Target(found["side"] or found["on"])
+
+
+def _target(found: Found) -> Target | None:
     """Return a target with the placement that its words name; None if they name several.
 
     *the second target used before the press* has the rank 2 and the relation ``before``.
     """
-    named = found.groupdict()
-    ordinals = [named.get(name) for name in ("rank", "at", "of", "first")]
+    ordinals = [found["rank"], found["at"], found["of"], found["first"]]
     rank = _rank(ordinals)
     if rank is None and any(ordinals):
         return None  # "the second target used first"
-    number = named.get("number")
-    if named.get("placing"):
-        number = named["placing"]
+    number = found["placing"] or found["number"]
     if number:
         rank = number_of(number)
-    return Target(None, rank, _relation(named.get("when")))
+    return Target(None, rank, _relation(found["when"]))
 
 
-def _relation(word: str | None) -> Relation | None:
+def _relation(word: str) -> Relation | None:
     """Return the relation to the press that a word names, *pre* or *after*; None without one."""
     if not word:
         return None
     if word in ("pre", "before"):
         return "before"
     return "after"
+
+
+TARGET_RULES = (
+    # Before single targets: "from your right to your left target".
+    Rule("way", _WAY, _way),
+    Rule("target", _SIDE_TARGET, _side_target),
+    Rule("target", _PRESS_TARGET, _target),
+    Rule("target", _WHERE, _target),
+    # Before single placements: "the target of the last placement".
+    Rule("target", _TARGET, _target),
+    Rule("target", _PLACING, _target),
+    # After targets, which these may hold: "the second time it passes target#1".
+    Rule("passed", _PASSED, _times),
+    Rule("visit", _VISIT, _visit),
+    Rule("visit", _NEXT, _next_visit),
+)
+"""Targets, and visits of a cube to one; where nothing is said, the order does not matter."""
+TIMES_RULES = (
+    # Before other numbers: "three times more".
+    Rule("more", _MORE, _times),
+    Rule("times", _TIMES, _times),
+)
+"""Repetitions."""

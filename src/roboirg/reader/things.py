@@ -1,13 +1,18 @@
-"""Things: the words for a cube, a tape, a box or a container, and for where it stands."""
+"""Things: the words for a cube, a tape, a box or a container, and for where it stands.
+
+- *description*: all that words say of a thing, ``Description``.
+- *place*: words for where it stands; *anchor*: another thing in them, *next to the button*.
+- *chunk*: what has been read stands in the patterns as ``thing#3``, ``place#4``.
+"""
 
 from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Literal, NamedTuple, cast
 
-from roboirg.reader.phrases import Chunks, Rewrites, compiled
+from roboirg.reader.phrases import Chunks, Found, Rewrites, Rule, compiled
 from roboirg.reader.places import Place, Side
 from roboirg.reader.tokens import color_of, number_of, ordinal_of
 
@@ -123,7 +128,6 @@ _PLACES: Mapping[str, Place] = {
     r"(?:right )?(?:next to|by|near|close to|beside|adjacent to|near to) ANCHOR":
         Place("distance", depth=-1, is_loose=True),
 }  # fmt: skip
-_PLACE_TABLE = [(compiled(pattern, _PARTS), place) for pattern, place in _PLACES.items()]
 _MAX_DEPTH = 3
 """Anchors that other anchors describe; deeper ones are not read."""
 _BACK = ("back", "far", "top", "rear")
@@ -189,52 +193,30 @@ def read_things(chunks: Chunks) -> None:
     its description is a chunk again, which another description can follow.
     """
     chunks.text = _BEHIND_NOUNS.apply(chunks.text)
-    chunks.replace("each", _EACH, lambda found: number_of(found["count"]) or 1)
-    chunks.replace("thing", _OWNED, _owned)
-    chunks.replace("thing", _NAMED, _named)
-    chunks.replace("thing", _COLORED, _named)
-
+    chunks.apply(_NAMES)
     # Descriptions may follow descriptions: "the cube on the left of the cube next to the bin".
-    is_new = True
-    while is_new:
-        is_new = _read_places(chunks)
-        for pattern, describe in _DESCRIPTIONS:
-            is_new |= chunks.replace("thing", pattern, functools.partial(describe, chunks))
-    chunks.replace("thing", _LIKE, lambda found: _like(found, chunks))
+    while chunks.apply(_DESCRIPTIONS):
+        pass
+    chunks.apply(_LIKENESSES)
 
 
-def _read_places(chunks: Chunks) -> bool:
-    """Replace the words for places by chunks; return whether there are any."""
-    is_new = False
-    for pattern, place in _PLACE_TABLE:
-        read = functools.partial(_place, place=place, chunks=chunks)
-        is_new |= chunks.replace("place", pattern, read)
-    is_new |= chunks.replace("place", _AMONG, lambda found: _member(found, chunks))
-    return is_new
-
-
-def _place(found: re.Match[str], place: Place, chunks: Chunks) -> Place | None:
+def _place(found: Found, place: Place) -> Place | None:
     """Return a place with the side, rank and anchors that its words name; None if too deep.
 
     Args:
         found: the words, *second from the left*.
         place: of the kind that such words name.
-        chunks: with the things that the words name as anchors.
     """
-    named = found.groupdict()  # few patterns have all groups
-    if named.get("depth"):
-        place = place._replace(depth=1 if named["depth"] in _BACK else -1)
-    anchors: list[object] = []
-    for name in ("anchor", "other"):
-        if named.get(name):
-            anchors.append(_anchor(named[name], chunks))
+    if found["depth"]:
+        place = place._replace(depth=1 if found["depth"] in _BACK else -1)
+    anchors = tuple(_anchor(found, name) for name in ("anchor", "other") if found[name])
     if any(map(_is_deep, anchors)):
         return None
     return place._replace(
-        side=cast("Side | None", named.get("side")),
-        rank=ordinal_of(named.get("rank") or "") or 1,
-        is_mirrored="picture" in found[0] or "camera" in found[0],
-        anchors=tuple(anchors),
+        side=cast("Side | None", found["side"] or None),
+        rank=ordinal_of(found["rank"]) or 1,
+        is_mirrored="picture" in found.text or "camera" in found.text,
+        anchors=anchors,
     )
 
 
@@ -250,38 +232,41 @@ def _is_deep(anchor: object) -> bool:
     return levels >= _MAX_DEPTH
 
 
-def _anchor(words: str, chunks: Chunks) -> object:
+def _anchor(found: Found, name: str) -> object:
     """Return the description of a thing, or the kind of a fixture: ``target#1``, ``the bin``."""
-    kind, _, _ = words.partition("#")
+    kind, _, _ = found[name].partition("#")
     if kind == "thing":
-        return chunks.value(words)
+        return found.value(name)
     return kind.removeprefix("the ")
 
 
-def _member(found: re.Match[str], chunks: Chunks) -> Place:
+def _member(found: Found) -> Place:
     """Return a place among a few things, *on the left of the two in the back*."""
-    place: Place = chunks.value(f"place#{found['place']}")
-    group: Place = chunks.value(f"place#{found['group']}")
-    return place._replace(group=group, size=number_of(found["size"]) or 0)
+    place: Place = found.value("place")
+    return place._replace(group=found.value("group"), size=number_of(found["size"]) or 0)
 
 
-def _named(found: re.Match[str]) -> Description:
+def _number_of_each(found: Found) -> int:
+    """Return how many there are of each color."""
+    return number_of(found["count"]) or 1
+
+
+def _named(found: Found) -> Description:
     """Return the description of a thing that is named by noun, color or both.
 
     *two red cubes* has the noun ``cube``, the color ``red`` and the number 2.
     """
-    named = found.groupdict()
-    determiner = (named.get("det") or "").split(" ")[0]  # of "all of the", the first word
-    if named.get("count"):
-        number = number_of(named["count"])
+    determiner, _, _ = found["det"].partition(" ")  # of "all of the", the first word
+    if found["count"]:
+        number = number_of(found["count"])
     else:
-        number = _number_by(determiner, is_plural=found[0].endswith("s"))
+        number = _number_by(determiner, is_plural=found.text.endswith("s"))
     return Description(
-        named.get("noun") or "one",
-        color_of(found["color"] or ""),
+        found["noun"] or "one",
+        color_of(found["color"]),
         number,
         is_definite=determiner in ("the", "this", "that", "those", "these", "your"),
-        is_shown=bool(named.get("shown")),
+        is_shown=bool(found["shown"]),
     )
 
 
@@ -294,65 +279,48 @@ def _number_by(determiner: str, *, is_plural: bool) -> int | None:
     return None
 
 
-def _thing(found: re.Match[str], name: str, chunks: Chunks) -> Description:
-    """Return the thing whose number a group of a match has."""
-    thing: Description = chunks.value(f"thing#{found[name]}")
-    return thing
-
-
-def _like(found: re.Match[str], chunks: Chunks) -> Description:
+def _like(found: Found) -> Description:
     """Return cubes of the color of another thing: *one more of the same color as the red one*."""
     number = number_of(found["count"]) or 1
-    return Description("cube", number=number, like=_thing(found, "like", chunks))
+    return Description("cube", number=number, like=found.value("like"))
 
 
-def _standing(chunks: Chunks, found: re.Match[str]) -> Description | None:
+def _standing(found: Found) -> Description | None:
     """Return a thing with its place; None if it has another description already.
 
     *thing#0 that was place#1* also says when it stood there: at first.
     """
-    thing = _thing(found, "thing", chunks)
+    thing: Description = found.value("thing")
     if thing.place is not None or thing.under is not None:
         return None
-    place: Place = chunks.value(f"place#{found['place']}")
-    return thing._replace(place=place, moment=_moment(found["words"], found["time"] or ""))
+    moment = _moment(found["words"], found["time"])
+    return thing._replace(place=found.value("place"), moment=moment)
 
 
-def _covering(chunks: Chunks, found: re.Match[str]) -> Description | None:
+def _covering(found: Found) -> Description | None:
     """Return a container over a thing."""
-    return _over(_thing(found, "thing", chunks), _thing(found, "under", chunks))
+    return _over(found.value("thing"), found.value("under"))
 
 
-def _covering_place(chunks: Chunks, found: re.Match[str]) -> Description | None:
+def _covering_place(found: Found) -> Description | None:
     """Return a container over what stands at a place."""
-    place: Place = chunks.value(f"place#{found['place']}")
-    under = Description("cube", is_definite=True, place=place)
-    return _over(_thing(found, "thing", chunks), under)
+    under = Description("cube", is_definite=True, place=found.value("place"))
+    return _over(found.value("thing"), under)
 
 
-def _covering_it(chunks: Chunks, found: re.Match[str]) -> Description:
+def _covering_it(found: Found) -> Description:
     """Return a thing as it is: *over it* says no more."""
-    return _thing(found, "thing", chunks)._replace(is_shown=False)
+    thing: Description = found.value("thing")
+    return thing._replace(is_shown=False)
 
 
-def _shown(chunks: Chunks, found: re.Match[str]) -> Description:
+def _shown(found: Found) -> Description:
     """Return a thing as the one that the video shows."""
-    return _thing(found, "thing", chunks)._replace(is_shown=True)
+    thing: Description = found.value("thing")
+    return thing._replace(is_shown=True)
 
 
-_Describe = Callable[[Chunks, re.Match[str]], Description | None]
-_DESCRIPTIONS: Sequence[tuple[re.Pattern[str], _Describe]] = (
-    (_STANDING, _standing),
-    (_COVERING, _covering),
-    (_COVERING_PLACE, _covering_place),
-    (_COVERING_IT, _covering_it),
-    (_COVERED, _covering),
-    (_SHOWN, _shown),
-)
-"""Words that describe a thing and stand behind it, each with what reads them, in this order."""
-
-
-def _owned(found: re.Match[str]) -> Description:
+def _owned(found: Found) -> Description:
     """Return the container over a cube, *blue's container*."""
     cube = Description("cube", color_of(found["color"] or found["other"]))
     return Description("container", is_definite=True, under=cube)
@@ -379,3 +347,32 @@ def _moment(*words: str) -> Moment | None:
     if re.search(r"\b(?:was|were|stood|sat|started|start|beginning|first|\w+ally|video)\b", text):
         return "first"
     return None
+
+
+_NAMES = (
+    # "two of each color" and "blue's container" hold a number, a color or a noun of their own.
+    Rule("each", _EACH, _number_of_each),
+    Rule("thing", _OWNED, _owned),
+    # With a noun before those without: "red cube", then "red".
+    Rule("thing", _NAMED, _named),
+    Rule("thing", _COLORED, _named),
+)
+"""Things by their names."""
+_PLACE_RULES = [
+    Rule("place", compiled(pattern, _PARTS), functools.partial(_place, place=place))
+    for pattern, place in _PLACES.items()
+]
+_DESCRIPTIONS = (
+    *_PLACE_RULES,
+    Rule("place", _AMONG, _member),
+    # A place goes to the nearest thing: "the container over the cube in the middle".
+    Rule("thing", _STANDING, _standing),
+    Rule("thing", _COVERING, _covering),
+    Rule("thing", _COVERING_PLACE, _covering_place),
+    Rule("thing", _COVERING_IT, _covering_it),
+    Rule("thing", _COVERED, _covering),
+    Rule("thing", _SHOWN, _shown),
+)
+"""Places, and words that describe a thing and stand behind it."""
+_LIKENESSES = (Rule("thing", _LIKE, _like),)
+"""Things of the color of another one, whose description has been read."""

@@ -18,7 +18,8 @@ other ``.toml``  commands and scenarios of the tasks that name the file as their
 ``relations``    how a number or a position can follow from another one
 ``derived``      how the goal of an episode can follow from something else
 ``offers``       the ways to the goal that scenarios can say
-``choice``       what is said: the way to the goal, then the scenario
+``choice``       what is said: a scenario, and the offer that it says
+``declared``     what the words for a field mean: the term of a pointer
 ``amounts``      the fields of the goal that a scenario leaves open, and what they follow from
 ``introduced``   the values that the words name
 ``speech``       the words of one scenario

@@ -1,7 +1,12 @@
-"""Choose what is said of an episode: how the goal follows, then the scenario.
+"""Choose what is said of an episode: a scenario, and an offer that it says.
 
 All scenarios are equally likely, so that no frame, which is the name of a scenario, goes with a
-value. An offer is a way to the goal; a remark are words that choose one of two values.
+value.
+
+- *scenario*: what a person says of a task, with slots for values.
+- *offer*: one way to lead to the goal: which fields of the command can point back, and at what.
+- *match*: a scenario with an offer that it can say; one match of an episode is drawn.
+- *remark*: words before the command that choose one of two values.
 """
 
 from __future__ import annotations
@@ -46,24 +51,17 @@ class Chosen(NamedTuple):
 
     Attributes:
         scenario: the scenario.
-        introduced: the values that its words name.
-        remark: the name of the remark that chooses; empty if none does.
+        offer: the way in which it leads to the goal.
+        introduced: all values that its words can name.
     """
 
     scenario: Scenario
-    introduced: Introduced
-    remark: str
-
-
-class _Sayable(NamedTuple):
-    """A way to lead to the goal, and the scenarios that can say it."""
-
     offer: Offer
-    scenarios: list[Scenario]
+    introduced: Introduced
 
 
-class _Saying(NamedTuple):
-    """A scenario, and the way to the goal that it says."""
+class _Match(NamedTuple):
+    """A scenario, and an offer that it can say."""
 
     scenario: Scenario
     offer: Offer
@@ -74,51 +72,51 @@ def choose(
 ) -> Chosen | None:
     """Return what is said in a setting that does not refuse; None if no scenario fits.
 
-    The scenario is drawn, with a way to the goal that it can say, then its list and its people.
+    The scenario is drawn, with the first offer that it can say, then its list and its people.
     """
-    sayable = _sayable_ways(request, setting, scenarios)
-    if not sayable:
+    matches = list(_matches(request, setting, scenarios))
+    if not matches:
         return None
-    if all_settings()[setting].offers == "reasoning":
-        sayable = [_in_turn(request, sayable)]
-    # The first way counts that a scenario can say; the draw is among scenarios, not among ways.
-    by_frame: dict[str, _Saying] = {}
-    for way in sayable:
-        for fitting in way.scenarios:
-            by_frame.setdefault(fitting.fields.frame, _Saying(fitting, way.offer))
-    purpose = setting.removeprefix("direct-")  # part of the key of a draw, so it has to stay
-    scenario, offer = request.sampler.pick_named(f"{purpose} scenario", by_frame)
-
+    scenario, offer = _drawn(request, setting, matches)
     values = {**goal_values(request), **offer.values}
     if offer.listed is None and scenario.fields.list:
         values |= several("list", _list(request, scenario))
     values |= _people(request, scenario)
-    return Chosen(scenario, Introduced(values, offer.notes), offer.remark)
+    return Chosen(scenario, offer, Introduced(values))
 
 
-def _sayable_ways(
+def _matches(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
-) -> list[_Sayable]:
-    """Return the ways to the goal that scenarios of a setting can say, each with these scenarios.
+) -> Iterator[_Match]:
+    """Yield each offer of a setting with each scenario that can say it, in the order of the offers.
 
-    A scenario says a way that leaves the same fields to the context as its words do: with *it* for
-    the color, a way that gives the color.
+    A scenario says an offer that leaves the same fields to the context as its words do: with *it*
+    for the color, an offer that gives the color.
     """
     by_hidden: dict[frozenset[str], list[Scenario]] = {}
     for scenario in scenarios:
         if _fits(scenario, request):
             by_hidden.setdefault(_hidden_by(scenario, request), []).append(scenario)
-    sayable: list[_Sayable] = []
     for offer in _offers_of(setting)(request):
-        possible = by_hidden.get(frozenset(offer.fields), [])
-        saying = [scenario for scenario in possible if _says(scenario, offer)]
-        if saying:
-            sayable.append(_Sayable(offer, saying))
-    return sayable
+        for scenario in by_hidden.get(frozenset(offer.fields), []):
+            if _says(scenario, offer):
+                yield _Match(scenario, offer)
+
+
+def _drawn(request: InstructionRequest, setting: str, matches: Sequence[_Match]) -> _Match:
+    """Draw a scenario, with the first offer that it can say; in reasoning, of those in turn."""
+    if all_settings()[setting].offers == "reasoning":
+        derivation = _in_turn(request, matches)
+        matches = [match for match in matches if match.offer is derivation]
+    by_frame: dict[str, _Match] = {}
+    for match in matches:
+        by_frame.setdefault(match.scenario.fields.frame, match)
+    purpose = setting.removeprefix("direct-")  # part of the key of a draw, so it has to stay
+    return request.sampler.pick_named(f"{purpose} scenario", by_frame)
 
 
 def _offers_of(setting: str) -> Callable[[InstructionRequest], Iterable[Offer]]:
-    """Return what yields the ways to the goal of a setting: its own, or that of one of ours."""
+    """Return what yields the offers of a setting: its own, or that of one of ours."""
     offers = all_settings()[setting].offers
     if not isinstance(offers, str):
         return offers
@@ -138,18 +136,17 @@ def misfit(request: InstructionRequest, setting: str, scenarios: Sequence[Scenar
     return "the goal follows in no way that setting, say, list, derive and needs allow"
 
 
-def _in_turn(request: InstructionRequest, sayable: Sequence[_Sayable]) -> _Sayable:
+def _in_turn(request: InstructionRequest, matches: Iterable[_Match]) -> Offer:
     """Draw a derivation of the pattern, such as ``color exclusion``, whose turn it is.
 
-    Ways of one pattern are told apart by relation, reference and listed slot, under which they are
-    drawn.
+    Derivations of one pattern are told apart by relation, reference and listed slot, under which
+    they are drawn.
     """
-    by_pattern: dict[str, dict[str, _Sayable]] = {}
-    for way in sayable:
-        notes = way.offer.notes
-        pattern = str(notes["pattern"])
-        name = f"{notes['relation']} {notes['reference']} {way.offer.listed}"
-        by_pattern.setdefault(pattern, {})[name] = way
+    by_pattern: dict[str, dict[str, Offer]] = {}
+    for _, offer in matches:
+        notes = offer.notes
+        name = f"{notes['relation']} {notes['reference']} {offer.listed}"
+        by_pattern.setdefault(str(notes["pattern"]), {})[name] = offer
     pattern = in_turn(request.episode, list(by_pattern))
     return request.sampler.pick_named(f"{pattern} derivation", by_pattern[pattern])
 
@@ -175,10 +172,10 @@ def _people(request: InstructionRequest, scenario: Scenario) -> Values:
     others = [person for person in scenario.people if person is not first]
     second = request.sampler.pick("other person", others)
     values: dict[str, tuple[IntroducedValue, ...]] = {}
-    # Each person is a row of words in the order of `PERSON`: "Leo", "he", "him" …
-    for slot, first_word, second_word in zip(PERSON, first, second, strict=True):
-        values[slot] = (IntroducedValue("", "person", first_word, first_word),)
-        values[f"{slot}.2"] = (IntroducedValue("", "person", second_word, second_word),)
+    for number, person in (("", first), (".2", second)):
+        # Each person is a row of words in the order of `PERSON`: "Leo", "he", "him" …
+        for slot, word in zip(PERSON, person, strict=True):
+            values[f"{slot}{number}"] = (IntroducedValue("", "person", word),)
     return values
 
 
@@ -202,7 +199,7 @@ def _hidden_by(scenario: Scenario, request: InstructionRequest) -> frozenset[str
 
 
 def _says(scenario: Scenario, offer: Offer) -> bool:
-    """Return whether a scenario leads to the goal by the way of an offer.
+    """Return whether a scenario has the words for an offer that hides the same fields.
 
     It has to introduce the list of the offer, if that has one, derive the goal as the offer does,
     and name nothing in its introduction for which the offer has no words.

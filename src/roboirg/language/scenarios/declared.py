@@ -1,11 +1,16 @@
 """The meaning that a scenario declares, built from the words as they are said.
 
 No term looks at the goal: what has not been said has no operands, and then no goal fits.
+
+- *slot*: a name for what a sentence says or points back at: ``color``, ``list``, ``taken``.
+- *operand*: a value that was said in a slot, or the description of a thing.
+- *pointer*: words that point back at a slot, *the latter*. Its operation leads to the value.
+- *term*: an operation with its operands, for `roboirg.language.meaning` to work out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -20,10 +25,10 @@ _RANKS: Mapping[str, int] = {"former": 1, "latter": 2, "first": 1, "second": 2, 
 """Positions that classes of expressions name."""
 _DIRECTIONS: Mapping[Operation, int] = {"minus": -1, "earlier": -1, "plus": 1, "later": 1}
 """Of a step that is said."""
-_DESCRIBED = ("place", "clue")
-"""Slots of a thing that is not named by its value."""
 _STEPS: Mapping[Operation, int] = {"before": -1, "after": 1}
 """Steps that the operation itself names."""
+_ASIDE = ("excluded", "aside", "kept", "reference")
+"""Slots of what is named so that something else is left."""
 
 
 class ChoosingRemark(NamedTuple):
@@ -62,10 +67,14 @@ class SaidValues:
         values = self.by_slot.get(slot, ())
         base, _, number = slot.partition(".")
         if not values and number:
-            together = self.by_slot.get(base, ())
             at = int(number)
-            values = together[at : at + 1]
+            values = self.by_slot.get(base, ())[at : at + 1]
         return tuple(self._operand(value) for value in values)
+
+    def number(self, slot: str) -> int:
+        """Return the number that a slot named."""
+        (number,) = self.by_slot[slot]
+        return int(number.value)
 
     def listed(self, *bases: str) -> tuple[Operand, ...]:
         """Return the members of a list, named together or one by one, as they were said.
@@ -96,51 +105,84 @@ def pointed_term(pointer: Pointer, said: SaidValues) -> Term:
     *it* has the same value as was said, *the former* the first of those listed, *one more than
     that* a number and a step.
     """
-    slot = pointer.of
-    operation = pointer.operation
-    if operation == "rank":
-        base = slot.partition(".")[0]
-        members = said.listed("list") or said.listed(base, *_DESCRIBED)
-        return Term("rank", members, _rank_of(pointer, said))
-    if operation == "other":
-        return _other_term(said)
-    if operation in ("without", "neighbor") or slot == "rest":  # what is left of all
-        return Term("without", _set_aside(said))
-    operands = said.operands(slot)
-    if not operands and "rank" in said.by_slot and operation not in ("double", "half"):
+    if pointer.of == "rest":  # the thing that is left when two are set aside
+        return _left(pointer, said)
+    return _TERM_OF[pointer.operation](pointer, said)
+
+
+def _same(pointer: Pointer, said: SaidValues) -> Term:
+    """Return the term of *it*, which is what was said."""
+    operands = said.operands(pointer.of)
+    if not operands and "rank" in said.by_slot:
         # "It's the second one's turn, so pick it up": a list was named, then a position in it.
         return Term("rank", said.listed("list"), _rank_of(pointer, said))
-    return _reckoned_term(operation, operands, said)
-
-
-def _reckoned_term(operation: Operation, operands: tuple[Operand, ...], said: SaidValues) -> Term:
-    """Return the term of what was said itself, or of a number that follows from it."""
-    if operation == "double":
-        return Term("double", operands)
-    if operation == "half":
-        return Term("half", operands)
-    step = _step_of(operation, said)
-    if step:
-        return Term("step", operands, step=step)
     return Term("same", operands)
 
 
-def _set_aside(said: SaidValues) -> tuple[Operand, ...]:
-    """Return what was named so that something else is left; empty if nothing was."""
-    for slot in ("excluded", "aside", "kept", "reference"):
-        members = said.listed(slot)
-        if members:
-            return members
-    return ()
+def _ranked(pointer: Pointer, said: SaidValues) -> Term:
+    """Return the term of *the latter*, which has a position in a list.
+
+    Without a list, in what was named one by one, by value or by description.
+    """
+    base = pointer.of.partition(".")[0]
+    members = said.listed("list") or said.listed(base, "place", "clue")
+    return Term("rank", members, _rank_of(pointer, said))
 
 
-def _other_term(said: SaidValues) -> Term:
+def _other(_pointer: Pointer, said: SaidValues) -> Term:
     """Return the term of *the other one*: of a list without what is taken, or of all without it."""
     members = said.listed("list")
     taken = said.operands("taken")
     if taken and not members:
         return Term("without", taken)
     return Term("other", members, _taken_rank(members, said))
+
+
+def _left(_pointer: Pointer, said: SaidValues) -> Term:
+    """Return the term of *the one that is left* of all, without what was set aside."""
+    for slot in _ASIDE:
+        members = said.listed(slot)
+        if members:
+            return Term("without", members)
+    return Term("without", ())
+
+
+def _doubled(pointer: Pointer, said: SaidValues) -> Term:
+    """Return the term of *twice as often as that*."""
+    return Term("double", said.operands(pointer.of))
+
+
+def _halved(pointer: Pointer, said: SaidValues) -> Term:
+    """Return the term of *half as often as that*."""
+    return Term("half", said.operands(pointer.of))
+
+
+def _stepped(pointer: Pointer, said: SaidValues) -> Term:
+    """Return the term of *one more than that*, or of *right before that*."""
+    step = _STEPS.get(pointer.operation)
+    if step is None:
+        step = _DIRECTIONS[pointer.operation] * said.number("step")
+    return Term("step", said.operands(pointer.of), step=step)
+
+
+_TERM_OF: Mapping[Operation, Callable[[Pointer, SaidValues], Term]] = {
+    "same": _same,
+    "place": _same,
+    "seen": _same,
+    "rank": _ranked,
+    "other": _other,
+    "without": _left,
+    "neighbor": _left,
+    "double": _doubled,
+    "half": _halved,
+    "minus": _stepped,
+    "plus": _stepped,
+    "earlier": _stepped,
+    "later": _stepped,
+    "before": _stepped,
+    "after": _stepped,
+}
+"""What makes the term of a pointer, by its operation."""
 
 
 def _taken_rank(members: tuple[Operand, ...], said: SaidValues) -> int:
@@ -155,16 +197,7 @@ def _rank_of(pointer: Pointer, said: SaidValues) -> int:
     """Return the position that words name, by their class or as the number in them."""
     if pointer.expression in _RANKS:
         return _RANKS[pointer.expression]
-    (rank,) = said.by_slot["rank"]
-    return int(rank.value)
-
-
-def _step_of(operation: Operation, said: SaidValues) -> int:
-    """Return by how much an operation differs from the number that was said; 0 for most."""
-    if operation in _DIRECTIONS:
-        (step,) = said.by_slot["step"]
-        return _DIRECTIONS[operation] * int(step.value)
-    return _STEPS.get(operation, 0)
+    return said.number("rank")
 
 
 def chosen_term(pointer: Pointer, remark: ChoosingRemark, said: SaidValues) -> Term:

@@ -1,5 +1,10 @@
 """Every way in which the goal of an episode can follow from something else, for reasoning.
 
+- *pattern*: the kind of reasoning, ``number deduction``.
+- *relation*: how a number, or a position in a series, follows from another: *one fewer*.
+- *reference*: the number, position or value from which the goal follows; it is introduced.
+- *complement*: a value as the other one of two, of which one is taken.
+
 No derivation gives a value away: a relation is not used if its words spell the result, *one fewer*
 for one, or if it can lead to a single goal of the scene only.
 """
@@ -69,13 +74,13 @@ def _deduced(request: InstructionRequest) -> Iterator[Offer]:
     first = numbers[0]  # all of them have its type
     results = [value.number for value in numbers]
     fields = [value.field for value in request.values_of(first.slot_type)]
-    for deduction in deductions(results, request.alternative_numbers(first.slot)):
-        relation = deduction.relation
+    choices = request.alternative_numbers(first.slot)
+    for relation, references in deductions(results, choices):
         # Words for amounts need not name the number: "and Leo wants the same".
         is_unsaid = first.slot_type == "amount" and relation.name == "twice"
         if relation.spells in results and not is_unsaid:
             continue
-        values = _counted(first, deduction.references, relation.offset)
+        values = _counted(first, references, relation.offset)
         yield _derived("number deduction", fields, values, relation.name)
 
 
@@ -91,26 +96,32 @@ class Deduction(NamedTuple):
     references: list[int]
 
 
-def deductions(results: Sequence[int], choices: Sequence[Sequence[int]]) -> Iterator[Deduction]:
+def deductions(
+    results: Sequence[int],
+    choices: Sequence[Sequence[int]],
+    known: Sequence[Relation] = RELATIONS,
+    most: int = MAX_REFERENCE,
+) -> Iterator[Deduction]:
     """Yield each relation that gives all of some results, with the number from which each follows.
 
-    *One fewer* gives the results 2 and 1 from 3 and 2.
+    *One fewer* gives the results 2 and 1 from 3 and 2, and *two after* the third position from the
+    first.
 
     Args:
-        results: the goal's numbers.
+        results: the goal's numbers, or its position in a series.
         choices: all results that are possible in the scene. A relation that can give only one
             of them would give the result away.
+        known: the relations that words can say.
+        most: the largest number from which they can follow: of positions, the length of the series.
     """
-    for relation in RELATIONS:
-        references = _references(relation, results)
-        if not references:
-            continue
-        reachable = [choice for choice in choices if _references(relation, choice)]
-        if len(reachable) > 1:
+    for relation in known:
+        references = _references(relation, results, most)
+        reachable = [choice for choice in choices if _references(relation, choice, most)]
+        if references and len(reachable) > 1:
             yield Deduction(relation, references)
 
 
-def _references(relation: Relation, results: Sequence[int]) -> list[int]:
+def _references(relation: Relation, results: Sequence[int], most: int) -> list[int]:
     """Return the numbers from which some results follow; empty if one follows from none.
 
     By *one fewer*, 2 and 1 follow from 3 and 2.
@@ -118,7 +129,7 @@ def _references(relation: Relation, results: Sequence[int]) -> list[int]:
     found: list[int] = []
     for result in results:
         reference = relation.reference(result)
-        if reference is None or not 1 <= reference <= MAX_REFERENCE:
+        if reference is None or not 1 <= reference <= most:
             return []
         found.append(reference)
     return found
@@ -138,12 +149,12 @@ def _stepped(
         pattern: the name of this kind of reasoning.
         known: the steps that words can say.
     """
+    choices = request.alternative_numbers(value.slot)
     length = series_length(request, value)
-    choices = [number for (number,) in request.alternative_numbers(value.slot)]
-    for step in open_steps(known, value.number, length, choices):
-        reference = value.number - step.offset
-        values = _counted(value, [reference], step.offset)
-        yield _derived(pattern, [value.field], values, step.name)
+    for step, references in deductions([value.number], choices, known, length):
+        if step.spells != value.number:
+            values = _counted(value, references, step.offset)
+            yield _derived(pattern, [value.field], values, step.name)
 
 
 def series_length(request: InstructionRequest, value: GoalValue) -> int:
@@ -154,35 +165,6 @@ def series_length(request: InstructionRequest, value: GoalValue) -> int:
     targets = [target.name for target in scene.of_kind("target")]
     placements = [fact for fact in scene.past if fact.kind == "placed" and fact.place in targets]
     return len(placements)
-
-
-def open_steps(
-    known: Sequence[Relation], position: int, length: int, choices: Sequence[int]
-) -> list[Relation]:
-    """Return those of the known steps that lead to a position and do not give it away.
-
-    *two after* leads to the third from the first. It would give the position away if its words
-    named it, or if it could lead to no other position.
-
-    Args:
-        known: the steps.
-        position: in the series, from 1.
-        length: of the series.
-        choices: all positions that are possible in the scene.
-    """
-    found: list[Relation] = []
-    for step in known:
-        if step.spells == position or not _leads(step, position, length):
-            continue
-        reachable = [choice for choice in choices if _leads(step, choice, length)]
-        if len(reachable) > 1:
-            found.append(step)
-    return found
-
-
-def _leads(step: Relation, position: int, length: int) -> bool:
-    """Return whether a step leads to a position from another one of the series."""
-    return 1 <= position - step.offset <= length
 
 
 def _counted(value: GoalValue, references: Sequence[int], offset: int) -> Values:

@@ -83,7 +83,7 @@ def _scenarios_in(words: TaskScenarios, pool: PoolName) -> list[list[str]]:
     """
     found: list[list[str]] = []
     for scenario in words.scenarios:
-        if scenario.fields.pool in (None, pool):
+        if scenario.fields.is_in(pool):
             # Which other tasks say it, too, does not matter.
             needs = replace(scenario.fields.needs, tasks=())
             fields = replace(scenario.fields, needs=needs)

@@ -1,9 +1,15 @@
-"""What a scenario's words can name: the values that its slots stand for, and how they are said."""
+"""What a scenario's words can name: the values that its slots stand for, and how they are said.
+
+- *introduced value*: a value with its type, which says how it is put into words; a place or a
+  person has words of its own.
+- *kind*: that type: ``color``, ``number``, ``visit``, ``place``, ``clue``, ``person`` …
+- *referent*: the value for which words stand that point back.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from roboirg.language.instruction import REFERENCE, Expression
@@ -84,11 +90,9 @@ class Introduced:
 
     Attributes:
         values: one or several for each slot; those of a list in its order.
-        notes: entries of the metadata.
     """
 
     values: Values
-    notes: Mapping[str, object] = field(default_factory=dict)
 
     def count(self, controller: str) -> int:
         """Return the number with which words agree: that of a slot, or how many values it has."""
@@ -144,7 +148,7 @@ class Introduced:
 
     def with_values(self, **added: tuple[IntroducedValue, ...]) -> Introduced:
         """Return the same with further slots."""
-        return Introduced({**self.values, **added}, self.notes)
+        return Introduced({**self.values, **added})
 
 
 class Offer(NamedTuple):

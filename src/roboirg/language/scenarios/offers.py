@@ -1,7 +1,10 @@
 """The ways to the goal that scenarios can say, by the name of the setting that has them.
 
-An offer says which fields of the command can point back, and at which values: *the cube on the
-left* is named first, and *it* then stands for the color.
+- *offer*: one of these ways: which fields of the command can point back, and at which values. *The
+  cube on the left* is named first, and *it* then stands for the color.
+- *place*: where a thing stands; *clue*: what only who sees the scene or the video can know.
+- *form*: how a place is said: as a ``spot``, or after a noun.
+- *notes*: what the metadata of the instruction say of the offer.
 """
 
 from __future__ import annotations

@@ -84,6 +84,10 @@ class ScenarioFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     needs: Needs = Needs()
     people: People | None = None
 
+    def is_in(self, pool: PoolName) -> bool:
+        """Return whether a pool has the scenario."""
+        return self.pool in (None, pool)
+
 
 class Scenario(msgspec.Struct, frozen=True):
     """A scenario with its sentences parsed.

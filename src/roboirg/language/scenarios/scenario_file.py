@@ -1,4 +1,10 @@
-"""Read the data files of words; every mistake of a file is named by scenario and field."""
+"""Read the data files of words; every mistake of a file is named by scenario and field.
+
+- *head*: the content of a file with its tables as they were written.
+- *commands*: skeletons of a task, *Pick up {color}*; *stated*: the words that state each field.
+- *frame*: the short name of a scenario; *sentence*: one of its texts, with marks.
+- *table of pointers*: ``pointers.toml``, with a row for all words that may point back.
+"""
 
 from __future__ import annotations
 
@@ -474,9 +480,8 @@ class _SentenceReader(NamedTuple):
         kind = type_of(pointer.of, self.listed)
         said = re.sub(r"<[^:<>]+: ", "<", sentence)  # as the table has it: without class and slot
         rows = [row for row in _rows_of(kind) if _is_said(row, pointer.words, said)]
-        # False comes before True, and the second order counts more than the first.
-        rows.sort(key=lambda row: row.operation not in self.operations)
-        rows.sort(key=lambda row: "<" not in row.words)  # with the words around them first
+        # Rows with the words around them come first, then those of the relations.
+        rows.sort(key=lambda row: ("<" not in row.words, row.operation not in self.operations))
         for row in rows:
             if row.kind == pointer.expression:
                 return pointer._replace(resolved=parse(row.resolved), operation=row.operation)

@@ -1,7 +1,9 @@
 """The words of one scenario: its sentences with values filled in, and the command.
 
-The lead stands before the command, *So,*. The skeleton is a command with fields to be filled, *Pick
-up {color}*. A field is hidden if its words point back; it is settled if the command alone says it.
+- *lead*: the words before the command, *So,*.
+- *skeleton*: a command with fields to be filled, *Pick up {color}*.
+- *hidden*: of a field whose words point back, so that the context has to give its value.
+- *settled*: of a field whose value the command alone gives.
 """
 
 from __future__ import annotations
@@ -36,7 +38,7 @@ from roboirg.language.scenarios.amounts import (
 )
 from roboirg.language.scenarios.choice import rival_values
 from roboirg.language.scenarios.declared import ChoosingRemark, SaidValues
-from roboirg.language.scenarios.introduced import Introduced
+from roboirg.language.scenarios.introduced import Introduced, PointedValue
 from roboirg.language.scenarios.markup import (
     Agreement,
     Pointer,
@@ -57,7 +59,10 @@ _ALWAYS_CAPITAL = re.compile(r"I\b|[A-Z]{2}")
 
 
 class Speech:
-    """The words of one scenario in one episode.
+    """The words of one scenario in one episode, and what they mean.
+
+    Sentences are said in the order of the text, since words can point back only at what was said:
+    introduction, remarks, `begin_command`, lead, fields, `command`, and then `meaning`.
 
     Args:
         request: the episode, and how to instruct it.
@@ -77,10 +82,10 @@ class Speech:
         self._words = words
         self._introduced = introduced
         self._scenario = scenario
-        self._said = SaidValues(request.frame)
-        self._terms: dict[str, Term] = {}
-        self._hidden: set[str] = set()
-        self._agrees: dict[str, bool] = {}
+        self._said = SaidValues(request.frame)  # by all sentences so far
+        self._terms: dict[str, Term] = {}  # of the fields that were said
+        self._hidden: set[str] = set()  # those of them that point back
+        self._agrees: dict[str, bool] = {}  # by slot, whether the last utterance speaks of one
 
     def begin_command(self) -> None:
         """Forget with what the words before agree: the last utterance begins."""
@@ -192,12 +197,11 @@ class Speech:
             phrases.append(self.phrase(amount_text("counts", at)))
 
         hidden = hidden_fields(words, fields)
-        self._hidden.update(hidden)
         for field in fields:
-            if field in hidden:
-                self._terms[field] = hidden_term(field, words, remark, self._said)
-            else:
-                self._terms[field] = Term("same", self._said.operands(field))
+            self._terms[field] = Term("same", self._said.operands(field))
+        for field in hidden:
+            self._terms[field] = hidden_term(field, words, remark, self._said)
+        self._hidden.update(hidden)
         return listed(phrases)
 
     def _resolved(self, name: str, words: Text, scenario: Scenario) -> Text:
@@ -221,13 +225,20 @@ class Speech:
         fields = [value.field for value in self._request.goal_values]
         return all(pointer.of in fields for pointer in pointers_in(words))
 
-    def meaning(self) -> Meaning:
-        """Return what has been said, of which some fields point back at what came before."""
+    def meaning(self, command: Phrase) -> Meaning:
+        """Return what has been said, of which some fields point back at what came before.
+
+        A field is also settled if the command names its value, whatever points back.
+        """
         fields = [value.field for value in self._request.goal_values]
         terms = {field: self._terms[field] for field in fields}
-        settled = set(terms)
+        settled = set(fields)
         if not self._request.resolved:
             settled -= self._hidden
+        named_values = _named_values(command)
+        for field in fields:
+            if self._introduced.referent(field) in named_values:
+                settled.add(field)
         return Meaning(terms, frozenset(settled), agrees=dict(self._agrees))
 
     def command(self, fields: Mapping[str, Phrase], lead: Phrase) -> Phrase:
@@ -242,20 +253,7 @@ class Speech:
             is_sentence = lead[-1].text.endswith((". ", "! ", "? "))
             if not is_sentence and not _ALWAYS_CAPITAL.match(skeleton[0].text):
                 skeleton = _begun(skeleton, str.lower)
-        said = (*lead, *skeleton)
-        self._settle_named(said)
-        return said
-
-    def _settle_named(self, command: Phrase) -> None:
-        """Count a field as settled if the command names its value, whatever points back."""
-        named_values: set[tuple[str, str | int]] = set()  # with the slot of each
-        for piece in command:
-            if piece.tag and piece.tag.role == "antecedent":
-                named_values.add((piece.tag.slot, piece.tag.value))
-        for field in list(self._hidden):
-            (value,) = self._introduced.values[field]
-            if (value.slot, value.value) in named_values:
-                self._hidden.remove(field)
+        return (*lead, *skeleton)
 
     def _skeleton(self, fields: Mapping[str, Phrase]) -> Phrase:
         """Return a command of the task, filled with the words for its fields.
@@ -321,6 +319,15 @@ class Speech:
 def _fields_in(command: str) -> frozenset[str]:
     """Return the fields that a command says."""
     return frozenset(slots_in(parse(command)))
+
+
+def _named_values(words: Phrase) -> set[PointedValue]:
+    """Return the values that words name, each with its slot."""
+    found: set[PointedValue] = set()
+    for piece in words:
+        if piece.tag and piece.tag.role == "antecedent":
+            found.add(PointedValue(piece.tag.slot, piece.tag.value))
+    return found
 
 
 def _begun(words: Phrase, case: Callable[[str], str]) -> Phrase:

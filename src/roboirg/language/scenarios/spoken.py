@@ -1,4 +1,9 @@
-"""Say a scenario: which one, its stages, and the command after a lead."""
+"""Say an episode: explicit states the goal, any other setting chooses a scenario and says it.
+
+- *choice*: what a setting says of an episode, and the draws that led to it; or its refusal.
+- *stage*: an utterance of contextual between introduction and command, known by its number.
+- *lead*: the words before the command, *So,*; a remark that chooses one of two values ends it.
+"""
 
 from __future__ import annotations
 
@@ -23,16 +28,14 @@ from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.speech import Speech
 from roboirg.language.scenarios.wording_store import task_words
 from roboirg.language.scenarios.written import shown
-from roboirg.language.settings import all_settings
+from roboirg.language.settings import EXPLICIT, all_settings
 from roboirg.language.settings.setting import Setting
 from roboirg.tasks import Task
 
-_EXPLICIT = "explicit"
 _CONTEXTUAL = "contextual"
-_DIRECT = "direct"
 _DISTRACTOR = 3
 _STAGES: Mapping[int, UtteranceStage] = {2: "reinforcement", _DISTRACTOR: "distractor", 4: "cue"}
-"""Between introduction and command."""
+"""By number: those between introduction and command."""
 
 
 class _Choice(NamedTuple):
@@ -60,11 +63,10 @@ def refusal(request: InstructionRequest) -> str | None:
     """Return why a setting cannot express an episode; None if it can."""
     setting = _setting_of(request)
     words = _find_words(request)
-    is_explicit = setting.offers == _EXPLICIT
-    # First, because a file of whole sentences needs no commands.
+    is_explicit = setting.offers == EXPLICIT
     if words is not None and words.literals and is_explicit:
-        return literal_refusal(request, words)
-    if words is None or not words.commands:  # whole sentences serve explicit alone
+        return literal_refusal(request, words)  # whole sentences need no commands
+    if words is None or not words.commands:
         return _no_words(request.task, setting)
     if is_explicit:
         return setting.refusal(request)
@@ -82,7 +84,7 @@ def _no_words(task: Task, setting: Setting) -> str:
 def say(request: InstructionRequest) -> InstructionSpec:
     """Return the words of an episode in a setting that does not refuse it."""
     words = cast("TaskScenarios", _find_words(request))
-    if _setting_of(request).offers != _EXPLICIT:
+    if _setting_of(request).offers != EXPLICIT:
         choice = _choose(request)
         request.sampler.log.extend(choice.log)
         return say_chosen(request, words, cast("Chosen", choice.chosen))
@@ -106,15 +108,12 @@ def _choose(request: InstructionRequest) -> _Choice:
     Nothing is chosen if the setting refuses the episode.
     """
     setting = _setting_of(request)
-    # Contextual says the scenarios of direct.
-    name = _DIRECT if setting.offers == _CONTEXTUAL else setting.name
-    wordings = outside_words(request.options.wordings)
     key = (
         # What can be said:
-        name,
+        _scenario_setting(setting),
         setting.words,
         setting.refusal,
-        wordings,
+        outside_words(request.options.wordings),
         request.pool,
         # What is drawn and seen:
         request.sampler.key,
@@ -126,25 +125,29 @@ def _choose(request: InstructionRequest) -> _Choice:
         return known
     if len(_CHOICES) >= _MOST_CHOICES:
         _CHOICES.clear()
-    choice = _choose_anew(request, setting, name)
+    choice = _choose_anew(request, setting)
     _CHOICES[key] = choice
     return choice
 
 
-def _choose_anew(request: InstructionRequest, setting: Setting, name: str) -> _Choice:
-    """Return what a setting says of an episode, with the draws; or why it says nothing.
+def _scenario_setting(setting: Setting) -> str:
+    """Return the name of the setting whose scenarios are said: contextual says those of direct."""
+    return "direct" if setting.offers == _CONTEXTUAL else setting.name
 
-    `name` is the setting whose scenarios are said: ``direct`` for contextual, else its own.
-    """
+
+def _choose_anew(request: InstructionRequest, setting: Setting) -> _Choice:
+    """Return what a setting says of an episode, with the draws; or why it says nothing."""
     # A refusal may draw, but its draws are not those of the words: they go to a log of their own.
     reason = setting.refusal(_with_log(request, []))
     if reason is not None:
         return _Choice(request.episode, None, [], reason)
     words = cast("TaskScenarios", _find_words(request))
-    scenarios: list[Scenario] = []
-    for scenario in words.scenarios:
-        if scenario.fields.setting == name and scenario.fields.pool in (None, request.pool):
-            scenarios.append(scenario)
+    name = _scenario_setting(setting)
+    scenarios = [
+        scenario
+        for scenario in words.scenarios
+        if scenario.fields.setting == name and scenario.fields.is_in(request.pool)
+    ]
     log: list[str] = []
     chosen = choose(_with_log(request, log), name, scenarios)
     if chosen is None:
@@ -163,8 +166,8 @@ def _with_log(request: InstructionRequest, log: list[str]) -> InstructionRequest
 def say_explicit(request: InstructionRequest, words: TaskScenarios) -> InstructionSpec:
     """Return a command that states the goal."""
     speech = Speech(request, words, Introduced(goal_values(request)))
-    command = UtteranceSpec("command", speech.command({}, ()))
-    return InstructionSpec((command,), speech.meaning())
+    command = speech.command({}, ())
+    return InstructionSpec((UtteranceSpec("command", command),), speech.meaning(command))
 
 
 def say_chosen(
@@ -191,12 +194,13 @@ def _scenario_words(
     scenario = chosen.scenario
     speech = Speech(request, words, chosen.introduced, scenario)
     utterances = [UtteranceSpec("introduction", speech.phrase(scenario.text("introduction")))]
-    notes: dict[str, object] = {**chosen.introduced.notes, "scenario": scenario.fields.frame}
+    notes: dict[str, object] = {**chosen.offer.notes, "scenario": scenario.fields.frame}
     if _setting_of(request).offers == _CONTEXTUAL:
         utterances += _stages(request, speech, scenario)
         notes |= _stage_notes(request.options)
-    utterances.append(UtteranceSpec("command", _command(request, speech, chosen)))
-    return InstructionSpec(tuple(utterances), speech.meaning(), notes)
+    command = _command(request, speech, chosen)
+    utterances.append(UtteranceSpec("command", command))
+    return InstructionSpec(tuple(utterances), speech.meaning(command), notes)
 
 
 def _stage_notes(options: InstructionOptions) -> dict[str, object]:
@@ -218,7 +222,7 @@ def _command(request: InstructionRequest, speech: Speech, chosen: Chosen) -> Phr
         texts = chosen.scenario.texts[f"say.{name}"]
         field_words[name] = request.sampler.pick(f"{name} words", texts)
 
-    # The lead is said first, so that what the fields point back at includes what it names.
+    # The lead is said before the fields, which can point back at what it names.
     speech.begin_command()
     lead = _lead(request, chosen)
     before = speech.phrase(lead.text, resolved=request.resolved)
@@ -246,11 +250,12 @@ def _lead(request: InstructionRequest, chosen: Chosen) -> _Lead:
         # It names what is meant, so no remark has to choose.
         return _Lead(scenario.text("resolved.lead"))
     lead = scenario.text("lead")
-    if not chosen.remark:
+    remark = chosen.offer.remark
+    if not remark:
         return _Lead(lead)
-    text = request.sampler.pick("remark", scenario.texts[f"remarks.{chosen.remark}"])
+    text = request.sampler.pick("remark", scenario.texts[f"remarks.{remark}"])
     pointer = next(pointers_in(text))
-    sets_aside = chosen.remark.startswith("not_")
+    sets_aside = remark.startswith("not_")
     return _Lead((*lead, *text), ChoosingRemark(pointer, sets_aside))
 
 
