@@ -16,7 +16,8 @@ def draw():
 
 
 def drawn_alone(seed, count):
-    state, numbers = RandomState(seed), []
+    state = RandomState(seed)
+    numbers = []
     for _ in range(count):
         with state:
             numbers.append(draw())
@@ -27,6 +28,7 @@ def drawn_alone(seed, count):
 def test_the_order_of_turns_changes_no_episode_s_numbers(turns):
     states = [RandomState(seed) for seed in range(3)]
     found = [[], [], []]
+
     for turn in turns:
         if turn is NOBODY:  # a call for several episodes
             RandomState.set_aside()
@@ -34,5 +36,6 @@ def test_the_order_of_turns_changes_no_episode_s_numbers(turns):
         else:
             with states[turn]:
                 found[turn].append(draw())
+
     for seed, numbers in enumerate(found):
         assert numbers == drawn_alone(seed, len(numbers))
