@@ -55,6 +55,7 @@ def test_values_that_are_not_finite_are_named(bad, column):
     action[column] = bad
     with pytest.raises(InvalidActionError, match=f"value {column} is {bad}"):
         check_action(action)
+
     chunk = np.zeros((3, 8))
     chunk[2, column] = bad
     with pytest.raises(InvalidActionError, match=f"value {column} of row 2 is {bad}"):
@@ -106,6 +107,7 @@ def test_a_tensor_of_flags_is_refused():
     cpu = tensor.detach.return_value.cpu.return_value
     cpu.is_floating_point.return_value = False
     cpu.numpy.return_value = np.ones((2, 8), bool)
+
     with pytest.raises(InvalidActionError, match="of dtype bool"):
         check_chunk(tensor)
 
@@ -133,5 +135,6 @@ def test_unknown_action_spaces_are_named(name):
 def test_limits_enclose_home():
     home = np.array([0, 0, 0, -np.pi / 2, 0, np.pi / 2, np.pi / 4, 1])
     assert ((home >= JOINT_ANGLE.low) & (home <= JOINT_ANGLE.high)).all()
+
     tool_at_home = np.array([-0.0605, 0.0, 0.5211, -np.pi, 0.0, 0.0, 1.0])
     assert ((tool_at_home >= EE_POSE.low) & (tool_at_home <= EE_POSE.high)).all()

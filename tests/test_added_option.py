@@ -101,7 +101,7 @@ def test_an_added_option_reaches_words_commands_plans_records_and_tables(
     assert shown.count("Hello, robot.") == 1
     assert "# hello: the robot is greeted; or plain.\ngreeting: hello" in planned
     records = [json.loads(line) for line in (run / "records.jsonl").read_text().splitlines()]
-    said = {one["options"]["setting"]: one["options"]["greeting"] for one in records}
+    said = {record["options"]["setting"]: record["options"]["greeting"] for record in records}
     assert said == {"direct": "hello", "explicit": "plain"}
     assert records[0]["instruction"][0]["text"].startswith("Hello, robot.")
     assert "direct (greeting hello)" in tables

@@ -144,11 +144,13 @@ def test_an_error_of_ours_logs_its_traceback(caplog):
         raise RuntimeError("a bug")
 
     server = AppServer(Starlette(routes=[Route("/", fail)]))
+
     with running(server):
         assert get(server, "/").status == 500
         deadline = time.monotonic() + 60  # the log follows the response
         while "RuntimeError: a bug" not in caplog.text and time.monotonic() < deadline:
             time.sleep(0.05)
+
     assert "RuntimeError: a bug" in caplog.text
 
 
@@ -192,8 +194,10 @@ def test_ctrl_c_does_not_wait_for_a_request(request_line):
         port = int(process.stdout.readline())
         head = f"{request_line}\r\nHost: 127.0.0.1:{port}\r\n"
         body = "Content-Length: 9\r\n\r\nx" if "POST" in request_line else "\r\n"
+
         with send(port, head + body):
             assert process.stdout.readline() == "waiting\n"
             process.send_signal(signal.SIGINT)
             assert process.wait(timeout=300) == 130
+
         assert process.stderr.read() == ""

@@ -23,6 +23,7 @@ def entries(folder):
 def test_what_is_kept_comes_back(tmp_path):
     cache = Cache(tmp_path / "deep" / "down", 1000)
     assert cache.read("a1") is None
+
     cache.write("a1", b"")
     cache.write("b2", bytes(range(256)))
     cache.write("b2", bytes(range(200)))
@@ -36,10 +37,13 @@ def test_what_was_not_used_for_longest_goes_first(tmp_path):
         cache.write(key, bytes(100))  # and a head of 40
         os.utime(tmp_path / key, (1000 + age, 1000 + age))
     assert cache.read("a1") == bytes(100)
+
     cache.write("d4", bytes(100))
     assert entries(tmp_path) == ["a1", "c3", "d4"]
+
     cache.write("large", bytes(1000))
     assert entries(tmp_path) == ["a1", "c3", "d4"]
+
     cache.write("e5", bytes(300))
     assert entries(tmp_path) == ["e5"]
 
@@ -58,10 +62,12 @@ def test_damage_is_logged_once_and_repaired(tmp_path, caplog, harm):
     cache.write("b2", b"something else")
     cache.write("a1", b"forty-two")
     harm(tmp_path / "a1")
+
     assert cache.read("a1") is None
     assert [record.getMessage() for record in caplog.records] == [
         f"The cache entry {tmp_path / 'a1'} is damaged and will be rebuilt."
     ]
+
     cache.write("a1", b"forty-two")
     assert cache.read("a1") == b"forty-two"
     assert len(caplog.records) == 1
@@ -118,6 +124,7 @@ def test_a_kill_while_writing_leaves_no_bad_entry(tmp_path, caplog, monkeypatch)
             assert set(cache.read(key)) == set(key.encode())
     assert caught_writing
     assert caplog.records == []
+
     # What was left unfinished is swept out in time.
     monkeypatch.setattr(cache_module, "_ABANDONED_S", -1.0)
     cache.write("0", b"0")
@@ -128,6 +135,7 @@ def test_a_disk_that_refuses_costs_one_notice(tmp_path, caplog):
     (tmp_path / "file").write_bytes(b"")
     cache = Cache(tmp_path / "file" / "below", 1000)
     cache_module._warned.clear()
+
     for _ in range(3):
         cache.write("a1", b"content")
         assert cache.read("a1") is None
@@ -139,14 +147,17 @@ def test_the_environment_says_where_and_how_much(tmp_path, monkeypatch):
     monkeypatch.setenv("ROBOIRG_CACHE", "off")
     open_cache("actions").write("a1", b"content")
     assert open_cache("actions").read("a1") is None
+
     monkeypatch.setenv("ROBOIRG_CACHE", str(tmp_path / "here"))
     open_cache("actions").write("a1", b"content")
     assert open_cache("actions").read("a1") == b"content"
     assert open_cache("frames").read("a1") is None
+
     monkeypatch.delenv("ROBOIRG_CACHE")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
     open_cache("frames").write("a1", b"content")
     assert [path.name for path in tmp_path.glob("xdg/roboirgbench/frames/*")] == ["a1"]
+
     monkeypatch.setenv("ROBOIRG_CACHE_GIB", "1e-8")
     open_cache("frames").write("b2", b"content")
     assert open_cache("frames").read("b2") is None

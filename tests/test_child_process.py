@@ -52,9 +52,10 @@ def wait_for(what: Callable[[], bool]) -> bool:
     return what()
 
 
-def test_a_child_answers_and_exits_when_its_channel_is_closed() -> None:
+def test_a_child_answers_and_exits_when_its_channel_is_closed():
     child = ChildProcess.spawn(answer)
     child.send("who")
+
     assert child.receive() == (child.pid, signal.SIG_IGN)
     assert child.exit is None
     assert child.close() == ChildExit(0) == child.exit
@@ -67,7 +68,7 @@ def test_a_child_answers_and_exits_when_its_channel_is_closed() -> None:
         ("kill", "the process died of signal 9 (Killed)", True),
     ],
 )
-def test_how_a_child_ended_is_told(message: str, words: str, was_killed: bool) -> None:
+def test_how_a_child_ended_is_told(message, words, was_killed):
     child = ChildProcess.spawn(answer)
     child.send("who")
     child.receive()
@@ -75,18 +76,20 @@ def test_how_a_child_ended_is_told(message: str, words: str, was_killed: bool) -
         os.kill(child.pid, signal.SIGKILL)
     child.send(message)
     ended = child.receive()
+
     assert (str(ended), ended.was_killed) == (words, was_killed)
+
     child.send("who")
     assert isinstance(child.receive(), ChildExit)
 
 
-def test_a_child_that_the_kernel_does_not_end_is_left() -> None:
+def test_a_child_that_the_kernel_does_not_end_is_left():
     """`join` needs a limit here, as `abs` does: waiting for a driver would stop all workers."""
     stuck = SimpleNamespace(exitcode=None, kill=str, pid=2**30, join=abs, close=str)
     assert ChildProcess(stuck, stuck).close() == ChildExit(None)  # type: ignore[arg-type]
 
 
-def test_where_no_process_can_start_one_sentence_says_what_would_help() -> None:
+def test_where_no_process_can_start_one_sentence_says_what_would_help():
     """The usual limit of open files is raised before that."""
     resource.setrlimit(resource.RLIMIT_NOFILE, (64, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
     with (
@@ -97,11 +100,12 @@ def test_where_no_process_can_start_one_sentence_says_what_would_help() -> None:
     assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] >= 1_024
 
 
-def test_what_a_child_has_started_ends_with_it() -> None:
+def test_what_a_child_has_started_ends_with_it():
     child = ChildProcess.spawn(answer)
     child.send("group")
     grandchild = child.receive()
     assert is_alive(grandchild)
+
     child.send("ignore")
     child.end()
     assert child.exit == ChildExit(-signal.SIGKILL)
@@ -109,9 +113,7 @@ def test_what_a_child_has_started_ends_with_it() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_a_guard_ends_only_when_nothing_is_left_even_of_what_a_look_at_all_processes_misses() -> (
-    None
-):
+def test_a_guard_ends_only_when_nothing_is_left_even_of_what_a_look_at_all_processes_misses():
     script = (
         "import subprocess\nfrom roboirg.util import process_guard\n"
         "child = subprocess.Popen(['sleep', '3600'], stdout=-3, start_new_session=True)\n"
@@ -125,7 +127,7 @@ def test_a_guard_ends_only_when_nothing_is_left_even_of_what_a_look_at_all_proce
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_processes_are_found_whatever_their_names() -> None:
+def test_processes_are_found_whatever_their_names():
     name = r"b'\xff) R 1\n(\xfe'"
     script = f"import ctypes; ctypes.CDLL(None).prctl(15, {name}); print(flush=True); input()"
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
@@ -135,7 +137,7 @@ def test_processes_are_found_whatever_their_names() -> None:
         child.kill()
 
 
-def test_children_do_not_outlive_a_parent_that_is_killed(tmp_path: Path) -> None:
+def test_children_do_not_outlive_a_parent_that_is_killed(tmp_path):
     script = tmp_path / "parent.py"
     script.write_text(
         f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
@@ -145,11 +147,13 @@ def test_children_do_not_outlive_a_parent_that_is_killed(tmp_path: Path) -> None
         "    child.send('who'); print(child.receive()[0], flush=True)\n"
         "    child.send('ignore'); child.receive()\n"
     )
+
     with subprocess.Popen([sys.executable, script], stdout=subprocess.PIPE, text=True) as parent:
         assert parent.stdout is not None
         pid = int(parent.stdout.readline())
         assert is_alive(pid)
         parent.kill()
+
     assert wait_for(lambda: not is_alive(pid))
 
 
@@ -161,7 +165,7 @@ def root(number: int) -> float:
     return number**0.5
 
 
-def test_a_map_names_the_item_at_which_a_process_died_and_raises_what_was_raised() -> None:
+def test_a_map_names_the_item_at_which_a_process_died_and_raises_what_was_raised():
     assert dict(parallel_map(root, range(5), 3)) == {n: n**0.5 for n in range(5)}
     with pytest.raises(RoboIRGError, match="died at 9: the process ended with exit code 4"):
         list(parallel_map(root, [9], 2))
@@ -170,7 +174,7 @@ def test_a_map_names_the_item_at_which_a_process_died_and_raises_what_was_raised
     assert "in root" in caught.value.__notes__[0]  # where it was raised
 
 
-def test_a_map_that_is_left_ends_its_processes() -> None:
+def test_a_map_that_is_left_ends_its_processes():
     found = parallel_map(time.sleep, [0.0, 3600.0, 3600.0], 2)
     assert next(found) == (0.0, None)
     found.close()  # type: ignore[attr-defined]

@@ -101,10 +101,11 @@ def planned(**fields: object) -> tuple[str, ...]:
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_one_sentence_and_exit_code_2(
-    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], sentence: str
-) -> None:
+    roboirg, tmp_path, monkeypatch, words, sentence
+):
     monkeypatch.chdir(tmp_path)
     said = roboirg(*words)
+
     assert (said.code, said.out, said.err.count("\n")) == (2, "", 1)
     assert said.err.startswith("roboirg: ")
     assert sentence in said.err
@@ -113,24 +114,27 @@ def test_what_is_wrong_is_one_sentence_and_exit_code_2(
 
 @pytest.mark.parametrize("words", ["tasks", "--help", "tables --published --which main",
                                    "tables --published --format csv"])  # fmt: skip
-def test_an_output_that_cannot_be_written_is_one_sentence(words: str) -> None:
+def test_an_output_that_cannot_be_written_is_one_sentence(words):
     command = [sys.executable, "-m", "roboirg", *words.split()]
     with Path("/dev/full").open("w") as full:
         child = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+
     assert child.stderr == "roboirg: The output cannot be written: No space left on device.\n"
     assert child.returncode == 2
 
 
-def test_a_reader_that_leaves_is_no_error() -> None:
+def test_a_reader_that_leaves_is_no_error():
     read, write = os.pipe()
     os.close(read)
     command = [sys.executable, "-m", "roboirg", "tasks"]
     child = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, text=True, check=False)
+
     os.close(write)
+
     assert (child.returncode, child.stderr) == (1, "")
 
 
-def test_help_and_version_are_answered(roboirg) -> None:
+def test_help_and_version_are_answered(roboirg):
     assert roboirg("--version").out == f"roboirg {version('roboirgbench')}\n"
     for words in (("--help",), ("run", "-h")):
         said = roboirg(*words)
@@ -139,24 +143,23 @@ def test_help_and_version_are_answered(roboirg) -> None:
     assert roboirg().code in {0, 2}  # Click before 8.2 sees no fault in it
 
 
-def test_a_missing_pyav_is_told_before_anything_is_played(
-    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_pyav_is_told_before_anything_is_played(roboirg, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     said = roboirg("run", "--plan", "demo", "--out", tmp_path / "out")
+
     assert (said.code, said.out, said.err.count("\n")) == (2, "", 1)
     assert not (tmp_path / "out").exists()
 
 
-def test_lost_videos_are_reported_once(
-    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, canned: type[CannedPlayer]
-) -> None:
+def test_lost_videos_are_reported_once(roboirg, tmp_path, monkeypatch, canned):
     def play(_self: CannedPlayer, job: Job):
         return make_record(job, **canned.result, video_error="OSError: disk full")
 
     monkeypatch.setattr(CannedPlayer, "__call__", play)
     words = (*RUN, "--episodes", "2", "--workers", "0", "--video", "all", "--out", tmp_path)
+
     said = roboirg(*words)
+
     assert said.code == 0
     assert said.err == (
         "10 of 10 videos could not be written; the verdicts are not affected. "
@@ -166,7 +169,7 @@ def test_lost_videos_are_reported_once(
 
 
 @pytest.mark.usefixtures("canned")
-def test_run_then_report(roboirg, tmp_path: Path) -> None:
+def test_a_run_goes_on_where_it_was_and_has_a_report(roboirg, tmp_path):
     command = (*RUN, "--episodes", "2", "--workers", "0", "--out", tmp_path)
     said = roboirg(*command)
     assert said.code == 0, said.err
@@ -186,34 +189,34 @@ def test_run_then_report(roboirg, tmp_path: Path) -> None:
     assert (tmp_path / "report.html").exists()
 
 
-def test_errors_are_told_and_are_exit_code_2(
-    roboirg, tmp_path: Path, canned: type[CannedPlayer]
-) -> None:
+def test_errors_are_told_and_are_exit_code_2(roboirg, tmp_path, canned):
     cause = "invalid action: Action value 3 is nan"
     canned.result = {"outcome": "error", "error": "invalid_action", "cause": cause, "steps": 2}
     command = (*RUN, "--episodes", "1", "--workers", "0", "--out", tmp_path)
     said = roboirg(*command)
+
     assert said.code == 2
     assert "5 of 5 episodes ended in an error" in said.err
     assert "Action value 3 is nan" in said.err
+
     canned.result = {"outcome": "success"}
     assert roboirg(*command).code == 0
 
 
-def test_instructions_are_printed(roboirg, snapshot) -> None:
+def test_instructions_are_printed(roboirg, snapshot):
     said = roboirg(
         "show", "PickXtimes", "3", "--words", "--settings", "contextual", "--stages", "1,5"
     )
     assert said.out + roboirg("show", "VideoUnmask", "0", "--words").out == snapshot
+
     wrong = roboirg("show", "VideoUnmask", "99", "--words")
     assert (wrong.code, wrong.err.count("\n")) == (2, 1)
 
 
-def test_failures_are_named_below_the_table(
-    roboirg, tmp_path: Path, canned: type[CannedPlayer]
-) -> None:
+def test_failures_are_named_below_the_table(roboirg, tmp_path, canned):
     canned.result = {"outcome": "failure", "cause": "pressed the button too early"}
     said = roboirg(*RUN, "--episodes", "3", "--workers", "0", "--out", tmp_path)
+
     assert said.code == 0
     assert "random: 15 episodes without success" in said.out
     assert "  PickXtimes test/0 explicit: pressed the button too early\n" in said.out
@@ -221,9 +224,7 @@ def test_failures_are_named_below_the_table(
     assert "and 5 more" in roboirg("report", tmp_path).out
 
 
-def test_an_episode_is_shown(
-    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, snapshot
-) -> None:
+def test_an_episode_is_shown(roboirg, tmp_path, monkeypatch, snapshot):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "100")
     save = lambda _, path, **__: Path(path).touch()  # noqa: E731
@@ -232,13 +233,15 @@ def test_an_episode_is_shown(
     played = playthrough.Playthrough("success", 7, (picture,))
     monkeypatch.setattr(playthrough, "play_through", lambda _: played)
     said = roboirg("show", "VideoPlaceButton", "3", "--split", "val")
+
     assert (said.code, said.err) == (0, "")
+
     names = [f"VideoPlaceButton-val-3{end}.png" for end in ("", "-dark")]
-    assert sorted(one.name for one in tmp_path.iterdir()) == sorted(names)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
     assert said.out == snapshot
 
 
-def test_help_needs_nothing_heavy() -> None:
+def test_help_needs_nothing_heavy():
     code = (
         "import sys; sys.argv = ['roboirg', '--help']\n"
         "from roboirg.main import main\n"
@@ -263,7 +266,7 @@ __main__.main()
 """
 
 
-def test_ctrl_c_at_any_moment_is_one_sentence() -> None:
+def test_ctrl_c_at_any_moment_is_one_sentence():
     ends = []
     for delay_s in np.linspace(0, 0.24, 5):
         command = subprocess.Popen(
@@ -281,6 +284,7 @@ def test_ctrl_c_at_any_moment_is_one_sentence() -> None:
         _, errors = command.communicate()
         ends.append((command.returncode, errors))
     stopped = 130, "roboirg: stopped.\n"
+
     # The last ones may have ended before, or be Python's again.
     assert set(ends) <= {stopped, (0, ""), (-signal.SIGINT, "")}
     assert stopped in ends
@@ -302,7 +306,7 @@ __main__.main()
 """
 
 
-def test_ctrl_c_within_a_class_definition_is_one_sentence() -> None:
+def test_ctrl_c_within_a_class_definition_is_one_sentence():
     # Python 3.11 makes a RuntimeError of it, as happened while a library was imported.
     ended = subprocess.run(
         [sys.executable, "-c", INTERRUPTED_CLASS], capture_output=True, text=True, check=False
@@ -310,31 +314,33 @@ def test_ctrl_c_within_a_class_definition_is_one_sentence() -> None:
     assert (ended.returncode, ended.stderr) == (130, "roboirg: stopped.\n")
 
 
-def test_episodes_that_were_not_played_are_an_error(capsys: pytest.CaptureFixture[str]) -> None:
+def test_episodes_that_were_not_played_are_an_error(capsys):
     summary = RunSummary(10, 7, (), 3, (), ())
     with pytest.raises(SystemExit, match="2"):
         report_problems(summary, Path("out"))
     assert "3 of 10 episodes were not played; run the same command" in capsys.readouterr().err
 
 
-def test_what_is_typed_goes_before_what_the_plan_says(
-    roboirg, tmp_path: Path, canned: type[CannedPlayer]
-) -> None:
+def test_what_is_typed_goes_before_what_the_plan_says(roboirg, tmp_path, canned):
     del canned
     plan = tmp_path / "plan.yaml"
     plan.write_text("policies: [random]\ntasks: StopCube\nsettings: explicit\nepisodes: 3\n")
     said = roboirg("run", "--plan", plan, "--episodes", "2", "--workers", "0", "--out", tmp_path)
+
     assert said.code == 0
+
     made = read_plan(tmp_path)
     assert made is not None
-    assert [one.spec for one in made.policies] == ["random"]
+    assert [policy.spec for policy in made.policies] == ["random"]
     assert (made.tasks, made.episodes) == (("StopCube",), (0, 1))
 
 
-def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path: Path) -> None:
+def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path):
     model = "p=planner:stateless?model=x&base_url=http://localhost:1/v1"
     words = ("run", "--plan", "paper", "--policy", model, "--dry-run", "--out", tmp_path / "out")
+
     said = roboirg(*words)
+
     assert "least calls of models" in said.out
     assert said.code == 0
     assert "150 + 150" in said.out
@@ -342,14 +348,14 @@ def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_dry_run_counts_calls_of_models_for_what_is_still_to_be_played(
-    roboirg, tmp_path: Path
-) -> None:
+def test_a_dry_run_counts_calls_of_models_for_what_is_still_to_be_played(roboirg, tmp_path):
     model = "p=vlm-listener:openai?model=x&base_url=http://localhost:1/v1"
     played = make_plan([model], tasks="PickXtimes", settings="direct", episodes="1").jobs()
     store(tmp_path, [make_record(job, "success") for job in played])
     words = ("--tasks", "PickXtimes", "--settings", "direct", "--episodes", "3", "--dry-run")
+
     said = roboirg("run", "--policy", model, *words, "--out", tmp_path)
+
     assert re.search(r"p\W+direct\W+2\W", said.out)
 
 
@@ -360,9 +366,7 @@ def test_a_dry_run_counts_calls_of_models_for_what_is_still_to_be_played(
         (("--settings", "direct", "--forms", "implicit,resolved"), "episodes: implicit + resolved"),
     ],
 )
-def test_a_dry_run_names_the_forms_it_counts(
-    roboirg, tmp_path: Path, words: tuple[str, ...], caption: str
-) -> None:
+def test_a_dry_run_names_the_forms_it_counts(roboirg, tmp_path, words, caption):
     said = roboirg(*RUN, *words, "--dry-run", "--out", tmp_path / "out")
     assert caption in map(str.strip, said.out.splitlines())
 
@@ -375,16 +379,17 @@ def test_a_dry_run_names_the_forms_it_counts(
         (("--out", "{other}"), "language version 1.1"),
     ],
 )
-def test_a_dry_run_checks_what_a_run_checks(
-    roboirg, tmp_path: Path, words: tuple[str, ...], sentence: str
-) -> None:
-    file, other = tmp_path / "file", tmp_path / "other"
+def test_a_dry_run_checks_what_a_run_checks(roboirg, tmp_path, words, sentence):
+    file = tmp_path / "file"
+    other = tmp_path / "other"
     file.write_text("x")
     (job,) = make_plan(["random"], tasks="PickXtimes", settings="direct", episodes="1").jobs()
     store(other, [make_record(job, "success", language_version="1.1")])
     places = {"file": file, "other": other}
     given = [word.format(**places) for word in words]
+
     before = sorted(tmp_path.rglob("*"))
+
     # Twice: without --dry-run, too.
     for last in (["--dry-run"], []):
         said = roboirg(*RUN, "--out", tmp_path / "out", *given, *last)
@@ -395,15 +400,15 @@ def test_a_dry_run_checks_what_a_run_checks(
             assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_a_run_s_own_plan_can_be_played_again(
-    roboirg, tmp_path: Path, canned: type[CannedPlayer]
-) -> None:
+def test_a_run_s_own_plan_can_be_played_again(roboirg, tmp_path, canned):
     del canned
     words = "--settings contextual,direct --stages 1,5;1-5 --episodes 3,"
     words += f" --plan {plan_file(retry_on='none', frame='camera')}"
     words += " --wordings train --forms implicit,resolved --workers 0 --out"
     first = roboirg(*RUN, *words.split(), tmp_path / "a")
+
     assert first.code == 0, first.err
+
     plan = tmp_path / "a" / "plan.json"
     again = roboirg("run", "--plan", plan, "--workers", "0", "--out", tmp_path / "b")
     assert again.code == 0, again.err
@@ -420,37 +425,38 @@ class Wanderer(CannedPlayer):
         return super().__call__(job)
 
 
-def test_a_relative_folder_stays_where_it_is(
-    roboirg, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    home, away = tmp_path / "home", tmp_path / "away"
+def test_a_relative_folder_stays_where_it_is(roboirg, tmp_path, monkeypatch):
+    home = tmp_path / "home"
+    away = tmp_path / "away"
     home.mkdir()
     away.mkdir()
     monkeypatch.chdir(home)
     monkeypatch.setattr("roboirg.runs.run.runner.EpisodeRunner", Wanderer)
     monkeypatch.setattr(Wanderer, "away", away)
+
     said = roboirg(*RUN, "--episodes", "2", "--workers", "0", "--out", "mine")
+
     assert said.code == 0, said.err
     assert (home / "mine" / "records.jsonl").exists()
     assert list(away.iterdir()) == []
 
 
-def test_unfinished_videos_of_a_run_that_died_are_deleted(
-    roboirg, tmp_path: Path, canned: type[CannedPlayer]
-) -> None:
+def test_unfinished_videos_of_a_run_that_died_are_deleted(roboirg, tmp_path, canned):
     videos = tmp_path / "videos"
     videos.mkdir()
     for name in (".a.mp4.part", "b.mp4", ".c.mp4.part.keep"):
         (videos / name).write_bytes(b"x")
     (videos / ".d.mp4.part").mkdir()  # not ours
+
     assert roboirg(*RUN, "--workers", "0", "--out", tmp_path).code == 0
-    assert {one.name for one in videos.iterdir()} == {"b.mp4", ".c.mp4.part.keep", ".d.mp4.part"}
+    assert {path.name for path in videos.iterdir()} == {"b.mp4", ".c.mp4.part.keep", ".d.mp4.part"}
 
 
-def test_long_lists_of_options_have_panels(roboirg, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_lists_of_options_have_panels(roboirg, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     out = roboirg("run", "--help").out
     assert "\x1b" not in out  # no color in what is no terminal
+
     panels = re.split(r"╭─ (.+?) ─+╮", out)[1:]
     sizes = {
         name: len(re.findall(r"(?m)^│ [ *] {0,3}--|^│ --", body))
@@ -460,16 +466,16 @@ def test_long_lists_of_options_have_panels(roboirg, monkeypatch: pytest.MonkeyPa
     assert all(1 < size <= 9 for size in sizes.values()), sizes
 
 
-def test_progress_moves_no_cursor_in_a_pipe_even_if_colors_are_forced(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_progress_moves_no_cursor_in_a_pipe_even_if_colors_are_forced(monkeypatch, capsys):
     monkeypatch.setenv("FORCE_COLOR", "1")
     # The time left goes by what was done since the first of them.
     times = iter([0, 20, 60, 65, 100, 101])
     monkeypatch.setattr(progress_bar, "time", SimpleNamespace(monotonic=times.__next__))
+
     with progress_bars() as report:
         for done in (3, 5, 6, 9, 10):
             report("record", done, 10, "done" if done == 10 else "")
+
     assert not progress_console().is_terminal
     assert capsys.readouterr().err.splitlines() == [
         "record 3/10", "record 5/10 2 min left", "record 9/10 17 s left", "record 10/10  done",

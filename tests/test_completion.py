@@ -28,11 +28,13 @@ def test_bash_completes_commands_and_options(tmp_path, words, wanted):
     command = tmp_path / "roboirg"
     command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m roboirg "$@"\n')
     command.chmod(0o755)
+
     done = subprocess.run(
         ["bash", "--norc", "-c", SCRIPT, "bash", *words],
         env=os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"},
         capture_output=True, text=True, check=False,
     )  # fmt: skip
+
     assert (done.returncode, done.stderr) == (0, "")
     assert set(wanted) <= set(done.stdout.split())
-    assert all(one.startswith(words[-1]) for one in done.stdout.split())
+    assert all(word.startswith(words[-1]) for word in done.stdout.split())

@@ -30,6 +30,7 @@ def test_a_prompt_is_heard_at_once():
     spoken = SpokenInstruction(("It is red.", "Take it."), "prompt")
     assert spoken.heard == [("It is red.", 0), ("Take it.", 0)]
     assert (spoken.prompt, spoken.unheard) == ("It is red. Take it.", 0)
+
     spoken.hear(100)
     assert len(spoken.heard) == 2
     assert spoken.said_at(100) == spoken.prompt
@@ -50,9 +51,11 @@ def test_turns_begin_at_the_reset_and_end_with_the_command(count):
 def test_an_utterance_is_heard_at_the_first_observation_after_it():
     spoken = SpokenInstruction("abcde", "turns")  # said at 0, 10, 20, 30 and 40
     heard = []
+
     for step in (9, 10, 12, 35, 36, 90):
         spoken.hear(step)
         heard.append((spoken.prompt, spoken.unheard))
+
     assert heard == [("a", 4), ("b", 3), ("b", 3), ("c d", 1), ("c d", 1), ("e", 0)]
     assert spoken.heard[-2:] == [HeardUtterance("d", 35), HeardUtterance("e", 90)]
     assert [spoken.said_at(step) for step in (0, 9, 20, 29, 39, 40, 90)] == list("aaccdee")
@@ -66,7 +69,9 @@ def test_the_settings_with_several_utterances_read_the_delivery():
             for setting in language.expressible(episode):
                 if len(language.instruct(episode, setting).utterances) > 1:
                     several.add(setting)
-    assert several == {name for name, one in all_settings().items() if "delivery" in one.reads}
+    assert several == {
+        name for name, setting in all_settings().items() if "delivery" in setting.reads
+    }
 
 
 def test_a_delivery_changes_no_word_and_an_unknown_one_is_told():
@@ -75,6 +80,7 @@ def test_a_delivery_changes_no_word_and_an_unknown_one_is_told():
         language.instruct_with(episode, InstructionOptions("contextual", delivery=delivery))
         for delivery in DELIVERIES
     )
+
     assert one == two
     with pytest.raises(UnknownNameError, match=r"no delivery 'turn'.*Did you mean 'turns'"):
         language.instruct_with(episode, InstructionOptions(delivery="turn"))
@@ -87,7 +93,9 @@ class Remembering:
     observe_every = 5
 
     def __init__(self):
-        self.told, self.prompts, self.history = [], [], []
+        self.told = []
+        self.prompts = []
+        self.history = []
 
     def reset(self, instruction, demonstration):
         self.told.append((instruction, 0))
@@ -116,10 +124,13 @@ def test_an_episode_in_turns_tells_them_in_order():
     assert play(env, policy)["status"] == "timeout"
     # Said at 0, 10, 20, 30 and 40; observed every 15 steps.
     assert policy.told == list(zip(turns, (0, 15, 30, 30, 45), strict=True))
+
     joined = f"{turns[2]} {turns[3]}"
     assert policy.prompts == [turns[0], turns[1], joined, turns[4], turns[4]]
+
     said = [0, 1, 1, 2, 2, 3, 3, 4, 4, 4, 4, 4]  # at 5, 10, ..., 60
     assert policy.history == [turns[index] for index in said]
+
     first, info = env.reset()
     assert first["instruction"] == turns[0]
     assert info["heard"] == [{"text": turns[0], "step": 0}]
@@ -131,7 +142,9 @@ def test_nothing_is_heard_after_the_end():
     env = roboirg.make("PickXtimes", setting="direct", cameras=(), max_steps=20, delivery="turns")
     observation, info = env.reset()
     action = [*observation["joint_positions"], 1.0]
+
     observation, _, _, truncated, info = env.step_chunk([action] * 30)
+
     assert truncated
     assert (info["heard"], env.unheard) == ([], 1)
     assert observation["instruction"] == env.instruction.turns[0]
@@ -150,11 +163,12 @@ def test_a_run_in_turns_has_records_and_videos_of_them(tmp_path):
     words += ["--plan", plan_file(delivery="turns", episodes=1, video="all"), "--workers", "0"]
     result = CliRunner().invoke(app, ["run", *words, "--out", str(tmp_path)])
     assert result.exit_code == 0, result.output
+
     direct, explicit = read_records(tmp_path)
     assert (explicit.outcome, direct.outcome) == ("success", "success")
     assert (explicit.options.delivery, direct.options.delivery) == ("prompt", "turns")
-    assert [one.step for one in explicit.instruction] == [0]
-    assert [one.step for one in direct.instruction] == [0, SPACING]
+    assert [turn.step for turn in explicit.instruction] == [0]
+    assert [turn.step for turn in direct.instruction] == [0, SPACING]
     assert direct.steps == explicit.steps + SPACING
     for record in (explicit, direct):
         assert (tmp_path / record.video).stat().st_size > 1000

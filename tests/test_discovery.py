@@ -25,7 +25,9 @@ class EntryPoint:
     dist = type("Distribution", (), {"name": "a-lab"})
 
     def __init__(self, number, load):
-        self.name, self.value, self.load = f"outside-{number}", "outside:TASK", load
+        self.name = f"outside-{number}"
+        self.value = "outside:TASK"
+        self.load = load
         self.group = tasks.ENTRY_POINTS
 
 
@@ -34,7 +36,7 @@ def install(monkeypatch):
     """Make entry points the only ones that are installed; they are found in any order."""
 
     def add(*loads):
-        entries = [EntryPoint(*one) for one in enumerate(loads)][::-1]
+        entries = [EntryPoint(*load) for load in enumerate(loads)][::-1]
         monkeypatch.setattr(importlib.metadata, "entry_points", lambda *, group: entries)
 
     return add

@@ -57,9 +57,14 @@ class Block(NamedTuple):
 def blocks_of(page: Path) -> list[Block]:
     text = page.read_text()
     return [
-        Block(one["language"], one["text"], one["why"], text[: one.start("text")].count("\n") + 1)
-        for one in BLOCK.finditer(text)
-        if one["language"] in LANGUAGES
+        Block(
+            found["language"],
+            found["text"],
+            found["why"],
+            text[: found.start("text")].count("\n") + 1,
+        )
+        for found in BLOCK.finditer(text)
+        if found["language"] in LANGUAGES
     ]
 
 
@@ -82,8 +87,10 @@ def write_run(folder: Path, lost: int) -> None:
     )  # fmt: skip
     with RecordStore(folder) as store:
         for job in plan.jobs():
-            won = job.policy == "listener" or (job.setting == "explicit" and job.episode != lost)
-            store.append(make_record(job, *(("success",) if won else ("failure", "wrong"))))
+            if job.policy == "listener" or (job.setting == "explicit" and job.episode != lost):
+                store.append(make_record(job, "success"))
+            else:
+                store.append(make_record(job, "failure", "wrong"))
     write_plan(plan, folder)
 
 
@@ -97,7 +104,9 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def folder(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    policy = next(one.text for one in blocks_of(ROOT / "README.md") if "class MyPolicy" in one.text)
+    policy = next(
+        block.text for block in blocks_of(ROOT / "README.md") if "class MyPolicy" in block.text
+    )
     (tmp_path / "my_policy.py").write_text(policy)
     shutil.copytree(runs, tmp_path / "runs")
     (tmp_path / "results").symlink_to(ROOT / "results")

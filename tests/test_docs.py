@@ -7,6 +7,7 @@ import tomllib
 from collections import defaultdict
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -54,7 +55,9 @@ def test_every_dependency_is_explained_once():
     names = {re.split(r"[\[<>=]", requirement)[0] for requirement in wanted}
     names -= {"roboirgbench", "roboirg-learn"}
     table = (ROOT / "docs" / "dependencies.md").read_text()
+
     explained = re.findall(r"^\| ([\w-]+) \| [`(]", table, flags=re.MULTILINE)
+
     assert sorted(explained) == sorted(names)
 
 
@@ -70,10 +73,12 @@ def test_readme_s_policy_is_a_policy_in_fifteen_lines():
     block = next(block for block in python_blocks(README) if "class MyPolicy" in block)
     body = [line for line in block.splitlines() if line.strip() and not line.startswith("#")]
     assert len(body) <= 15
+
     namespace: dict = {}
     exec(block, namespace)  # noqa: S102 - it is our own README
     policy = namespace["MyPolicy"]()
     assert isinstance(policy, Policy)
+
     policy.reset("Do it.", {"front_rgb": np.zeros((0, 256, 256, 3), np.uint8)})
     actions = policy.act({"joint_positions": np.zeros(7, np.float32)})
     assert check_chunk(actions).shape == (1, 8)
@@ -97,27 +102,32 @@ def row_of(name: str, page: str = (ROOT / "docs" / "floors.md").read_text()) -> 
 
 
 def test_readme_repeats_the_published_averages():
-    rows = [row for row in published_rows("main") if row.model == "FrameS-Modul"]
-    averages = {row.options.setting: row.average for row in rows}
-    explicit = next(row for row in rows if row.options.setting == "explicit")
-    kept = {name: float(one / averages["explicit"]) for name, one in averages.items()}
-    assert f"succeeds in {averages['explicit']:.0f} %" in README
-    assert f"{averages['reasoning']:.0f} % is left with reasoning" in README
-    spatial = next(row for row in rows if row.options.setting == "spatial")
-    same = explicit.average_over([name for name, rate in spatial.rates.items() if rate is not None])
-    assert f"covers 7 tasks: {spatial.average:.0f} %, next to {same:.0f} % explicit" in README
-    kept["spatial"] = float(spatial.average / same)
-    assert 0.6 < kept.pop("direct") < 0.7
-    assert all(share < 0.5 for name, share in kept.items() if name != "explicit")
+    best = [row for row in published_rows("main") if row.model == "FrameS-Modul"]
+    rows = {row.options.setting: row for row in best}
+    explicit = rows["explicit"].average
+    spatial = rows["spatial"].average
+    with_spatial = [task for task, rate in rows["spatial"].rates.items() if rate is not None]
+    same_tasks = rows["explicit"].average_over(with_spatial)
+
+    assert f"succeeds in {explicit:.0f} %" in README
+    assert f"{rows['reasoning'].average:.0f} % is left with reasoning" in README
+    assert f"covers 7 tasks: {spatial:.0f} %, next to {same_tasks:.0f} % explicit" in README
+    # Lost are, as it says, a third in the direct setting and more than half in the others.
+    assert 0.6 < rows["direct"].average / explicit < 0.7
+    assert rows["reasoning"].average / explicit < 0.5
+    assert rows["contextual"].average / explicit < 0.5
+    assert spatial / same_tasks < 0.5
 
 
 def test_what_came_since_the_paper_is_the_file_s():
     rates = defaultdict(list)
     with (ROOT / "docs" / "robomme-since.csv").open(encoding="utf-8") as file:
-        for one in csv.DictReader(file):
-            rates[one["system"].split()[0]].append(float(one["success_percent"]))
+        for line in csv.DictReader(file):
+            rates[line["system"].split()[0]].append(float(line["success_percent"]))
     means = {system: np.mean(found) for system, found in rates.items()}
+
     page = (ROOT / "docs" / "comparability.md").read_text()
+
     assert f"| {means['GPT-6']:.1f} |" in row_of("GPT-6 Astra", page)
     assert f"| {means['agentic']:.1f} " in row_of("memory agent", page)
     assert f"reaches {means['GPT-6']:.0f} %" in README
@@ -126,10 +136,12 @@ def test_what_came_since_the_paper_is_the_file_s():
 def test_the_page_of_earlier_words_has_the_rows_of_its_file():
     rows = defaultdict(list)
     with (ROOT / "results" / "earlier-words.csv").open(encoding="utf-8") as file:
-        for one in csv.DictReader(file):
-            row = (one["row"], one["learned from"], one["split"], one["seeds"])
-            rows[row].append(f"{one['percent']} ({one['low']}–{one['high']})")
+        for line in csv.DictReader(file):
+            row = (line["row"], line["learned from"], line["split"], line["seeds"])
+            rows[row].append(f"{line['percent']} ({line['low']}–{line['high']})")
+
     lines = [f"| {' | '.join([*row, *rates])} |" for row, rates in rows.items()]
+
     assert "\n" + "\n".join(lines) + "\n\n" in (ROOT / "docs" / "earlier-words.md").read_text()
 
 
@@ -138,6 +150,7 @@ def test_what_a_guess_solves_is_the_same_on_all_pages():
     direct, reasoning, spatial = re.search(
         r"([\d.]+) in direct and contextual, ([\d.]+) in reasoning, ([\d.]+) in spatial", statistics
     ).groups()
+
     assert row_of("`forgetful` hears").endswith(
         f"100 | {direct} | {reasoning} | {direct} | {spatial} |"
     )
@@ -154,24 +167,23 @@ def test_what_a_guess_solves_is_the_same_on_all_pages():
 )
 def test_exact_rates_are_the_program_s(row, floor, setting):
     options = InstructionOptions(setting)
-    levels = [
-        floor_level(
-            floor,
-            (
-                Job(policy="", task=name, split="test", episode=number, options=options)
-                for number in range(50)
-            ),
-        )
-        for name in find_tasks(["all"])
-    ]
+    levels = []
+    for task in find_tasks(["all"]):
+        job = Job(policy="", task=task, split="test", episode=0, options=options)
+        jobs = [msgspec.structs.replace(job, episode=number) for number in range(50)]
+        levels.append(floor_level(floor, jobs))
+
     written = row_of(row).strip("| ").split(" | ")[1 + SETTINGS.index(setting)]
+
     assert float(written) == round(100 * float(sum(levels) / len(levels)), 1)
 
 
 def test_the_tasks_that_need_no_video_are_those_of_their_page():
     page = (ROOT / "docs" / "own-checkpoint.md").read_text()
     listed = re.search(r"Six are left: ([\w,\s]+)\.", page)[1]
+
     rows = re.findall(
         r"^\|[^|]*\| (\w+) \|[^|]*\| no \|$", (ROOT / "docs" / "tasks.md").read_text(), re.M
     )
+
     assert set(re.findall(r"[A-Z]\w+", listed)) == set(rows) & {*find_tasks(["all"])}

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 from importlib import metadata
-from pathlib import Path
 
 import pytest
 
@@ -26,14 +25,14 @@ def run_module(*arguments: str, **environment: str) -> subprocess.CompletedProce
 
 
 @pytest.mark.sim
-def test_a_healthy_machine_passes() -> None:
+def test_a_healthy_machine_passes():
     text = doctor.report(doctor.run_checks(render_s=1))
     assert text.endswith("All checks passed.")
     # Two cameras; a picture that is not drawn anew would take no time.
     assert re.search(r"ok    1 s of pictures +\d*[02468] pictures in 1 s\n", text), text
 
 
-def test_without_vulkan_the_remedy_is_named() -> None:
+def test_without_vulkan_the_remedy_is_named():
     result = run_module(VK_DRIVER_FILES="/nonexistent", VK_ICD_FILENAMES="/nonexistent")
     assert result.returncode == 1
     assert "not tried: no device" in result.stdout
@@ -44,13 +43,13 @@ def test_without_vulkan_the_remedy_is_named() -> None:
 
 
 @pytest.mark.sim
-def test_an_unknown_render_device_is_named_with_the_known_ones() -> None:
+def test_an_unknown_render_device_is_named_with_the_known_ones():
     result = run_module("--frame", ROBOIRG_RENDER_DEVICE="cuda:77")
     assert (result.returncode, result.stderr.count("\n")) == (1, 1), "no traceback"
     assert "'cuda:77' does not exist; set ROBOIRG_RENDER_DEVICE to one of " in result.stderr
 
 
-def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_package_is_named(monkeypatch):
     headless = "opencv-contrib-python-headless"
     versions = {"roboirgbench": "0.1.0", "av": "9.2", "sapien": "3.0.3", "jinja2": "3.2rc1"}
     versions[headless] = "5.0"
@@ -71,6 +70,7 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(metadata, "version", version)
     monkeypatch.setattr(metadata, "packages_distributions", lambda: {"cv2": [headless]})
     monkeypatch.setattr(metadata, "requires", lambda _: requirements)
+
     assert list(doctor._check_packages()) == [
         Check("roboirgbench", True, "0.1.0"),
         Check("numpy", False, "not installed; needs >=1.26", "pip install 'numpy>=1.26'"),
@@ -81,9 +81,10 @@ def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     ]
 
 
-def test_missing_model_files_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_model_files_are_named(tmp_path, monkeypatch):
     monkeypatch.setenv("ROBOIRG_MODEL_FILES", str(tmp_path))
     check = doctor._check_files()[0]
+
     assert not check.ok
     assert str(tmp_path) in check.found
     assert check.remedy.startswith("run: roboirg fetch-models")
@@ -96,17 +97,17 @@ def test_missing_model_files_are_named(tmp_path: Path, monkeypatch: pytest.Monke
         (-signal.SIGALRM, "drawn, then no picture within 120 s"),
     ],
 )
-def test_a_crash_of_the_driver_is_a_failed_check(
-    monkeypatch: pytest.MonkeyPatch, code: int, words: str
-) -> None:
+def test_a_crash_of_the_driver_is_a_failed_check(monkeypatch, code, words):
     crash = subprocess.CompletedProcess([], code, "a card\ndrawn\n", "")
     monkeypatch.setattr(subprocess, "run", lambda *_, **__: crash)
+
     device, frame = doctor._check_rendering()
+
     assert device.ok
     assert (frame.ok, frame.found) == (False, words)
 
 
-def test_the_report_has_a_remedy_below_every_failure() -> None:
+def test_the_report_has_a_remedy_below_every_failure():
     text = doctor.report([Check("a", True, "1"), Check("bb", False, "none", "install b")])
     assert text.splitlines() == [
         "ok    a   1",

@@ -53,11 +53,13 @@ def test_observations_hold_what_they_promise():
     assert info["demonstration"]["front_rgb"].shape == (33, 256, 256, 3)
     assert info["demonstration"]["joint_positions"].shape == (66, 7)
     assert info["elapsed_steps"] == 67
+
     # The video shows colored cubes, then only containers; so does the first observation.
     video = info["demonstration"]["front_rgb"].astype(int)
     colored = (np.ptp(video, axis=-1) > 200).any(axis=(1, 2))
     assert colored.tolist() == [True] * 16 + [False] * 17
     assert not (np.ptp(observation["front_rgb"].astype(int), axis=-1) > 200).any()
+
     observation, reward, terminated, truncated, info = env.step(HOME_ACTION)
     assert observation in env.observation_space
     assert (reward, terminated, truncated, info["steps"]) == (0.0, False, False, 1)
@@ -68,6 +70,7 @@ def test_depth_and_calibration_are_there_for_the_cameras_asked_for():
     env = roboirg.make("VideoUnmask", depth=True, calibration=True, **options)
     observation, info = env.reset()
     assert observation in env.observation_space
+
     fields = {
         "front_depth": ((256, 256, 1), np.int16),
         "front_extrinsic": ((3, 4), np.float32),
@@ -79,42 +82,48 @@ def test_depth_and_calibration_are_there_for_the_cameras_asked_for():
         frames = 2 if key == "front_depth" else 66
         assert (video.shape, video.dtype) == ((frames, *shape), kind)
     assert not any(key.startswith("wrist") for key in observation)
+
     plain = roboirg.make("VideoUnmask", **options).reset()[0]
     assert set(observation) - set(plain) == set(fields)
     assert np.array_equal(plain["front_rgb"], observation["front_rgb"])
 
 
-def test_subgoals_are_grounded_once_their_object_is_seen_and_then_frozen():
+def test_a_subgoal_is_grounded_once_its_object_is_seen():
     env = roboirg.make("VideoUnmask", episode=1, cameras=(), grounded=True)
     _, info = env.reset()
     assert info["demonstration_subgoals"] == ["static"] * 66
-    stage = env.episode.stages[0]
-    name = env.episode.scene.hidden_in(stage.points_at).color
-    assert info["subgoal"] == f"pick up the container that hides the {name} cube"
-    found = re.fullmatch(
-        rf"pick up the container at <(\d+), (\d+)> that hides the {name} cube",
-        info["grounded_subgoal"],
-    )
-    x, y, _ = env.episode.scene[stage.points_at].position
+
+    container = env.episode.stages[0].points_at
+    color = env.episode.scene.hidden_in(container).color
+    assert info["subgoal"] == f"pick up the container that hides the {color} cube"
+    grounded = rf"pick up the container at <(\d+), (\d+)> that hides the {color} cube"
+    row, column = map(int, re.fullmatch(grounded, info["grounded_subgoal"]).groups())
     # Projected by hand; the center of a container is some 4 cm above the table.
+    x, y, _ = env.episode.scene[container].position
     z = 0.04
     distance = -0.44721 * x - 0.89443 * z + 0.49194
-    row = 128 + 128 * (0.89443 * x - 0.44721 * z - 0.08944) / distance
-    column = 128 + 128 * y / distance
-    assert (int(found[1]), int(found[2])) == pytest.approx((row, column), abs=6)
-    texts = {(info["subgoal"], info["grounded_subgoal"])}
+    assert row == pytest.approx(128 + 128 * (0.89443 * x - 0.44721 * z - 0.08944) / distance, abs=6)
+    assert column == pytest.approx(128 + 128 * y / distance, abs=6)
+
+
+def test_a_grounded_subgoal_is_frozen_until_its_stage_is_over():
+    """Lifting moves the container, not its pixel; after the end the last one stays."""
+    env = roboirg.make("VideoUnmask", episode=1, cameras=(), grounded=True)
+    _, info = env.reset()
     policy = make_policy("oracle", 0)
     policy.attach(env)
     policy.reset(env.instruction.text, info["demonstration"])
+
+    subgoals = {info["subgoal"]: {info["grounded_subgoal"]}}
     while info["status"] == "ongoing":
         before = info
         *_, info = env.step_chunk(policy.act({}))
-        texts.add((info["subgoal"], info["grounded_subgoal"]))
-    # Lifting moves the container, not its pixel; after the end the last one stays.
-    assert info["status"] == "success"
-    assert info["subgoal"] == "All tasks completed"
+        subgoals.setdefault(info["subgoal"], set()).add(info["grounded_subgoal"])
+
+    assert (info["status"], info["subgoal"]) == ("success", "All tasks completed")
     assert info["grounded_subgoal"] == before["grounded_subgoal"]
-    assert len(texts) == len(env.episode.stages) + 1
+    assert len(subgoals) == len(env.episode.stages) + 1
+    assert all(len(grounded) == 1 for grounded in subgoals.values())
 
 
 def test_subgoals_change_one_step_after_their_stage_and_only_pointing_ones_are_grounded():
@@ -128,11 +137,14 @@ def test_subgoals_change_one_step_after_their_stage_and_only_pointing_ones_are_g
             changes.append((env.session.world.elapsed, pair))
 
     env.set_frame_hook(note)
-    assert play(env, make_policy("oracle", 0))["status"] == "success"
-    happened = [
-        next(event.step for event in env.events if event.fact == stage.expects)
-        for stage in env.episode.stages
-    ]
+
+    info = play(env, make_policy("oracle", 0))
+
+    assert info["status"] == "success"
+    steps = {}
+    for event in reversed(env.events):
+        steps[event.fact] = event.step  # at last the first
+    happened = [steps[stage.expects] for stage in env.episode.stages]
     assert [step for step, _ in changes[1:-1]] == [step + 1 for step in happened[:-1]]
     assert changes[-1][0] == happened[-1]
     for stage, (_, (simple, grounded)) in zip(env.episode.stages, changes, strict=False):
@@ -142,17 +154,23 @@ def test_subgoals_change_one_step_after_their_stage_and_only_pointing_ones_are_g
 
 def test_make_is_typed_with_the_options_of_the_environment():
     typed = {name: hint.__forward_arg__ for name, hint in EnvOptions.__annotations__.items()}
-    shared = {*OPTION_NAMES, *ENVIRONMENT_OPTIONS}
-    own = {name: hint for name, hint in typed.items() if name not in shared}
-    settings = {option.name: option.type for option in dataclasses.fields(EnvSettings)}
-    nested = ("words", "environment")
-    assert own == {name: hint for name, hint in settings.items() if name not in nested}
-    assert typed.keys() == {*own, *shared}
-    documented = inspect.getdoc(roboirg.make).partition("Keyword Args:")[2].partition("Raises:")[0]
-    assert re.findall(r"^    (\w+): ", documented, re.MULTILINE) == list(own)
+    own = {option.name: option.type for option in dataclasses.fields(EnvSettings)}
+    del own["words"], own["environment"]  # whose fields are options
+
+    assert typed.keys() == {*own, *OPTION_NAMES, *ENVIRONMENT_OPTIONS}
+    assert {name: typed[name] for name in own} == own
     for made in (roboirg.make, RoboIRGEnv):
         annotation = inspect.signature(made).parameters["options"].annotation
         assert annotation == "Unpack[EnvOptions]"
+
+
+def test_options_of_make_are_documented_and_others_are_refused():
+    _, _, documented = inspect.getdoc(roboirg.make).partition("Keyword Args:")
+    documented, _, _ = documented.partition("Raises:")
+    shared = {*OPTION_NAMES, *ENVIRONMENT_OPTIONS}
+    own = [name for name in EnvOptions.__annotations__ if name not in shared]
+
+    assert re.findall(r"^    (\w+): ", documented, re.MULTILINE) == own
     with pytest.raises(UnknownNameError, match=r"option of make\(\) 'camera'.*mean 'cameras'"):
         roboirg.make("PickXtimes", camera=("front",))
 
@@ -168,6 +186,7 @@ def test_an_environment_without_what_a_policy_looks_at_is_refused(attribute):
     policy = make_policy("random", 0)
     setattr(policy, attribute, True)
     policy.cameras = ("front",)
+
     with pytest.raises(InvalidValueError, match=f"make it with {attribute}=True"):
         play(roboirg.make("PickXtimes", cameras=()), policy)
 
@@ -183,6 +202,7 @@ def test_runs_give_policies_their_action_space():
 def test_tasks_without_a_video_have_an_empty_demonstration():
     env = roboirg.make("PickXtimes", cameras=("wrist",))
     observation, info = env.reset()
+
     assert set(observation) == set(env.observation_space)
     assert "front_rgb" not in observation
     assert {key: len(value) for key, value in info["demonstration"].items()} == {
@@ -203,13 +223,15 @@ def test_the_frame_hook_is_called_at_its_period_and_at_the_end():
     info = play(env, make_policy("oracle", 0))
     last = info["elapsed_steps"]
     expected = [step for step in range(1, last + 1) if step % 8 == 0 or step == last]
+
     assert [step for step, _ in calls] == expected
     assert [demonstration for step, demonstration in calls] == [step <= 66 for step in expected]
 
 
 def test_a_chunk_does_what_its_rows_do_keeps_every_nth_observation_and_stops_at_the_end():
     rng = np.random.default_rng(0)
-    actions = HOME_ACTION + np.append(rng.normal(0, 0.1, (27, 7)), rng.normal(0, 1, (27, 1)), 1)
+    noise = np.append(rng.normal(0, 0.1, (27, 7)), rng.normal(0, 1, (27, 1)), 1)
+    actions = HOME_ACTION + noise
     options = {"cameras": ("wrist",), "depth": True, "max_steps": 25}
     single = roboirg.make("PickXtimes", **options)
     single.reset()
@@ -217,38 +239,46 @@ def test_a_chunk_does_what_its_rows_do_keeps_every_nth_observation_and_stops_at_
     env = roboirg.make("PickXtimes", **options, observe_every=4)
     first, _ = env.reset()
     assert first["history"] == ()
-    for rows, due in (
+
+    for rows, kept in (
         (actions[:3], []),
         (actions[3:10], [4, 8]),
         (actions[10:20], [12, 16, 20]),
         (actions[20:], [24]),
     ):
         observation, *ended, info = env.step_chunk(rows)
+
         assert observation in env.observation_space
-        _, *alone_ended, alone_info = steps[info["steps"]]
-        assert (ended, info["status"]) == (alone_ended, alone_info["status"])
-        seen = dict(observation)
-        history = seen.pop("history")
-        assert len(history) == len(due)
-        for some, step in ((seen, info["steps"]), *zip(history, due, strict=True)):
-            expected = steps[step][0]
-            assert list(some) == list(expected)
-            for key, value in expected.items():
-                assert np.array_equal(some[key], value), (step, key)
+        _, *ended_alone, info_alone = steps[info["steps"]]
+        assert (ended, info["status"]) == (ended_alone, info_alone["status"])
+        last = dict(observation)
+        history = last.pop("history")
+        assert len(history) == len(kept)
+        for seen, step in zip((*history, last), (*kept, info["steps"]), strict=True):
+            check_same(seen, steps[step][0])
     assert ended == [0.0, False, True]
     assert info["status"] == "timeout"
     assert env.events == single.events
 
 
+def check_same(seen, expected):
+    assert list(seen) == list(expected)
+    for key, value in expected.items():
+        assert np.array_equal(seen[key], value), key
+
+
 def test_history_may_have_fewer_cameras(monkeypatch):
-    drawn, picture = [], Cameras.picture
+    drawn = []
+    picture = Cameras.picture
     monkeypatch.setattr(
         Cameras, "picture", lambda self, name: drawn.append(name) or picture(self, name)
     )
     env = roboirg.make("PickXtimes", observe_every=8, history_cameras=("front",))
     env.reset()
     drawn.clear()
+
     observation, *_ = env.step_chunk(np.tile(HOME_ACTION, (20, 1)))
+
     assert observation in env.observation_space
     assert drawn == ["front", "front", "front", "wrist"]
     for seen in observation["history"]:
@@ -276,6 +306,7 @@ def test_policies_are_shown_what_they_ask_for():
     wrong = roboirg.make("PickXtimes", cameras=(), demonstration_frames="none")
     with pytest.raises(InvalidValueError, match=r"needs observe_every=5, but .* has None"):
         play(wrong, policy)
+
     name = f"{__name__}:Choosy"
     job = job_of(policy=name, task="PickXtimes", split="test", episode=2, setting="direct")
     env = make_env(
@@ -283,6 +314,7 @@ def test_policies_are_shown_what_they_ask_for():
     )
     env.max_steps = 20
     play(env, policy)
+
     assert policy.seen == [3, 0, 1, 1]
 
 
@@ -291,8 +323,10 @@ def test_a_reset_makes_the_words_again_only_for_other_options():
     said = env.instruction
     env.reset()
     assert env.instruction is said
+
     env.reset(options={"setting": "direct"})
     assert env.instruction.setting == "direct"
+
     env.reset()
     assert env.instruction == said
 
@@ -302,10 +336,12 @@ def test_angles_of_the_tool_do_not_jump():
     observation, _ = env.reset()
     angles = [observation["end_effector"][3:]]
     action = HOME_ACTION.copy()
+
     for step in range(60):
         action[6] = HOME_ACTION[6] + 1.5 * np.sin(step / 10)
         action[4] = 0.05 * np.cos(step / 3)
         angles.append(env.step(action)[0]["end_effector"][3:])
+
     assert np.abs(np.diff(angles, axis=0)).max() < 0.5
 
 
@@ -315,6 +351,7 @@ def test_a_closed_environment_lets_go_of_its_world():
     assert play(env, policy)["status"] == "timeout"
     with pytest.raises(gymnasium.error.ResetNeeded, match="timeout"):
         env.step(HOME_ACTION)
+
     world = weakref.ref(env.session.world)
     env.close()
     del policy
@@ -380,5 +417,6 @@ def test_without_vulkan_or_the_simulator_what_can_is_done_and_what_to_install_is
         check=False,
         env={**os.environ, **missing},
     )
+
     assert (done.returncode, done.stdout) == (1, printed)
     assert complaint in done.stderr.strip().splitlines()[-1]

@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[1]
 def test_from_a_checkout_it_names_the_folder(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert install_command("sim").endswith(f"install -e '{ROOT}[sim]'")
+
     monkeypatch.chdir(ROOT)
     assert install_command("sim").endswith("install -e '.[sim]'")
 
@@ -41,6 +42,7 @@ def test_elsewhere_it_names_what_pip_installed_from(monkeypatch, tmp_path, noted
     installed = SimpleNamespace(read_text=kept.__getitem__)
     monkeypatch.setattr(extras, "_CHECKOUT", tmp_path)
     monkeypatch.setattr(metadata, "distribution", lambda name: installed)
+
     assert install_command("vlm").endswith(f"install {wanted}")
 
 
@@ -49,6 +51,7 @@ def test_another_python_s_pip_is_not_named(monkeypatch, tmp_path):
     (tmp_path / "pip").chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
     assert install_command("sim").startswith(f"{sys.executable} -m pip install ")
+
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
     assert install_command("sim").startswith("pip install ")
 

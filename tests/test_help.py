@@ -1,7 +1,5 @@
 """The command line stays small, and the help of every command is short and has an example."""
 
-from __future__ import annotations
-
 import re
 import shlex
 from typing import get_type_hints
@@ -20,7 +18,9 @@ from roboirg.runs.plan.plan_fields import plan_options
 from roboirg.runs.plan.plan_file import plan_text, read_plan_file
 from roboirg.runs.plan.plan_maker import make_plan
 
-LINES, LINES_OF_RUN, COLUMNS = 45, 60, 100
+LINES = 45
+LINES_OF_RUN = 60
+COLUMNS = 100
 
 
 def help_of(name, columns, monkeypatch, capsys):
@@ -35,16 +35,18 @@ def test_the_command_line_is_small():
     found = count_commands.commands()
     assert count_commands.entries() <= count_commands.MOST_ENTRIES
     assert len(found) - 1 <= count_commands.MOST_COMMANDS
-    assert sum(len(one.parameters) for one in found) <= count_commands.MOST_PARAMETERS
+    assert sum(len(command.parameters) for command in found) <= count_commands.MOST_PARAMETERS
 
 
 @pytest.mark.parametrize("name", sorted(all_commands()))
 def test_help_is_short_and_has_an_example(name, monkeypatch, capsys):
     text = help_of(name, COLUMNS, monkeypatch, capsys)
     assert len(text.strip().splitlines()) <= (LINES_OF_RUN if name == "run" else LINES)
+
     (example,) = re.findall(r"Example: roboirg (.*)", text)
     words = shlex.split(example)
     assert words[: len(name.split())] == name.split()
+
     # Click refuses what the command does not take.
     all_commands()[name].make_context(name, words[len(name.split()) :])
 
@@ -55,10 +57,13 @@ def test_help_cuts_no_word_and_is_no_wider_than_the_terminal(name, monkeypatch, 
     assert max(map(len, text.splitlines())) <= 80
     # Addresses are written scheme://….
     assert not [word for word in text.split() if "…" in word and "://…" not in word]
+
     options = {
-        name for one in all_commands()[name].params for name in one.opts + one.secondary_opts
+        name
+        for parameter in all_commands()[name].params
+        for name in parameter.opts + parameter.secondary_opts
     }
-    assert {one for one in options if one.startswith("-")} <= set(text.split())
+    assert {option for option in options if option.startswith("-")} <= set(text.split())
 
 
 @pytest.mark.parametrize("episodes", ["3,0-2,7", "7,"])  # 7 alone would be the first seven
@@ -70,10 +75,11 @@ def test_a_plan_explains_all_of_its_fields_and_is_read_back(tmp_path, episodes):
         video="failures", devices="0,1", retry_on="none", wordings="train",
     )  # fmt: skip
     text = plan_text(plan)
-    for one in plan_options():
-        assert one.help in " ".join(text.replace("\n# ", " ").split())
-        assert f"\n{one.name}:" in text
+    for option in plan_options():
+        assert option.help in " ".join(text.replace("\n# ", " ").split())
+        assert f"\n{option.name}:" in text
     assert "bär=listener" in text
+
     (tmp_path / "plan.yaml").write_text(text)
     fields = read_plan_file(str(tmp_path / "plan.yaml"))
     assert make_plan(fields.pop("policies"), **fields) == plan
@@ -81,6 +87,9 @@ def test_a_plan_explains_all_of_its_fields_and_is_read_back(tmp_path, episodes):
 
 def test_options_of_instructions_are_listed_once():
     assert set(get_type_hints(InstructionKeywords)) == set(OPTION_NAMES)
-    (shown,) = (one.parameters for one in count_commands.commands() if one.words == "show")
+
+    (shown,) = (
+        command.parameters for command in count_commands.commands() if command.words == "show"
+    )
     own = {"setting", "form", "delivery"}
     assert {f"--{name}" for name in OPTION_NAMES if name not in own} <= set(shown)

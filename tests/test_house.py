@@ -14,7 +14,10 @@ import layout
 import pytest
 from house_rooms import PACKAGE, PACKAGES, ROOT, SOURCES, TESTS, house_files
 
-EVERY = [*SOURCES, *(path for one in PACKAGES for path in one.rglob("*.py") if path not in TESTS)]
+EVERY = [
+    *SOURCES,
+    *(path for package in PACKAGES for path in package.rglob("*.py") if path not in TESTS),
+]
 """The benchmark's files and those of the packages next to it."""
 
 MOST_ROOMS = 21
@@ -85,7 +88,9 @@ def lines_of(suffixes):
     """Return the lines of files with these endings, without tests and what describes packages."""
     folders = (PACKAGE, ROOT / "packages", ROOT / "integrations")
     paths = [path for folder in folders for path in folder.rglob("*") if path.suffix in suffixes]
-    counted = [one for one in paths if "tests" not in one.parts and one.name != "pyproject.toml"]
+    counted = [
+        path for path in paths if "tests" not in path.parts and path.name != "pyproject.toml"
+    ]
     return sum(path.read_text("utf-8").count("\n") for path in counted)
 
 
@@ -102,13 +107,16 @@ def test_the_house_stays_under_its_ceilings():
     counts["lines_of_data"] = lines_of(DATA)
     allowed = Counter({f"rooms.{room}": most for room, most in ceilings.pop("rooms").items()})
     whole = ceilings.pop("nodes")
+
     assert sum(allowed.values()) == whole, "the rooms' ceilings add up to the whole's"
+
     del ceilings["growth"]
     allowed.update(ceilings)
     found = []
     for name, count in counts.items():
         if count > allowed[name]:
             found.append(f"{name} has {count:,.2f}; it may have {allowed[name]:,}: let things go")
+
     check_empty(found)
 
 
@@ -124,6 +132,7 @@ def test_ceilings_rise_only_by_a_growth_that_they_name():
     stored = [tomllib.loads(git("show", f"{commit}:{name}")) for commit in commits]
     newest = tomllib.loads(CEILINGS.read_text("utf-8"))
     found = []
+
     for after, before in itertools.pairwise([newest, *stored]):
         known = before.get("growth", [])
         new = [growth for growth in after.get("growth", []) if growth not in known]
@@ -131,6 +140,7 @@ def test_ceilings_rise_only_by_a_growth_that_they_name():
             most = before[key] + sum(growth.get(key, 0) for growth in new)
             if after[key] > most:
                 found.append(f"{key} rose from {before[key]} to {after[key]}; it may have {most}")
+
     check_empty(found)
 
 
@@ -168,9 +178,11 @@ def test_packages_import_documented_names_alone():
                 names.add(("roboirg", node.attr))
     page = (ROOT / "docs" / "architecture.md").read_text("utf-8")
     known = re.compile(r"roboirg(\.extension\.\w+)?")
+
     found = [
-        one for one in sorted(names) if f"`{one[1]}`" not in page or not known.fullmatch(one[0])
+        name for name in sorted(names) if f"`{name[1]}`" not in page or not known.fullmatch(name[0])
     ]
+
     check_empty(found)
     assert 40 < len(names) <= MOST_NAMES
 

@@ -26,23 +26,26 @@ def test_a_notebook_runs(notebook, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
     kept = [kinds(cell) for cell in notebook.cells]
+
     nbclient.NotebookClient(
         notebook, timeout=None, resources={"metadata": {"path": str(tmp_path)}}
     ).execute()
+
     assert [kinds(cell) for cell in notebook.cells] == kept, "its outputs are old: execute it"
 
 
 def kinds(cell):
-    return {(one.output_type, one.get("name")) for one in cell.get("outputs", ())}
+    return {(output.output_type, output.get("name")) for output in cell.get("outputs", ())}
 
 
 def test_a_notebook_is_small_and_shows_its_outputs(notebook):
     nbformat.validate(notebook)
     text = nbformat.writes(notebook)
+
     assert len(text.encode()) < MAX_SIZE
     assert any(cell.get("outputs") for cell in notebook.cells)
     for cell in notebook.cells:
-        for one in cell.get("outputs", ()):
-            assert one.output_type != "error"
-            if "image/png" in one.get("data", {}):
-                assert len(base64.b64decode(one.data["image/png"])) < MAX_SIZE
+        for output in cell.get("outputs", ()):
+            assert output.output_type != "error"
+            if "image/png" in output.get("data", {}):
+                assert len(base64.b64decode(output.data["image/png"])) < MAX_SIZE

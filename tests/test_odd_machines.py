@@ -54,7 +54,7 @@ def test_a_proxy_is_named_and_this_machine_needs_none(bare, url, named):
     ("proxy", "secret"),
     [
         *((proxy, "secret") for proxy in ("socks5://h:1", "socks://h:1", "http://h:1x")),
-        *(("http://h:1", f"sec{one}ret") for one in "/?#\n "),
+        *(("http://h:1", f"sec{mark}ret") for mark in "/?#\n "),
     ],
 )
 def test_a_proxy_that_cannot_be_used_is_one_sentence(bare, proxy, secret):
@@ -62,6 +62,7 @@ def test_a_proxy_that_cannot_be_used_is_one_sentence(bare, proxy, secret):
     bare.setitem(sys.modules, "socksio", None)
     with pytest.raises(MissingDependencyError, match=f"proxy {proxy} of ALL_PROXY cannot be used"):
         make_model(ModelOptions(model="m", base_url="http://models.org/v1"))
+
     make_model(ModelOptions(model="m", base_url="http://127.0.0.1:8/v1"))
 
 
@@ -70,7 +71,9 @@ def test_without_a_home_folders_are_temporary(monkeypatch, tmp_path):
     monkeypatch.setattr("pwd.getpwuid", {}.__getitem__)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setattr("os.getuid", lambda: tmp_path.stat().st_uid)
+
     folder = tmp_path / f"roboirgbench-{os.getuid()}"
+
     assert user_folder("data", below="servers") == folder / "servers"
     assert folder.stat().st_mode & 0o777 == 0o700
 
@@ -82,6 +85,7 @@ def test_a_temporary_folder_that_another_user_made_a_link_is_refused(monkeypatch
     link = tmp_path / f"roboirgbench-{os.getuid()}"
     link.symlink_to("ours")
     os.chown(link, 12345, -1, follow_symlinks=False)
+
     with pytest.raises(InvalidValueError, match="belongs to another user"):
         temporary_folder()
 
@@ -101,7 +105,9 @@ def test_a_worker_is_watched_without_shared_memory(monkeypatch, has_memory):
     watchdog = Watchdog()
     child = ChildProcess.spawn(hang, watchdog)
     child.receive()
+
     assert watchdog.phase == "policy's act()"
+
     child.end()
 
 
@@ -113,6 +119,7 @@ def test_what_the_output_cannot_show_is_replaced(monkeypatch, encoding, shown):
     monkeypatch.setattr(cli, "app", lambda **_: out.write("≠"))
     with pytest.raises(SystemExit):
         cli.main()
+
     out.flush()
     assert out.buffer.getvalue() == shown
 
@@ -122,11 +129,13 @@ def test_the_doctor_names_what_is_odd(bare, tmp_path):
     bare.setenv("ROBOIRG_CACHE", "~nobody-here/x")
     bare.setenv("http_proxy", "http://a:b@h:1")
     _, files, cache, _, proxies = doctor._check_files()
+
     assert (files.ok, files.found, cache.ok) == (False, "No such file or directory", False)
     assert (cache.found, cache.remedy) == (
         "ROBOIRG_CACHE is '~nobody-here/x', but there is no such home",
         "write the whole path.",
     )
     assert proxies == Check("proxies", True, "through the proxy http://h:1 of http_proxy")
+
     bare.setenv("http_proxy", "socks://h:1")
     assert doctor._check_files()[-1].ok

@@ -1,9 +1,5 @@
 """How many cores a command uses."""
 
-from __future__ import annotations
-
-from pathlib import Path
-
 import pytest
 
 from roboirg.util import processor
@@ -24,15 +20,14 @@ from roboirg.util import processor
         ({"quota": "400000", "period": "100000"}, 4),
     ],
 )
-def test_a_container_has_the_cores_of_its_limit(
-    limits: dict[str, str], cores: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_container_has_the_cores_of_its_limit(limits, cores, tmp_path, monkeypatch):
     """Otherwise it starts a worker for each core of its host, and runs out of memory."""
     for name, text in limits.items():
         (tmp_path / name).write_text(f"{text}\n")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(processor, "_CPU_QUOTAS", (("max",), ("quota", "period")))
     monkeypatch.setattr("os.sched_getaffinity", lambda _process: set(range(8)))
+
     assert processor.core_count() == cores
 
 
@@ -43,9 +38,7 @@ def test_a_container_has_the_cores_of_its_limit(
         (9, "one per core, or about 8 per GPU that renders if the policy wants every picture"),
     ],
 )
-def test_a_gpu_is_shared_by_no_more_workers_than_it_serves(
-    cores: int, advice: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_gpu_is_shared_by_no_more_workers_than_it_serves(cores, advice, monkeypatch):
     """Sixteen were slower than eight on the GPU that was measured; chunks are bound by cores."""
     monkeypatch.setattr(processor, "core_count", lambda: cores)
     assert processor.worker_advice() == advice

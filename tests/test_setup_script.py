@@ -66,11 +66,11 @@ def apt_dir(tmp_path: Path) -> Path:
         ("", False),
     ],
 )
-def test_versions_are_compared_as_numbers(version: str, enough: bool) -> None:
+def test_versions_are_compared_as_numbers(version, enough):
     assert (bash(f"version_at_least '{version}' 23.2").returncode == 0) is enough
 
 
-def test_backports_use_the_mirror_and_key_of_a_deb822_source(apt_dir: Path) -> None:
+def test_backports_use_the_mirror_and_key_of_a_deb822_source(apt_dir):
     (apt_dir / "sources.list.d" / "debian.sources").write_text(DEB822)
     assert bash("backports_source bookworm", apt_dir).stdout == (
         "Types: deb\n"
@@ -81,9 +81,10 @@ def test_backports_use_the_mirror_and_key_of_a_deb822_source(apt_dir: Path) -> N
     )
 
 
-def test_a_key_inside_the_source_is_kept_as_it_is(apt_dir: Path) -> None:
+def test_a_key_inside_the_source_is_kept_as_it_is(apt_dir):
     (apt_dir / "sources.list.d" / "ubuntu.sources").write_text(EMBEDDED_KEY)
     source = bash("backports_source noble", apt_dir).stdout
+
     assert "Suites: noble-backports\n" in source
     assert source.endswith("\n -----BEGIN PGP PUBLIC KEY BLOCK-----\n .\n abc=\n")
 
@@ -99,29 +100,32 @@ def test_a_key_inside_the_source_is_kept_as_it_is(apt_dir: Path) -> None:
         ),
     ],
 )
-def test_backports_use_the_mirror_and_key_of_a_one_line_source(
-    apt_dir: Path, line: str, key: str
-) -> None:
+def test_backports_use_the_mirror_and_key_of_a_one_line_source(apt_dir, line, key):
     security = "deb http://security.example/debian bookworm-security main"
     source_line = "deb-src http://source.example/debian bookworm main"
     (apt_dir / "sources.list").write_text(f"# deb no\n{source_line}\n{security}\n{line} # why\n")
+
     source = bash("backports_source bookworm", apt_dir).stdout
+
     assert "URIs: http://mirror.example/debian\nSuites: bookworm-backports\n" in source
     assert source.partition("Signed-By: ")[2].strip() == key
 
 
-def test_files_that_apt_ignores_are_ignored(apt_dir: Path) -> None:
+def test_files_that_apt_ignores_are_ignored(apt_dir):
     line = "deb http://wrong.example/debian bookworm main\n"
     for name in ("a.list.disabled", "b.list~", "c.save", "d,e.list"):
         (apt_dir / "sources.list.d" / name).write_text(line)
+
     assert bash("archives", apt_dir).stdout == ""
     assert bash("backports_source bookworm", apt_dir).returncode == 1
 
 
-def test_the_administrator_is_told_every_command(apt_dir: Path) -> None:
+def test_the_administrator_is_told_every_command(apt_dir):
     (apt_dir / "sources.list.d" / "debian.sources").write_text(DEB822)
     fakes = "mesa_candidate() { echo 22.3.6-1; }; distribution_codename() { echo bookworm; }; "
+
     commands = bash(fakes + "administrator_commands ${VULKAN_PACKAGES[*]}", apt_dir).stdout
+
     assert commands.startswith(f"cat > {apt_dir}/sources.list.d/roboirg-backports.sources <<'END'")
     assert commands.endswith(
         "apt-get update\napt-get install --target-release bookworm-backports "
@@ -136,7 +140,7 @@ def test_the_administrator_is_told_every_command(apt_dir: Path) -> None:
         ("22.3.6-1", "OPENCV", "libgl1 libglib2.0-0"),  # which needs no newer Mesa
     ],
 )
-def test_no_backports_are_asked_for_without_need(apt_dir: Path, mesa, packages, names) -> None:
+def test_no_backports_are_asked_for_without_need(apt_dir, mesa, packages, names):
     code = f"mesa_candidate() {{ echo {mesa}; }}; "
     code += f"administrator_commands ${{{packages}_PACKAGES[*]}}"
     assert bash(code, apt_dir).stdout == f"apt-get update\napt-get install {names}\n"
@@ -176,7 +180,7 @@ def installed(checkout: Path, words: str = "") -> list[str]:
     return [line.partition("installing ")[2] for line in done.stdout.splitlines() if "[" in line]
 
 
-def test_developers_packages_come_when_they_are_asked_for(checkout: Path) -> None:
+def test_developers_packages_come_when_they_are_asked_for(checkout):
     assert installed(checkout) == ["[sim,report]"]
     assert installed(checkout) == []
     assert installed(checkout, "dev") == ["[sim,report,dev]"]
@@ -185,20 +189,21 @@ def test_developers_packages_come_when_they_are_asked_for(checkout: Path) -> Non
     assert installed(checkout, "dev") == []
 
 
-def test_changed_requirements_are_installed_and_no_more(checkout: Path) -> None:
+def test_changed_requirements_are_installed_and_no_more(checkout):
     installed(checkout, "dev")
     (checkout / "pyproject.toml").write_text("[project]\ndependencies = []")
+
     assert installed(checkout) == ["[sim,report]"]
     assert installed(checkout, "dev") == ["[sim,report,dev]"]
 
 
-def test_an_unknown_argument_of_set_up_is_refused() -> None:
+def test_an_unknown_argument_of_set_up_is_refused():
     done = bash("main docs")
     assert done.returncode == 1
     assert "unknown argument 'docs'" in done.stderr
 
 
-def test_every_target_that_checks_or_writes_documents_sets_up_for_developers() -> None:
+def test_every_target_that_checks_or_writes_documents_sets_up_for_developers():
     targets = ["lint", "test", "test-slow", "test-all", "docs", "card"]
     for target in [*targets, "demo", "play", "setup"]:
         dry = subprocess.run(
@@ -206,4 +211,4 @@ def test_every_target_that_checks_or_writes_documents_sets_up_for_developers() -
             check=True,
         )  # fmt: skip
         wanted = "scripts/setup dev" if target in targets else "scripts/setup"
-        assert [one for one in dry.stdout.splitlines() if "scripts/setup" in one] == [wanted]
+        assert [line for line in dry.stdout.splitlines() if "scripts/setup" in line] == [wanted]

@@ -59,8 +59,8 @@ def pages(site):
 
 
 def test_every_page_of_the_docs_is_on_the_site(site, pages):
-    wanted = {one.relative_to(ROOT / "docs").with_suffix(".html") for one in
-              (ROOT / "docs").rglob("*") if one.suffix in (".md", ".ipynb")}  # fmt: skip
+    wanted = {page.relative_to(ROOT / "docs").with_suffix(".html") for page in
+              (ROOT / "docs").rglob("*") if page.suffix in (".md", ".ipynb")}  # fmt: skip
     assert wanted < {page.relative_to(site) for page in pages}
     assert (
         len(pages) == len(wanted) + 5
@@ -84,7 +84,9 @@ def test_no_link_is_dead(pages):
 
 def test_nothing_is_loaded_from_elsewhere(pages):
     for page, found in pages.items():
-        assert not [one for one in found.loaded if urlsplit(one).scheme not in ("", "data")], page
+        assert not [link for link in found.loaded if urlsplit(link).scheme not in ("", "data")], (
+            page
+        )
 
 
 def test_the_search_knows_pages_notebooks_and_the_reference(site):
@@ -96,15 +98,17 @@ def test_the_search_knows_pages_notebooks_and_the_reference(site):
 def test_the_reference_has_the_public_names(pages):
     names = set().union(*(found.names for found in pages.values()))
     wanted = {f"roboirg.{name}" for name in roboirg.__all__ if not name.startswith("_")}
+
     wanted |= {
         "roboirg.envs.environment.RoboIRGEnv.step",
         "roboirg.policies.Policy.act",
         "roboirg.records.record.Record",
     }
+
     assert wanted <= names
 
 
 def test_the_reference_has_every_command(pages):
     names = set().union(*(found.names for found in pages.values()))
-    wanted = {f"roboirg {one.words}".strip() for one in count_commands.commands()[1:]}
-    assert {one.replace(" ", "-") for one in wanted} <= names
+    wanted = {f"roboirg {command.words}".strip() for command in count_commands.commands()[1:]}
+    assert {command.replace(" ", "-") for command in wanted} <= names

@@ -111,9 +111,9 @@ def test_sampled_episodes_follow_the_cycle_and_the_rule_of_seeds(task):
 @each_task
 def test_counts_are_of_sampled_episodes_and_stay_below_the_next_one_s_seeds(task):
     sampled = {
-        f"{one.split}/{one.index}"
-        for one in episodes(task)
-        if published_episode(*slot(one)) is None
+        f"{episode.split}/{episode.index}"
+        for episode in episodes(task)
+        if published_episode(*slot(episode)) is None
     }
     assert set(shipped_splits()[task].passed_over) <= sampled
     assert all(0 < count <= MAX_REJECTED for count in shipped_splits()[task].passed_over.values())
@@ -141,6 +141,7 @@ def test_a_fingerprint_tells_small_changes_but_not_the_last_bits():
     # Mathematics libraries differ by as much.
     assert fingerprint([turned(1e-14)]) == fingerprint([episode])
     assert fingerprint([episode]) == fingerprint([get_episode("PickXtimes", "test", 3)])
+
     other = get_episode("PickXtimes", "test", 2)
     assert fingerprint([episode, other]) != fingerprint([other, episode])
 
@@ -156,6 +157,7 @@ def test_only_plain_data_has_a_fingerprint():
 def test_the_file_reads_back_and_has_a_line_for_each_task():
     splits = {"A": TaskSplits("0f", {"train/3": 2}), "B": TaskSplits("ff", {})}
     text = splits_text(splits)
+
     assert len(text.splitlines()) == 4
     assert {task: TaskSplits(**entry) for task, entry in json.loads(text).items()} == splits
 
@@ -185,5 +187,7 @@ def test_a_task_without_shipped_seeds_passes_over_those_without_a_scene(monkeypa
 
     picky = dataclasses.replace(task, name="Picky", sample=sample)
     monkeypatch.setattr(splits, "get_task", lambda _name: picky)
+
     picked = splits.get_episode("Picky", "val", 7)
+
     assert picked.seed == first + 3

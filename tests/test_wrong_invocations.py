@@ -35,18 +35,18 @@ def wrong_words(command, words):
     """Yield kinds of mistakes, with variations of right words that have one, for a command."""
     yield "unknown option", [*words, "--no-such-option"]
     yield "surplus words", [*words, "surplus", "words", "here"]
-    for one in command.params:
-        names = [name for name in one.opts if name.startswith("--")]
+    for parameter in command.params:
+        names = [name for name in parameter.opts if name.startswith("--")]
         if not names or names[0] in ("--help", "--version"):
             continue
-        if one.is_flag:
+        if parameter.is_flag:
             yield "a flag with a value", [*words, f"{names[0]}=maybe"]
         elif names[0] not in TEXTS:
             bad = NAMES.get(names[0], "many")
             yield f"{names[0]} {bad}", [*words, names[0], bad]
-        if one.required:
+        if parameter.required:
             yield f"without {names[0]}", [word for word in words if word != names[0]]
-        if not one.is_flag:
+        if not parameter.is_flag:
             yield "no value", [*words, names[0]]
 
 
@@ -72,7 +72,8 @@ def one_of_each_kind():
     for name, command in all_commands().items():
         for kind, words in wrong_words(command, right_words[name]):
             cases.setdefault(kind, {}).setdefault(name, words)
-    tried, chosen = Counter(), []
+    tried = Counter()
+    chosen = []
     for kind in sorted(cases, key=lambda kind: len(cases[kind])):
         name = min(cases[kind], key=lambda name: tried[name])
         tried[name] += 1
@@ -114,6 +115,7 @@ def refused(home, monkeypatch, capsys):
 def test_a_wrong_invocation_is_one_sentence(name, words, home, refused):
     before = sorted(home.rglob("*"))
     told = refused(name, words)
+
     assert told.out == ""
     assert told.err.startswith("roboirg: ")
     assert told.err.count("\n") == 1

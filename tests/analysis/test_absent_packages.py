@@ -33,10 +33,12 @@ def run(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_its_tables_are_shown_and_its_page_is_made(run: Path) -> None:
+def test_its_tables_are_shown_and_its_page_is_made(run):
     shown = " ".join(call("tables", run, "--which", "other").split())
     warning = "The package with TheirTask is not installed: what its runs lack is not counted."
     call("report", run)
+
     page = (run / "report.html").read_text()
+
     for text, parts in ((shown, ("TheirTask", "their_package:Policy", warning)), (page, THEIRS)):
-        assert [one for one in parts if THEIRS.get(one, one) not in text] == []
+        assert [part for part in parts if THEIRS.get(part, part) not in text] == []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 from flat_jobs import frame_of, make_result
-from syrupy.assertion import SnapshotAssertion
 
 from roboirg.analysis.measures.arm_figures import ArmFigure, arm_figures
 from roboirg.analysis.measures.chance import silent_chance
@@ -55,12 +54,12 @@ def data_of(*results: list[Summary]) -> RunData:
     return RunData(frame_of(*results))
 
 
-def rates(one: ArmFigure) -> tuple[float, float]:
-    return float(one.rate), float(mean_rate(one.others))
+def rates(arm_figure: ArmFigure) -> tuple[float, float]:
+    return float(arm_figure.rate), float(mean_rate(arm_figure.others))
 
 
 def figure(data: RunData, name: str) -> ArmFigure:
-    return next(one for one in arm_figures(data.frame) if one.key.contrast.name == name)
+    return next(drawn for drawn in arm_figures(data.frame) if drawn.key.contrast.name == name)
 
 
 @pytest.mark.parametrize(
@@ -73,10 +72,12 @@ def test_who_listens_and_who_has_a_habit(acts, use, habit, worth):
     assert (rates(found), found.gap.value) == ((use, habit), use - habit)
     assert found.gap.episodes == len(TASKS) * len(SCENES)
     assert found.p_holm < 0.001
+
     intervals = (found.interval, found.other_interval)
     for interval, rate in zip(intervals, rates(found), strict=True):
         assert interval.low <= rate <= interval.high
-    worths = {figure(data, one).gap.value for one in ("words' worth", "order's worth")}
+
+    worths = {figure(data, contrast).gap.value for contrast in ("words' worth", "order's worth")}
     assert worths == {worth}
 
 
@@ -85,7 +86,9 @@ def test_paraphrases_against_their_mean_and_what_counts_in_no_figure():
     half += play("mine", {"paraphrase-2": "own"}, range(4))
     half += play("mine", {"paraphrase-2": "none"}, range(4, 8))
     found = figure(data_of(half), "paraphrases")
+
     assert (rates(found), found.gap.value, found.gap.episodes) == ((0.5, 0.75), -0.25, 16)
+
     # A trial without another arm, and errors.
     results = play("mine", LISTENER, range(3))
     results += [make_result("success", 7, policy="mine", task=TASKS[0])]
@@ -93,7 +96,7 @@ def test_paraphrases_against_their_mean_and_what_counts_in_no_figure():
     assert figure(data_of(results), "words' worth").gap.episodes == 6
 
 
-def test_tables_and_sentences_are_as_stored(snapshot: SnapshotAssertion) -> None:
+def test_tables_and_sentences_are_as_stored(snapshot):
     """Of a policy that listens, mostly, with another rate in each arm, and one that never does.
 
     In two settings each, and with two seeds.
@@ -107,11 +110,15 @@ def test_tables_and_sentences_are_as_stored(snapshot: SnapshotAssertion) -> None
     other = [play("mine", HABIT, range(2), setting="direct")]
     other += [play("knows", {"told": "own", "silent-empty": "none"}, setting="direct")]
     table = make_arm_table(data_of(mixed, play("knows", HABIT), *other))
+
     assert get_format("markdown").draw(table) == snapshot
+
     told = data_of(play("knows", {"told": "own"}))
     with pytest.raises(InvalidValueError, match="--arms told"):
         make_arm_table(told)
-    mine, knows = data_of(mixed), data_of(play("knows", HABIT))
+
+    mine = data_of(mixed)
+    knows = data_of(play("knows", HABIT))
     assert [*language_use_sentences(mine.frame, knows.frame, ("mine", "knows"))] == snapshot
     assert not [*language_use_sentences(mine.frame, told.frame, ("", ""))]
 

@@ -42,7 +42,7 @@ LETTER = Breakdown("letters", "letter", "Made up.")
 def played(job: Job) -> Record:
     """The forgetful policy fails in every implicit instruction that says *it*, and in no other."""
     record = make_record(job, "success")
-    says_it = any(one.expression == "it" for one in record.mentions)
+    says_it = any(mention.expression == "it" for mention in record.mentions)
     if job.policy == "listener" or not says_it:
         return record
     return replace(record, outcome="failure", cause="it?")
@@ -61,7 +61,7 @@ def run(records: Records, tmp_path_factory: pytest.TempPathFactory) -> Path:
 # Labels
 
 
-def test_a_rival_has_the_kind_of_words_that_single_it_out(records: Records) -> None:
+def test_a_rival_has_the_kind_of_words_that_single_it_out(records):
     read = record_columns()["rival"].read
     for record in records:
         reference = record.metadata["rival_reference"]
@@ -69,12 +69,14 @@ def test_a_rival_has_the_kind_of_words_that_single_it_out(records: Records) -> N
         assert read(record) == (f"one of two: {reference}" if reference else None)
 
 
-def test_only_the_command_s_expressions_count(records: Records) -> None:
+def test_only_the_command_s_expressions_count(records):
     read = record_columns()["expression"].read
     contextual = [record for record in records if record.setting == "contextual"]
     found = {label for record in contextual for label in read(record)}  # type: ignore[attr-defined]
     said = {mention.expression for record in contextual for mention in record.mentions}
+
     assert found < said, "a reinforcement has others"
+
     job = PLAN.jobs()[0].with_options(setting="contextual", form="resolved")
     resolved = make_record(job, "success")
     assert read(resolved) == ()
@@ -86,41 +88,44 @@ def test_only_the_command_s_expressions_count(records: Records) -> None:
 def hand_made(*settings: str) -> Frame:
     """Explicit wins in episodes 0 to 5 of 12, others in 0 to 2; even ones have two labels."""
     results = [*make_results("1" * 6 + "0" * 6), *make_results("1" * 3 + "0" * 9 + "!", "direct")]
-    frame = frame_of([one for one in results if one.setting in settings])
+    frame = frame_of([result for result in results if result.setting in settings])
     labels = [("10 b",) if episode % 2 else ("9", "zebra") for episode in frame["episode"]]
     return frame.extended({"letters": as_column(labels)})
 
 
-def test_gaps_are_those_of_the_very_same_episodes() -> None:
+def test_gaps_are_those_of_the_very_same_episodes():
     """Explicit wins 0, 2, 4 and 1, 3, 5; direct 0, 2 and 1."""
     rows = break_down(hand_made("explicit", "direct"), LETTER)
-    assert [(one.key.label, one.counts.episodes) for one in rows] == [
+    assert [(row.key.label, row.counts.episodes) for row in rows] == [
         ("9", 6),
         ("10 b", 6),
         ("zebra", 6),
     ]
-    gaps = [one.gap for one in rows]
+
+    gaps = [row.gap for row in rows]
     assert [gap and round(gap.value * 6) for gap in gaps] == [-1, -2, -1]
     # Of one and of two episodes that differ; both by 3 are more than 1.
     assert [gap and gap.p_value for gap in gaps] == [1.0, 0.5, 1.0]
-    assert [one.p_holm for one in rows] == [1.0, 1.0, 1.0]
+    assert [row.p_holm for row in rows] == [1.0, 1.0, 1.0]
 
 
-def test_a_label_without_explicit_has_no_gap() -> None:
+def test_a_label_without_explicit_has_no_gap():
     table = make_breakdown_table(LETTER, hand_made("direct"))
     assert [entry.text for entry in table.rows[0].entries] == ["6", "33.33", "–", "–", "–"]
     assert "– without explicit on the same episodes." in table.notes
     assert table.notes[-1].startswith("Incomplete: 1 trial without a verdict")
 
 
-def test_a_compared_label_is_the_difference_on_its_episodes() -> None:
+def test_a_compared_label_is_the_difference_on_its_episodes():
     direct = hand_made("direct")
     better = Frame({
-        **direct, "run": as_column([one._replace(policy="better") for one in direct["run"]]),
+        **direct, "run": as_column([result._replace(policy="better") for result in direct["run"]]),
         "outcome": as_column(["success"] * len(direct["run"])),
     })  # fmt: skip
     found = compare(better, direct, [LETTER])
+
     parts = found.parts["letter"]
+
     assert [(part.key.label, round(part.gap.value * 6)) for part in parts] == [
         ("9", 4), ("10 b", 5), ("zebra", 4),
     ]  # fmt: skip
@@ -133,13 +138,13 @@ def test_a_compared_label_is_the_difference_on_its_episodes() -> None:
 # Commands
 
 
-def test_the_wanted_breakdowns_are_compared(run: Path) -> None:
+def test_the_wanted_breakdowns_are_compared(run):
     sides = call("compare", f"{run}:listener", f"{run}:forgetful", "--by", "pattern,rival")
     assert re.findall(r"^By (.*?):", sides, re.MULTILINE) == ["reasoning pattern", "rival"]
     assert "  direct-rival, one of two: " in sides
 
 
-def test_explicit_alone_has_nothing_to_break_down(records: Records, tmp_path: Path) -> None:
+def test_explicit_alone_has_nothing_to_break_down(records, tmp_path):
     store(tmp_path, [record for record in records if record.setting == "explicit"])
     with pytest.raises(InvalidValueError, match="need an implicit setting"):
         call("tables", tmp_path, "--by", "slots")
@@ -148,14 +153,16 @@ def test_explicit_alone_has_nothing_to_break_down(records: Records, tmp_path: Pa
 # Memory
 
 
-def test_words_are_read_line_by_line(records: Records, tmp_path: Path) -> None:
+def test_words_are_read_line_by_line(records, tmp_path):
     """The long parts of records are dropped at once: labels take a small share of the file."""
     long = replace(records[1], details="x" * 20_000)
     store(tmp_path, [replace(long, episode=episode) for episode in range(2000)])
     reads = {name: column.read for name, column in record_columns().items()}
+
     tracemalloc.start()
     frame = with_columns(frame_of([long]), iterate_records(tmp_path), reads)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
+
     assert frame["slots"].tolist() == [long.metadata["hidden_slots"] or None]
     assert peak < (tmp_path / RECORDS_FILE).stat().st_size / 5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from types import SimpleNamespace
 
 import msgspec
@@ -28,27 +29,31 @@ def version_of(told: Job) -> str:
     return str(instruct_job(told).metadata["language_version"])
 
 
+def job_without_candidates(task, setting):
+    """Return a job whose context names no candidates: there the level is a guess among them."""
+    jobs = (job(task, setting, index) for index in range(2, 50))
+    return next(made for made in jobs if not instruct_job(made).metadata["candidates"])
+
+
 @pytest.mark.parametrize(
     ("task", "setting"),
     [("PickXtimes", "spatial"), ("VideoUnmask", "direct"), ("BinFill", "reasoning")],
 )
-def test_it_is_what_the_forgetful_listener_comes_to(task: str, setting: str) -> None:
+def test_it_is_what_the_forgetful_listener_comes_to(task, setting):
     """Its own decisions, with 400 seeds in one episode; only its hands are left out."""
-    # Where the context names the candidates, the level is a guess among them.
-    played = next(
-        one
-        for one in (job(task, setting, index) for index in range(2, 50))
-        if not instruct_job(one).metadata["candidates"]
-    )
+    played = job_without_candidates(task, setting)
     episode = get_episode(task, "test", played.episode)
     env = SimpleNamespace(episode=episode, instruction=instruct_job(played))
-    wanted = get_task(task).stages(episode.scene, episode.goal)
-    right = [
-        get_task(task).stages(episode.scene, ForgetfulPolicy(seed=seed).decide(env, "")) == wanted  # type: ignore[arg-type]
-        for seed in range(400)
-    ]
+    stages_of = partial(get_task(task).stages, episode.scene)
+
+    rights = []
+    for seed in range(400):
+        goal = ForgetfulPolicy(seed=seed).decide(env, "")  # type: ignore[arg-type]
+        rights.append(stages_of(goal) == stages_of(episode.goal))
     level = float(floor_level(CHANCE, [played]))
-    assert np.mean(right) == pytest.approx(level, abs=0.01 + 3 * np.sqrt(level * (1 - level) / 400))
+
+    deviation = np.sqrt(level * (1 - level) / 400)
+    assert np.mean(rights) == pytest.approx(level, abs=0.01 + 3 * deviation)
 
 
 @pytest.mark.parametrize(
@@ -56,16 +61,18 @@ def test_it_is_what_the_forgetful_listener_comes_to(task: str, setting: str) -> 
     [("PickXtimes", "direct"), ("VideoUnmask", "reasoning"), ("StopCube", "reasoning")],
 )
 @pytest.mark.parametrize("rule", SURFACE_RULES)
-def test_floors_are_what_the_shortcut_listeners_come_to(rule: str, task: str, setting: str) -> None:
+def test_floors_are_what_the_shortcut_listeners_come_to(rule, task, setting):
     """Their own decisions, with 100 seeds; a goal that the scene lacks is none."""
     played = job(task, setting, episode=3)
-    episode, instruction = get_episode(task, "test", 3), instruct_job(played)
+    episode = get_episode(task, "test", 3)
+    instruction = instruct_job(played)
     env = SimpleNamespace(episode=episode, instruction=instruction)
+
     goals = [make_policy(rule, seed).decide(env, instruction.text) for seed in range(100)]
     level = float(floor_level(rule, [played]))
-    assert np.mean([goal == episode.goal for goal in goals]) == pytest.approx(
-        level, abs=3 * np.sqrt(level * (1 - level) / 100) + 1e-9
-    )
+
+    deviation = np.sqrt(level * (1 - level) / 100)
+    assert goals.count(episode.goal) / 100 == pytest.approx(level, abs=3 * deviation + 1e-9)
 
 
 @pytest.mark.parametrize("task", all_tasks())
@@ -73,17 +80,19 @@ def test_floors_are_what_the_shortcut_listeners_come_to(rule: str, task: str, se
     ("setting", "form"),
     [("explicit", "implicit"), ("direct", "resolved"), ("contextual", "resolved")],
 )
-def test_commands_that_name_all_leave_nothing_to_chance(task: str, setting: str, form: str) -> None:
+def test_commands_that_name_all_leave_nothing_to_chance(task, setting, form):
     assert floor_level(CHANCE, [job(task, setting, at, form=form) for at in range(4)]) == 1
 
 
-def test_who_plays_and_how_often_makes_no_difference() -> None:
+def test_who_plays_and_how_often_makes_no_difference():
     jobs = [job("StopCube", "reasoning", episode) for episode in range(4)]
-    again = [msgspec.structs.replace(one, policy="else", policy_seed=3) for one in jobs[:1]]
+    again = [msgspec.structs.replace(made, policy="else", policy_seed=3) for made in jobs[:1]]
     assert floor_level(CHANCE, jobs + again * 5) == floor_level(CHANCE, jobs)
     assert floor_level(CHANCE, []) is None
+
     # Learned floors are those of the usual options, in the version that was played.
-    usual, short = job("PickXtimes", "contextual"), job("PickXtimes", "contextual", stages=(1, 5))
+    usual = job("PickXtimes", "contextual")
+    short = job("PickXtimes", "contextual", stages=(1, 5))
     assert floor_level("text-only", [short], version_of(usual)) is None
     assert floor_level("text-only", [usual], version_of(usual)) is not None
     assert floor_level("text-only", [usual], "0.9") is None, "never those of another version"

@@ -10,7 +10,8 @@ from roboirg.analysis.measures.comparison_text import sentences
 from roboirg.analysis.results.frame import make_frame
 from roboirg.core.errors import InvalidValueError
 
-GOOD, POOR = "listener", "forgetful"
+GOOD = "listener"
+POOR = "forgetful"
 
 
 def compared(first: list, second: list):
@@ -37,9 +38,9 @@ def case(name: str) -> tuple[list, list]:
         "left out": ([("1111!1", {}), ("11", {"setting": "direct"})], [("0000-", {})]),
         # 6 of 20 episodes differ, all to one side: p = 0.031 alone, 0.125 among four settings.
         "interval and p": (
-            [("1" * 20, {"setting": one}) for one in settings],
-            [("1" * 14 + ("0" if one == "direct" else "1") * 6, {"setting": one})
-             for one in settings]),
+            [("1" * 20, {"setting": setting}) for setting in settings],
+            [("1" * 14 + ("0" if setting == "direct" else "1") * 6, {"setting": setting})
+             for setting in settings]),
     }[name]  # fmt: skip
     sides = []
     for policy, side in ((GOOD, good), (POOR, poor)):
@@ -51,30 +52,33 @@ def case(name: str) -> tuple[list, list]:
 
 
 @pytest.mark.parametrize("name", ["better", "open", "tasks", "left out", "interval and p"])
-def test_what_is_said_is_as_stored(snapshot, name: str) -> None:
+def test_what_is_said_is_as_stored(snapshot, name):
     """Which is better, what stays open and what it would take, and what is left out."""
     assert text(*case(name)) == snapshot
 
 
-def test_control_arms_are_left_out() -> None:
-    first, second = make_results("11"), make_results("01", policy=POOR)
+def test_control_arms_are_left_out():
+    first = make_results("11")
+    second = make_results("01", policy=POOR)
+
     silent = make_results("00", arm="silent")
+
     assert compared([*first, *silent], second) == compared(first, second)
     assert compared(silent, silent).averages, "unless there is nothing else"
 
 
-def test_policies_without_a_common_episode_are_refused() -> None:
+def test_policies_without_a_common_episode_are_refused():
     for changes in ({"task": "BinFill"}, {"setting": "direct"}):
         with pytest.raises(InvalidValueError, match="no episode in common"):
             compared(make_results("11"), make_results("11", policy=POOR, **changes))
 
 
-def test_a_side_is_one_policy_of_one_version() -> None:
-    one = make_results("11")
+def test_a_side_is_one_policy_of_one_version():
+    results = make_results("11")
     for side, words in (
-        ([*one, *make_results("11", policy=POOR)], "name one as RUN:forgetful"),
-        ([*one, *make_results("--1", policy_version="2")], "in several versions"),
+        ([*results, *make_results("11", policy=POOR)], "name one as RUN:forgetful"),
+        ([*results, *make_results("--1", policy_version="2")], "in several versions"),
         ([], "no results"),
     ):
         with pytest.raises(InvalidValueError, match=words):
-            compared(side, one)
+            compared(side, results)

@@ -24,20 +24,21 @@ Facts = dict[str, dict[str, str]]
 def record(episode: int, outcome: str = "success", **fields) -> Record:
     setting = fields.pop("setting", "explicit")
     job = job_of(policy="mine", task="PickXtimes", split="test", episode=episode, setting=setting)
-    cause, start = None if outcome == "success" else "why", f"{episode}{setting}{outcome}"
+    cause = None if outcome == "success" else "why"
+    start = f"{episode}{setting}{outcome}"
     return make_record(job, outcome, cause, started_at=start, **fields)
 
 
 def facts(folder: Path, *records: Record) -> Facts:
     store(folder, records)
     rows = json.loads(call("tables", folder, "--which", "facts", "--format", "json"))
-    return {
-        one["of"]: {row["fact"]: row["value"] for row in rows if row["of"] == one["of"]}
-        for one in rows
-    }
+    found: Facts = {}
+    for row in rows:
+        found.setdefault(row["of"], {})[row["fact"]] = row["value"]
+    return found
 
 
-def test_a_run_has_its_facts(tmp_path: Path) -> None:
+def test_a_run_has_its_facts(tmp_path):
     failed = {"error": "policy", "steps": 50, "calls": 1, "executed": 20}
     again = record(0, "error", **failed), record(0, attempt=2, steps=30, calls=3, executed=10)
     code = {"code": "0a", "verdict_code": None}
@@ -58,7 +59,9 @@ def test_a_run_has_its_facts(tmp_path: Path) -> None:
         "package code": f"{again[0].code}; 0a",
         "verdict code": again[0].verdict_code,
     }
+
     found = facts(tmp_path, *again, *later)
+
     assert found[RUN].items() >= expected.items()
     # Without the episode that was played again.
     assert found["mine"]["control steps per call, mean"] == "10.0"
@@ -132,12 +135,14 @@ MINE = InferenceFacts(
     ],
 )
 def test_a_policy_has_what_it_declares_and_its_process_reports(
-    tmp_path: Path, fields, metadata, expected
-) -> None:
+    tmp_path, fields, metadata, expected
+):
     # In the mean of steps by calls, longer episodes count for more.
     short = {**fields, "steps": 10, "calls": 1, "executed": 10} if "steps" in fields else fields
     both = (record(at, policy_metadata=metadata, **own) for at, own in enumerate((fields, short)))
+
     found = facts(tmp_path, *both)
+
     assert found["mine"].items() >= expected.items()
     assert found[RUN]["errors, in no rate"] == "0"
 
@@ -155,14 +160,16 @@ class Network:
         return self._parameters
 
 
-def test_parameters_are_found_below_a_policy(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parameters_are_found_below_a_policy(monkeypatch):
     """In dictionaries, lists and objects; the kind of most numbers comes first."""
     torch = SimpleNamespace(nn=SimpleNamespace(Module=Network))
     monkeypatch.setitem(sys.modules, "torch", torch)
     large = Network(("bfloat16", "cuda:0", 400))
     small = Network(("float32", "cpu", 6), ("float32", "cuda:0", 2))
     body = SimpleNamespace(nets={"large": large}, behind=SimpleNamespace(heads=[small]))
+
     body.itself = body
+
     for policy, dtypes, devices in (
         (body, ("bfloat16", "float32"), ("cuda:0", "cpu")),
         (object(), (), ()),

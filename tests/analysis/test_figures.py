@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from collections import defaultdict
 from itertools import combinations
-from pathlib import Path
 
 import pytest
 from msgspec.structs import replace
@@ -55,7 +54,7 @@ def drawn_texts(figure: Figure) -> list[Text]:
     """The texts of a figure that are seen, after it was laid out."""
     FigureCanvasAgg(figure).draw()
     owners = [*(panel for panel in figure.axes if panel.get_visible()), *figure.legends]
-    found = [*figure.texts, *(text for one in owners for text in one.findobj(Text))]
+    found = [*figure.texts, *(text for owner in owners for text in owner.findobj(Text))]
     return [text for text in found if text.get_visible() and text.get_text()]
 
 
@@ -83,7 +82,7 @@ def dots(figure: Figure) -> dict[tuple[str, str], list[float]]:
 
 
 @pytest.mark.slow
-def test_all_figures_that_apply_are_written_and_are_the_same_again(tmp_path: Path) -> None:
+def test_all_figures_that_apply_are_written_and_are_the_same_again(tmp_path):
     paths = write_figures(
         content(planned=PLAN.jobs()), tmp_path / "a" / "b", ("gaps", "context", "failures")
     )
@@ -93,16 +92,19 @@ def test_all_figures_that_apply_are_written_and_are_the_same_again(tmp_path: Pat
         for name in ("gaps", "failures")
         for ending in (".png", ".svg", ".pdf", "-dark.png", "-dark.svg")
     }
+
     turned = content(results()[::-1], planned=PLAN.jobs())
     again = write_figures(turned, tmp_path / "again", ["gaps"])
     for first, second in zip(sorted(paths)[-5:], sorted(again), strict=True):
         assert first.read_bytes() == second.read_bytes(), first.name
 
 
-def test_figures_are_not_written_through_links(tmp_path: Path) -> None:
+def test_figures_are_not_written_through_links(tmp_path):
     (tmp_path / "victim").write_text("mine")
     (tmp_path / "gaps.png").symlink_to(tmp_path / "victim")
+
     write_figures(content(), tmp_path, ["gaps"])
+
     assert (tmp_path / "victim").read_text() == "mine"
     assert not (tmp_path / "gaps.png").is_symlink()
 
@@ -117,8 +119,8 @@ LIMITS = "Played on the test split, in our own words, with at most 1300 steps."
         ("failures", ["grounding: wrong object", "n = 6", "direct (resolved)"]),
     ],
 )
-def test_figures_say_what_the_records_say(name: str, shown: list[str]) -> None:
-    texts = [words(one) for one in drawn_texts(draw(name, content()))]
+def test_figures_say_what_the_records_say(name, shown):
+    texts = [words(drawn) for drawn in drawn_texts(draw(name, content()))]
     assert {*shown} <= {*texts}
     assert LIMITS in texts[0]
 
@@ -136,30 +138,35 @@ def widths(panel: Axes) -> dict[str, float]:
     return found
 
 
-def test_bars_are_shares_of_what_was_played(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bars_are_shares_of_what_was_played(monkeypatch):
     """Also those too short for a number: would catch one that the next part covers."""
     monkeypatch.setattr(failures, "MIN_LABELED_PERCENT", 20.0)
     found = content(planned=PLAN.jobs())
-    # Everything failed in the four implicit tellings, nothing in the rest.
+    failed = [result.attribution.failure for result in results() if result.attribution is not None]
+
     listener, forgetful = (widths(panel) for panel in draw("failures", found).axes)
+
+    # Everything failed in the four implicit tellings, nothing in the rest.
     assert sum(listener.values()) == 0
     assert sum(forgetful.values()) == pytest.approx(400)
-    failed = [one.attribution.failure for one in results() if one.attribution is not None]
     for name, color in failures.COLORS.items():
         assert forgetful.get(color, 0) == pytest.approx(100 * failed.count(name) / 6)
     assert len({*failures.COLORS.values()}) == len(FAILURES) + 1
 
 
-def test_gaps_are_those_of_the_summary() -> None:
+def test_gaps_are_those_of_the_summary():
     """And who lacks a trial is marked, of two policies that played the same otherwise."""
     found = content(planned=[*PLAN.jobs(), replace(PLAN.jobs()[0], policy_seed=1)])
+
     shown = dots(draw("gaps", found))
+
     names = {label.partition(",")[0] for _, label in shown}
     assert names == {"listener (privileged) (incomplete)", "forgetful (privileged)"}
     assert {setting for setting, _ in shown} == {"direct", "reasoning", "contextual", "spatial"}
+    runs = {name: policy_run for policy_run, name in found.frame.names.items()}
     for (setting, label), (explicit, implicit) in shown.items():
-        key = next(one for one, name in found.frame.names.items() if label.startswith(name))
-        gap = found.summaries[key, ALL_TASKS, InstructionOptions(setting)].gap
+        (policy_run,) = [run for name, run in runs.items() if label.startswith(name)]
+        gap = found.summaries[policy_run, ALL_TASKS, InstructionOptions(setting)].gap
         assert implicit - explicit == pytest.approx(100 * gap.value)
 
 
@@ -170,84 +177,115 @@ def test_gaps_are_those_of_the_summary() -> None:
         (Rate(0.5, 0.75, Interval(-0.375, -0.125)), [37.5, 62.5]),
     ],
 )
-def test_bands_lie_around_their_rates(rate: Rate, ends: list[float]) -> None:
+def test_bands_lie_around_their_rates(rate, ends):
     """The interval of a difference is drawn from the reference, not from the rate."""
     figure = draw_rates({"direct": ""}, [RateRow("a", {"direct": rate})], WORDS["main"], [])
     assert [*figure.axes[0].lines[0].get_xdata()] == ends
 
 
-def test_published_gaps_are_over_the_tasks_of_their_setting() -> None:
-    shown = dots(draw("gaps", content([]), published=True))
+def test_published_gaps_are_over_the_tasks_of_their_setting():
     rows = {(row.model, row.options.setting): row for row in published_rows("main")}
+
+    shown = dots(draw("gaps", content([]), published=True))
+
     assert len(shown) == 4 * len({model for model, _ in rows})
     for (setting, model), (explicit, implicit) in shown.items():
-        assert implicit == pytest.approx(float(rows[model, setting].average))
-        played = [task for task, rate in rows[model, setting].rates.items() if rate is not None]
-        assert explicit == pytest.approx(float(rows[model, "explicit"].average_over(played) or 0))
+        row = rows[model, setting]
+        played = [task for task, rate in row.rates.items() if rate is not None]
+        average = rows[model, "explicit"].average_over(played)
+        assert implicit == pytest.approx(float(row.average))
+        assert explicit == pytest.approx(float(average or 0))
+
+
+def test_there_is_no_figure_of_gaps_without_results():
     assert draw_figure("gaps", content([])) is None
 
 
-def test_published_rows_stand_apart_and_signs_say_what_cannot_be_compared() -> None:
+def test_published_rows_stand_apart_and_signs_say_what_cannot_be_compared():
     """As in a table: one episode of our own next to 150 of the paper's has its n and its ≠."""
-    found = [one for one in like_published("main", "MemER") if one.task == "PickXtimes"]
-    one = min(found, key=lambda one: (one.setting != "direct", one.episode, one.policy_seed))
-    figure = draw("gaps", content([one]), published=True)
-    labels = [words(label) for label in figure.axes[0].get_yticklabels()]
+    found = [result for result in like_published("main", "MemER") if result.task == "PickXtimes"]
+    first = next(result for result in found if (result.setting, result.episode) == ("direct", 0))
+
+    figure = draw("gaps", content([first]), published=True)
+
+    panel = figure.axes[0]
+    labels = [words(label) for label in panel.get_yticklabels()]
     assert labels[:2] == ["MemER, n = 1 ≠", "published, n = 50 × 3"]
     assert len(labels) == 2 + len({row.model for row in published_rows("main")})
-    (line,) = (one for one in figure.axes[0].lines if [*one.get_xdata()] == [0, 1])
-    own, heading = figure.axes[0].get_yticks()[:2]
+
+    (line,) = (line for line in panel.lines if [*line.get_xdata()] == [0, 1])
+    own, heading = panel.get_yticks()[:2]
     assert own < line.get_ydata()[0] < heading  # type: ignore[index]
+
     texts = [words(text) for text in drawn_texts(figure)]
     assert "≠ Implicit settings are not comparable with the published rates" in texts[0]
     assert "PickXtimes" in texts
+
+
+def test_no_sign_stands_where_nothing_published_is_drawn():
+    found = [result for result in like_published("main", "MemER") if result.task == "PickXtimes"]
     assert "published" not in words(draw("gaps", content(found)).texts[0])
 
 
-def test_the_context_is_compared_with_the_shortest_on_the_same_tasks() -> None:
-    found = like_published("context")
-    shown = dots(draw("context", content(found), published=True))
-    rows = {
-        (row.model, row.options.stages): float(row.average) for row in published_rows("context")
-    }
+def test_the_context_is_compared_with_the_shortest_on_the_same_tasks():
+    rates = {(row.model, row.options.stages): row.average for row in published_rows("context")}
+
+    shown = dots(draw("context", content(like_published("context")), published=True))
+
     assert {title for title, _ in shown} == {"stages 1,2,5", "stages 1,2,3,5", "stages 1,2,3,4,5"}
     for (title, label), (shortest, rate) in shown.items():
         model, _, own = label.partition(",")
         stages = tuple(map(int, title.removeprefix("stages ").split(",")))
         near = 0.01 if own else 1e-9
-        assert shortest == pytest.approx(rows[model, (1, 5)], abs=near)
-        assert rate == pytest.approx(rows[model, stages], abs=near)
-    only = content([one for one in found if one.options.stages == (1, 5)])
-    assert draw_figure("context", only) is None
+        assert shortest == pytest.approx(float(rates[model, (1, 5)]), abs=near)
+        assert rate == pytest.approx(float(rates[model, stages]), abs=near)
 
 
-@pytest.mark.parametrize(("name", "policies"), [("gaps", 5), ("context", 1), ("failures", 5)])
-def test_no_text_leaves_the_figure_or_lies_on_another(name: str, policies: int) -> None:
-    long = "my_package.policies:NetWithAVeryLongName, frames of the video none"
+def test_there_is_no_figure_of_the_shortest_context_alone():
+    found = like_published("context")
+    shortest = [result for result in found if result.options.stages == (1, 5)]
+    assert draw_figure("context", content(shortest)) is None
+
+
+POLICIES_WITH_LONG_NAMES = (
+    "my_package.policies:NetWithAVeryLongName, frames of the video none",
+    "a" * 90,
+    "b",
+    "pickxtimes-recurrent-seed1",
+    "c",
+)
+
+
+@pytest.mark.parametrize(("name", "count"), [("gaps", 5), ("context", 1), ("failures", 5)])
+def test_no_text_leaves_the_figure_or_lies_on_another(name, count):
     found = like_published("context") if name == "context" else results()
-    many = [
-        replace(one, policy=policy)
-        for policy in (long, "a" * 90, "b", "pickxtimes-recurrent-seed1", "c")[:policies]
-        for one in found
-        if one.policy in ("forgetful", "MemER")
-    ]
+    played = [result for result in found if result.policy in ("forgetful", "MemER")]
+    many = []
+    for policy in POLICIES_WITH_LONG_NAMES[:count]:
+        many += [replace(result, policy=policy) for result in played]
+
     figure = draw(name, content(many), published=True)
-    boxes = {id(text): (text, text.get_window_extent()) for text in drawn_texts(figure)}
-    assert any("NetWithA" in "".join(text.get_text().split()) for text, _ in boxes.values())
-    for text, box in boxes.values():
+
+    texts = drawn_texts(figure)
+    assert any("NetWithA" in "".join(text.get_text().split()) for text in texts)
+    boxes = {text: text.get_window_extent() for text in texts}
+    for text, box in boxes.items():
         assert figure.bbox.x0 <= min(box.x0, figure.bbox.x1 - box.x1), text
         assert figure.bbox.y0 <= min(box.y0, figure.bbox.y1 - box.y1), text
-    for (one, first), (other, second) in combinations(boxes.values(), 2):
-        across = min(first.x1, second.x1) - max(first.x0, second.x0)
-        down = min(first.y1, second.y1) - max(first.y0, second.y0)
-        assert min(across, down) <= 1, (one, other)
+    for (text, box), (other, other_box) in combinations(boxes.items(), 2):
+        across = min(box.x1, other_box.x1) - max(box.x0, other_box.x0)
+        down = min(box.y1, other_box.y1) - max(box.y0, other_box.y0)
+        assert min(across, down) <= 1, (text, other)
 
 
 @pytest.mark.parametrize("kept", ["explicit", "direct"])
-def test_rates_without_another_setting_stand_alone(kept: str) -> None:
-    found = content([one for one in results() if one.setting == kept and one.form == "implicit"])
+def test_rates_without_another_setting_stand_alone(kept):
+    found = content(
+        [result for result in results() if result.setting == kept and result.form == "implicit"]
+    )
     shown = dots(draw("gaps", found))
     assert {title for title, _ in shown} == {kept}
+
     own = [
         found.summaries[key, ALL_TASKS, InstructionOptions(kept)].rate for key in found.frame.names
     ]

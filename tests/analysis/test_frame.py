@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from pathlib import Path
 
 import pytest
@@ -38,56 +37,67 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return store(folder, found, plan).folder
 
 
-def test_columns_have_their_types_and_lack_what_they_may_lack(run: Path) -> None:
+def test_columns_have_their_types_and_lack_what_they_may_lack(run):
     found = roboirg.results(run)
+
     declared = {**COLUMNS, **record_columns()}
     assert list(found) == list(declared)
-    kinds = found.dtypes.astype(str).to_dict()
-    assert {(one.kind, kinds[name]) for name, one in declared.items()} == {
+
+    types = found.dtypes.astype(str).to_dict()
+    assert {(column.kind, types[name]) for name, column in declared.items()} == {
         ("text", "string"),
         ("texts", "object"),
         ("number", "Int64"),
         ("decimal", "Float64"),
         ("flag", "boolean"),
     }
-    assert {name for name, one in declared.items() if not one.missing} <= {
-        name for name in found if found[name].notna().all()
-    }
+
+    full = {name for name in found if found[name].notna().all()}
+    assert {name for name, column in declared.items() if not column.missing} <= full
+
     assert len(found) == 2 * 5 * 3 - 3, "what is planned has no row; StopCube has no spatial"
     assert (found["success"].isna() == (found["outcome"] == "error")).all()
     assert (found["error"].notna() == (found["outcome"] == "error")).all()
     assert (found["pattern"].notna() == (found["setting"] == "reasoning")).all()
     assert found["privileged"].all()
-    texts = [[turn.text for turn in one.instruction] for one in iterate_records(run)]
-    assert found["words"].sum() == len(" ".join(itertools.chain(*texts)).split())
     assert set(found["suite"]) == {"counting"}
 
 
-def test_policies_of_their_own_versions_are_called_by_their_names() -> None:
+def test_words_of_all_turns_are_counted(run):
+    texts = []
+    for record in iterate_records(run):
+        texts += [turn.text for turn in record.instruction]
+    assert roboirg.results(run)["words"].sum() == len(" ".join(texts).split())
+
+
+def test_policies_of_their_own_versions_are_called_by_their_names():
     both = [make_result(policy=name, policy_version=name) for name in "ba"]
     assert list(frame_of(both).names.values()) == ["a", "b"]
     assert list(frame_of(both).names_as_played.values()) == ["b", "a"]
-    planned = [one.identity for one in both]
+
+    planned = [result.identity for result in both]
     assert list(frame_of(both, planned=planned).names.values()) == ["b", "a"]
 
 
-def test_rows_are_sorted_by_task_then_episode_then_seed() -> None:
+def test_rows_are_sorted_by_task_then_episode_then_seed():
     """In the order of the benchmark; unknown tasks come last."""
     rows = [("StopCube", 0, 0), ("StopCube", 0, 1), ("StopCube", 1, 0), ("BinFill", 2, 0),
             ("Another", 0, 0)]  # fmt: skip
     found = [
         make_result("success", at, task=task, policy_seed=seed) for task, at, seed in rows[::-1]
     ]
+
     frame = frame_of(found)
+
     assert [*zip(frame["task"], frame["episode"], frame["policy_seed"], strict=True)] == rows
 
 
-def test_what_is_missing_belongs_to_the_version_that_played_first() -> None:
+def test_what_is_missing_belongs_to_the_version_that_played_first():
     two = [make_result("success", at, policy_version=name) for at, name in enumerate("ba")]
     cells = cells_of(frame_of(two, planned=[make_result("success", 2).identity]))
-    assert {key.policy_run.versions.policy_version: one.missing for key, one in cells.items()} == {
-        "a": 0, "b": 1,
-    }  # fmt: skip
+    missing = {key.policy_run.versions.policy_version: cell.missing for key, cell in cells.items()}
+
+    assert missing == {"a": 0, "b": 1}
 
 
 PLAYS = st.dictionaries(
@@ -103,60 +113,71 @@ PLAYS = st.dictionaries(
 
 @settings(max_examples=25)
 @given(PLAYS, st.randoms(use_true_random=False))
-def test_order_and_runs_of_the_records_make_no_difference(plays, random) -> None:
+def test_order_and_runs_of_the_records_make_no_difference(plays, random):
     """Two runs complete each other, and what neither played is missing."""
-    found = [
-        make_result(outcome, episode, setting=setting, task=task, policy_seed=seed)
-        for (setting, task, episode, seed), outcome in plays.items()
-    ]
-    planned = [one.identity for one in found]
-    results = [one for one in found if one.outcome != "missing"]
-    whole = make_frame([("whole", results)], planned)
-    mixed = random.sample(results, len(results))
+    found = []
+    for (setting, task, episode, seed), outcome in plays.items():
+        result = make_result(outcome, episode, setting=setting, task=task, policy_seed=seed)
+        found.append(result)
+    planned = [result.identity for result in found]
+    played = [result for result in found if result.outcome != "missing"]
+    mixed = random.sample(played, len(played))
     at = random.randint(0, len(mixed))
+
+    whole = make_frame([("whole", played)], planned)
     parts = make_frame([("a", mixed[:at]), ("b", mixed[at:])], planned)
+
     for name in ("run", "outcome", "options", "task", "episode"):
         assert list(parts[name]) == list(whole[name])
     assert sorted(whole["outcome"]) == sorted(plays.values())
     assert summarize(cells_of(parts)) == summarize(cells_of(whole))
 
 
-def test_the_same_episode_in_two_runs_stays_apart() -> None:
+def test_the_same_episode_in_two_runs_stays_apart():
     both = [make_result(outcome, 0, started_at=outcome) for outcome in OUTCOMES[:2]]
+
     twice = make_frame([("a", both[:1]), ("none", []), ("b", both[1:])])
-    reads = {"cause": lambda one: one.outcome, "one": lambda _: 1, "true": lambda _: True}
-    found = with_columns(twice, both[::-1], reads)
-    assert list(found["cause"]) == ["success", "failure"]
-    assert [*map(repr, found["true"])] == ["True"] * 2, "equal values of two kinds are two"
+
     assert list(twice.names.values()) == ["listener, a", "listener, b"]
     assert [cell.rate for cell in cells_of(twice).values()] == [1, 0]
 
 
-def test_a_policy_that_has_not_begun_is_there() -> None:
+def test_each_row_gets_its_own_value_of_an_added_column():
+    both = [make_result(outcome, 0, started_at=outcome) for outcome in OUTCOMES[:2]]
+    twice = make_frame([("a", both[:1]), ("b", both[1:])])
+    reads = {"cause": lambda record: record.outcome, "1": lambda _: 1, "true": lambda _: True}
+
+    found = with_columns(twice, both[::-1], reads)
+
+    assert list(found["cause"]) == ["success", "failure"]
+    assert [*map(repr, found["true"])] == ["True"] * 2, "equal values of two kinds are two"
+
+
+def test_a_policy_that_has_not_begun_is_there():
     frame = make_frame([], [make_result(policy="late").identity], run_name="mine")
     ((key, cell),) = cells_of(frame).items()
     expected = ("late", Versions(), "mine", 1)
+
     assert (key.policy_run[0], *key.policy_run[2:4], cell.missing) == expected
 
 
-def test_the_page_lists_the_columns() -> None:
+def test_the_page_lists_the_columns():
     page = (Path(__file__).parents[2] / "docs" / "own-tables.md").read_text(encoding="utf-8")
     rows = [
-        f"| `{one.name}` | {one.kind} | {one.meaning} | {one.missing or 'never'} |"
-        for one in (*COLUMNS.values(), *record_columns().values())
+        f"| `{column.name}` | {column.kind} | {column.meaning} | {column.missing or 'never'} |"
+        for column in (*COLUMNS.values(), *record_columns().values())
     ]
     assert "\n".join(rows) in page, "\n".join(rows)
 
 
-def test_a_run_is_opened_once_for_all_that_is_wanted_of_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_is_opened_once_for_all_that_is_wanted_of_it(tmp_path, monkeypatch):
     """Two spellings of a folder are one run; a folder alone wants all of its policies."""
     monkeypatch.chdir(tmp_path)
     for name in ("a", "b", "c", "c:d"):
         Path(name).mkdir()
     given = ["a:x", "b:y", "./a", "b:z:Z", f"../{tmp_path.name}/b:y", "c:d:e", "c:e"]
+
     with opened_sources(given) as found:
-        assert [(str(one.path), one.policies) for one in found] == [
+        assert [(str(source.path), source.policies) for source in found] == [
             ("a", None), ("b", ("y", "z:Z")), ("c:d", ("e",)), ("c", ("e",)),
         ]  # fmt: skip

@@ -1,7 +1,5 @@
 """The headline number by hand, and what it takes to have one."""
 
-from __future__ import annotations
-
 import pytest
 from flat_jobs import frame_of, make_result, make_results
 
@@ -30,10 +28,11 @@ SETTINGS = ("reasoning", "spatial")
 
 
 def floors(excess):
-    return {
-        key: ShortcutRow(key, 9, {}, Excess(value, 0.01))
-        for key, value in ((FloorKey(RANDOM, name), value) for name, value in excess.items())
-    }
+    found = {}
+    for name, value in excess.items():
+        key = FloorKey(RANDOM, name)
+        found[key] = ShortcutRow(key, 9, {}, Excess(value, 0.01))
+    return found
 
 
 @pytest.fixture
@@ -75,16 +74,17 @@ def notes_of(results):
     return list(headline_notes(cells_of(frame), frame.names))
 
 
-def test_the_mean_over_settings_of_the_means_over_their_tasks() -> None:
+def test_the_mean_over_settings_of_the_means_over_their_tasks():
     found = headline_of(by_hand())
     assert found.gap == pytest.approx(((-1 / 4 - 1 / 2) / 2 + -1) / 2)
     assert (found.episodes, found.is_complete) == (6, True)
     assert found.interval is None, "some resamples of so few episodes lack a setting"
+
     lost = [*make_results("00"), *make_results("10", "reasoning"), *make_results("00", "spatial")]
     assert headline_of(lost).gap == 0.25  # though nothing was won without implicit reference
 
 
-def test_few_episodes_of_a_setting_that_are_all_lost_have_no_interval() -> None:
+def test_few_episodes_of_a_setting_that_are_all_lost_have_no_interval():
     """Some resamples have none of the five, all others have the same gap: its width would be 0."""
     lost = [
         *make_results("1" * 20),
@@ -94,25 +94,28 @@ def test_few_episodes_of_a_setting_that_are_all_lost_have_no_interval() -> None:
     assert (headline_of(lost).gap, headline_of(lost).interval) == (-1, None)
 
 
-def test_settings_share_their_episodes() -> None:
+def test_settings_share_their_episodes():
     """Two settings with equal verdicts say no more than one: the interval is as wide."""
-    both, alone = (headline_of(enough(), one) for one in (SETTINGS, SETTINGS[1:]))
+    both, alone = (headline_of(enough(), settings) for settings in (SETTINGS, SETTINGS[1:]))
     assert (both.gap, both.interval) == (alone.gap, alone.interval)
     assert both.gap == -0.5
 
 
-def test_it_needs_every_setting_and_explicit() -> None:
+def test_it_needs_every_setting_and_explicit():
     results = by_hand()
     for setting in ("spatial", "explicit"):
-        assert headline_of([one for one in results if one.options.setting != setting]) is None
+        assert (
+            headline_of([result for result in results if result.options.setting != setting]) is None
+        )
     assert headline_of(results, ()) is None
 
 
-def test_it_stands_next_to_every_table_or_why_there_is_none(two_settings) -> None:
+def test_it_stands_next_to_every_table_or_why_there_is_none(two_settings):
     (note,) = notes_of(enough())
     assert note.startswith("Headline of listener: −50.0 points to explicit (95 % interval ")
     assert note.endswith("reasoning, spatial; 20 episodes.")
     assert notes_of(enough()) == [note], "to explicit of the same language"
+
     frame = frame_of(enough())
     (run_table,) = make_run_tables(frame)
     assert note in make_table("main", RunData(frame)).notes
@@ -132,18 +135,23 @@ def test_it_stands_next_to_every_table_or_why_there_is_none(two_settings) -> Non
         assert note.startswith(f"listener has no headline number: {reason}")
 
 
-def test_settings_count_up_to_five_points_above_chance() -> None:
+def test_settings_count_up_to_five_points_above_chance():
     found = floors({"direct": 0.0501, "reasoning": 0.05, "spatial": -0.3})
     parts = [FloorKey(TEST, "direct"), FloorKey(RANDOM, "direct", "StopCube")]
+
     found |= dict.fromkeys(parts, found[RANDOM, "spatial", "", ""])
+
     assert settings_at_chance(found) == ("reasoning", "spatial")
 
 
-def test_floors_are_known_of_every_setting_and_task() -> None:
+def test_floors_are_known_of_every_setting_and_task():
     """`python scripts/measure_floors.py` measures them anew, after a change of words."""
-    implicit = {name for name, one in all_settings().items() if one.implicit}
+    implicit = {name for name, setting in all_settings().items() if setting.implicit}
     wanted = {FloorKey(RANDOM, name) for name in implicit}
     for task in all_tasks().values():
         wanted |= {FloorKey(RANDOM, name, task.name) for name in implicit & {*settings_of(task)}}
-    told = instruct(get_episode("PickXtimes", "test", 0))
-    assert wanted <= (measured_floors(str(told.metadata["language_version"])) or {}).keys()
+
+    language = instruct(get_episode("PickXtimes", "test", 0)).metadata["language_version"]
+    measured = measured_floors(str(language)) or {}
+
+    assert wanted <= measured.keys()

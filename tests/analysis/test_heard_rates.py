@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import pytest
 from flat_jobs import frame_of, make_result, make_results
@@ -44,7 +43,7 @@ def sample() -> list[Summary]:
     ]
 
 
-def test_tables_have_rates_over_what_was_heard_next_to_rates_over_all() -> None:
+def test_tables_have_rates_over_what_was_heard_next_to_rates_over_all():
     """Of all tasks the means over tasks, not over trials: 50–67, 40.00."""
     data = RunData(frame_of(sample()))
     table = make_heard_table(data)
@@ -55,11 +54,12 @@ def test_tables_have_rates_over_what_was_heard_next_to_rates_over_all() -> None:
         ("listener, contextual", "BinFill"): ["2", "0–50", "50.00", "1", "100.00"],
         ("listener, contextual", "all tasks"): ["6", "38–62", "41.67", "2", "100.00"],
     }
+
     note = (
         "listener did not read every instruction to its end (its prompt is limited): 38–50 % of "
         "its prompts were cut; tables --which heard has the rates."
     )
-    assert [note in one.notes for one in make_run_tables(data.frame)] == [True, False]
+    assert [note in table.notes for table in make_run_tables(data.frame)] == [True, False]
 
 
 def long_record(policy: str, tokens: int | None, **fields: object) -> Record:
@@ -85,7 +85,7 @@ def run(tmp_path: Path) -> Path:
 
 
 @pytest.mark.browser
-def test_the_page_strikes_out_what_was_cut(open_page: Any, run: Path) -> None:
+def test_the_page_strikes_out_what_was_cut(open_page, run):
     call("report", run)
     with open_page((run / "report.html").as_uri()) as page:
         warnings = " ".join(page.locator(".warning").all_inner_texts())
@@ -104,11 +104,13 @@ def test_the_page_strikes_out_what_was_cut(open_page: Any, run: Path) -> None:
         assert found == {"whole": ("", False), "silent": ("", False), "cutting": cut}
 
 
-def test_a_guess_without_a_meaning_stands_next_to_the_rate() -> None:
+def test_a_guess_without_a_meaning_stands_next_to_the_rate():
     known = make_results("111")
     guess = make_result("failure", 3, guessed=True)
     (table,) = make_run_tables(frame_of([*known, guess]))
     words = "guessed a goal in 1 of 4 episodes, whose words have no meaning for it."
+
     assert [note for note in table.notes if words in note]
+
     (table,) = make_run_tables(frame_of(known))
     assert not [note for note in table.notes if "guessed" in note]

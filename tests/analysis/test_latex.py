@@ -6,7 +6,6 @@ import re
 import shutil
 import subprocess
 from decimal import Decimal
-from pathlib import Path
 
 import pytest
 from flat_jobs import frame_of
@@ -63,10 +62,10 @@ def text() -> str:
     """All tables."""
     like = like_published
     data = RunData(frame_of([*like("main"), *like("real"), *like("context")]))
-    perfect = [replace(one, outcome="success") for one in like("main", "MemER")]
+    perfect = [replace(result, outcome="success") for result in like("main", "MemER")]
     tables = [
         make_table("main", RunData(frame_of(perfect)), published=True),
-        *(make_table(one, data, published=True) for one in WHICH if one != "other"),
+        *(make_table(which, data, published=True) for which in WHICH if which != "other"),
         crowded(policies=2, tasks=7),
         crowded(policies=40, tasks=2),
         FACTS,
@@ -74,15 +73,18 @@ def text() -> str:
     return "\n\\clearpage\n".join(map(latex, tables))
 
 
-def test_every_name_and_rate_is_there_once() -> None:
+def test_every_name_and_rate_is_there_once():
     """And the notes below the last of the tables."""
     table = crowded(policies=30, tasks=20)
     text = latex(table)
     plain = text.replace(r"\allowbreak{}", "").replace("\\_", "_")
     labels = re.findall(r"\\label\{(.*?)\}", text)
+
     assert len(set(labels)) == len(labels) > 3
+
     rate = r"\textbf{100.00}\roboirgdown{100.00}\textsuperscript{!\ldots{}$\neq$}"
     assert plain.count(rate) == len(table.rows) * len(table.columns)
+
     names = [plain.count(f"\n{row.name} &") for row in table.rows]
     assert set(names) == {9}  # in three settings, and the columns in three parts
     assert text.count("folder") == 30
@@ -97,13 +99,15 @@ def test_every_name_and_rate_is_there_once() -> None:
 @pytest.mark.parametrize(
     "document", ["[conference]{IEEEtran}", "{article}", "[twocolumn]{article}"]
 )
-def test_no_box_is_overfull(tmp_path: Path, text: str, document: str) -> None:
+def test_no_box_is_overfull(tmp_path, text, document):
     (tmp_path / "paper.tex").write_text(DOCUMENT % (document, text), encoding="utf-8")
     subprocess.run(
         ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"],
         cwd=tmp_path, check=True, capture_output=True,
     )  # fmt: skip
     log = (tmp_path / "paper.log").read_text(errors="replace")
+
     bad = [line for line in log.splitlines() if re.search(r"Overfull|too large|^!", line)]
+
     assert bad == []
     assert (tmp_path / "paper.pdf").stat().st_size > 10_000

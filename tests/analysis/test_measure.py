@@ -36,43 +36,51 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
 
 @settings(max_examples=8)
 @given(st.data())
-def test_measure_is_what_pandas_gives(played: pd.DataFrame, data: st.DataObject) -> None:
-    from statsmodels.stats.multitest import multipletests
-
+def test_measure_is_what_pandas_gives(played, data):
     outcomes = st.sampled_from(["success", "failure", "error"])
     drawn = data.draw(st.lists(outcomes, min_size=len(played), max_size=len(played)))
     frame = played.assign(outcome=drawn)
-    by = ("policy", "setting")
+    judged = frame[frame["outcome"] != "error"]
+    judged = judged.assign(won=judged["outcome"] == "success")
+    by = ["policy", "setting"]
+
     found = roboirg.measure(frame, by, against={"setting": "explicit"}, family=["policy"])
-    assert [one.key for one in found] == list(frame.groupby(list(by), sort=False).groups)
-    judged = frame[frame["outcome"] != "error"].assign(won=lambda one: one["outcome"] == "success")
-    rates = judged.groupby([*by, "task"])["won"].mean().groupby(list(by)).mean()
-    for one in found:
-        own = judged[(judged["policy"] == one.key[0]) & (judged["setting"] == one.key[1])]
-        assert (one.counts.trials, one.counts.successes) == (len(own), own["won"].sum())
-        assert one.counts.errors == 3 * 2 * 2 - len(own)
-        assert (
-            one.rate is None if own.empty else float(one.rate or 0) == pytest.approx(rates[one.key])
-        )
+
+    assert [row.key for row in found] == list(frame.groupby(by, sort=False).groups)
+    rates = judged.groupby([*by, "task"])["won"].mean().groupby(by).mean()
+    for row in found:
+        policy, setting = row.key
+        own = judged[(judged["policy"] == policy) & (judged["setting"] == setting)]
+        assert row.counts.trials == len(own)
+        assert row.counts.successes == own["won"].sum()
+        assert row.counts.errors == 3 * 2 * 2 - len(own)
+        if own.empty:
+            assert row.rate is None
+        else:
+            assert float(row.rate or 0) == pytest.approx(rates[row.key])
     for policy in ("listener", "forgetful"):
-        tested = [one for one in found if one.gap and one.key[0] == policy]
-        if tested:
-            corrected = multipletests(
-                [one.gap.p_value for one in tested if one.gap], method="holm"
-            )[1]
-            assert [one.p_holm for one in tested] == pytest.approx(list(corrected))
+        check_holm([row for row in found if row.gap and row.key[0] == policy])
 
 
-def test_rows_of_several_settings_are_pooled_in_any_order(played: pd.DataFrame) -> None:
+def check_holm(rows):
+    """Check that p-values of a family are corrected as statsmodels corrects them."""
+    from statsmodels.stats.multitest import multipletests
+
+    if rows:
+        _, corrected, *_ = multipletests([row.gap.p_value for row in rows], method="holm")
+        assert [row.p_holm for row in rows] == pytest.approx(list(corrected))
+
+
+def test_rows_of_several_settings_are_pooled_in_any_order(played):
     """By policy alone an episode has a row for each setting; none gets lost."""
     rates = played.groupby(["policy", "task"])["success"].mean().groupby("policy").mean()
     for frame in (played, played[::-1]):
-        for one in roboirg.measure(frame, ["policy"], pool=["instruction_options"]):
-            assert float(one.rate or 0) == pytest.approx(rates[one.key[0]])
-            assert one.counts.trials == (played["policy"] == one.key[0]).sum()
+        for row in roboirg.measure(frame, ["policy"], pool=["instruction_options"]):
+            assert float(row.rate or 0) == pytest.approx(rates[row.key[0]])
+            assert row.counts.trials == (played["policy"] == row.key[0]).sum()
 
 
-def test_a_rate_is_over_both_forms_only_if_the_call_names_them(played: pd.DataFrame) -> None:
+def test_a_rate_is_over_both_forms_only_if_the_call_names_them(played):
     """Implicit ones are won, resolved ones lost: 50 % is no success of either."""
     resolved = played.assign(form="resolved", outcome="failure", instruction_options="resolved")
     frame = pd.concat([played, resolved])
@@ -80,10 +88,12 @@ def test_a_rate_is_over_both_forms_only_if_the_call_names_them(played: pd.DataFr
         InvalidValueError, match=r"values of form \(implicit, resolved\): add 'form'"
     ):
         roboirg.measure(frame, ["policy", "setting"])
+
     by_form = roboirg.measure(frame, ["policy", "setting", "form"])
-    assert {(one.key[-1], one.rate) for one in by_form} == {("implicit", 1), ("resolved", 0)}
+    assert {(row.key[-1], row.rate) for row in by_form} == {("implicit", 1), ("resolved", 0)}
+
     both = roboirg.measure(frame, ["policy", "setting"], pool=["form", "instruction_options"])
-    assert {(one.rate, one.counts.trials) for one in both} == {(Fraction(1, 2), 24)}
+    assert {(row.rate, row.counts.trials) for row in both} == {(Fraction(1, 2), 24)}
 
 
 @pytest.mark.parametrize(
@@ -100,13 +110,13 @@ def test_a_rate_is_over_both_forms_only_if_the_call_names_them(played: pd.DataFr
         ({"by": ["policy", "setting"]}, "Several rows of a group are about"),
     ],
 )
-def test_a_wrong_question_is_one_sentence(played: pd.DataFrame, asked, words) -> None:
+def test_a_wrong_question_is_one_sentence(played, asked, words):
     with pytest.raises(InvalidValueError, match=words):
         roboirg.measure(pd.concat([played, played]), **asked)
 
 
 @pytest.mark.parametrize("outcome", ["Success", "success ", True, 1, None])
-def test_an_outcome_that_is_none_is_no_failure(played: pd.DataFrame, outcome: object) -> None:
+def test_an_outcome_that_is_none_is_no_failure(played, outcome):
     frame = played.astype({"outcome": object})
     frame.loc[0, "outcome"] = outcome
     with pytest.raises(InvalidValueError, match=f"'outcome' has (no value|{outcome!r};)"):
@@ -114,18 +124,18 @@ def test_an_outcome_that_is_none_is_no_failure(played: pd.DataFrame, outcome: ob
 
 
 @pytest.mark.parametrize("name", ["task", "episode", "policy_seed"])
-def test_a_row_of_no_trial_is_refused(played: pd.DataFrame, name: str) -> None:
+def test_a_row_of_no_trial_is_refused(played, name):
     with pytest.raises(InvalidValueError, match=f"{name!r} has no value in some row"):
         roboirg.measure(played.assign(**{name: pd.NA}), ["policy", "setting"])
 
 
-def test_a_column_that_stands_twice_is_refused(played: pd.DataFrame) -> None:
+def test_a_column_that_stands_twice_is_refused(played):
     frame = pd.concat([played, played[["task"]]], axis=1)
     with pytest.raises(InvalidValueError, match="several columns 'task'"):
         roboirg.measure(frame, ["policy", "setting"])
 
 
-def test_averages_are_unweighted_and_suites_stand_by_themselves() -> None:
+def test_averages_are_unweighted_and_suites_stand_by_themselves():
     results = [
         *make_results("1" * 9, task="PickXtimes"),
         *make_results("0", task="BinFill"),
@@ -133,8 +143,9 @@ def test_averages_are_unweighted_and_suites_stand_by_themselves() -> None:
         *make_results("1", task="SomethingElse"),
     ]
     found = summarize(cells_of(frame_of(results)))
-    rates = {key.scope: one.rate for key, one in found.items()}
+    rates = {key.scope: summary.rate for key, summary in found.items()}
     tasks = {"PickXtimes": 1, "BinFill": 0, "VideoUnmask": 0, "SomethingElse": 1}
+
     assert rates == {
         **tasks,
         "counting": Fraction(1, 2),
@@ -144,7 +155,7 @@ def test_averages_are_unweighted_and_suites_stand_by_themselves() -> None:
     assert list(rates)[-1] == ALL_TASKS
 
 
-def test_gaps_are_corrected_in_three_families_and_forms_compared() -> None:
+def test_gaps_are_corrected_in_three_families_and_forms_compared():
     """All of 20 are won in explicit, none in direct, 15 in its resolved form."""
     results = [
         *make_results("1" * 20),
@@ -152,12 +163,18 @@ def test_gaps_are_corrected_in_three_families_and_forms_compared() -> None:
         *make_results("1" * 15 + "0" * 5, "direct", form="resolved"),
     ]
     summaries = summarize(cells_of(frame_of(results)))
-    explicit = [one for key, one in summaries.items() if key.options == REFERENCE_OPTIONS]
-    direct = [one for key, one in summaries.items() if key.options == InstructionOptions("direct")]
-    assert [(one.gap, one.p_holm, one.second_gap) for one in explicit] == [(None, None, None)] * 3
+    explicit = [summary for key, summary in summaries.items() if key.options == REFERENCE_OPTIONS]
+
+    direct = [
+        summary for key, summary in summaries.items() if key.options == InstructionOptions("direct")
+    ]
+
+    assert [(summary.gap, summary.p_holm, summary.second_gap) for summary in explicit] == [
+        (None, None, None)
+    ] * 3
     assert explicit[0].interval == wilson_interval(20, 20)
     # An exact test of 20 episodes that differ, all to one side, next to that of the resolved form.
-    assert [one.p_holm for one in direct] == pytest.approx([2 * 2 / 2**20] * 3)
-    assert [one.gap.value for one in direct] == [-1] * 3
+    assert [summary.p_holm for summary in direct] == pytest.approx([2 * 2 / 2**20] * 3)
+    assert [summary.gap.value for summary in direct] == [-1] * 3
     assert direct[0].second_gap.value == -0.75
     assert direct[0].second_gap.overlap == (0, 0, 15, 5)

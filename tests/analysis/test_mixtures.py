@@ -1,7 +1,5 @@
 """What results do not have in common: kept apart, named once, and refused in a comparison."""
 
-from __future__ import annotations
-
 import pytest
 from flat_jobs import frame_of, make_result
 
@@ -39,31 +37,47 @@ AVERAGED = [
 
 @pytest.mark.parametrize("policy", ["listener", "other"])
 @pytest.mark.parametrize(("fields", "sentence"), [*UNFAIR, *APART, *AVERAGED])
-def test_each_difference_is_one_sentence(policy, fields, sentence) -> None:
+def test_each_difference_is_one_sentence(policy, fields, sentence):
     """With the same policy or another."""
+    runs = two_runs(policy, fields)
+    expected = [sentence.format(policy)]
+    if "{}" in sentence and policy == "other":
+        expected = []  # of two policies each has its own
+
+    found = mixtures([*runs["a"], *runs["b"]])
+
+    assert [words.partition(". ")[0] + "." for words in found] == expected
+
+    frame = make_frame([*runs.items()])
+    (table,) = with_mixtures([make_table("main", RunData(frame))], frame)
+    assert list(table.notes[len(table.notes) - len(found) :]) == found
+    assert len({row.name for row in table.rows}) == len(table.rows) == len(frame.names)
+
+
+def two_runs(policy, fields):
+    """Return results of two runs that differ in some fields, and the second in its policy."""
     usual = {"render_device": "llvmpipe", "verdict_code": "0a"}
     first = [make_result(episode=episode, **usual) for episode in range(2)]
     second = [make_result(episode=episode, policy=policy, **usual | fields) for episode in range(2)]
-    runs = [
-        ("a", [*first, make_result(episode=2)]),
-        ("b", second),
-    ]  # nothing was rendered, and what decides verdicts is not known: fits all
-    is_of_policy, is_same = "{}" in sentence, policy == "listener"
-    expected = [] if is_of_policy and not is_same else [sentence.format(policy)]
-    found = mixtures([one for _, results in runs for one in results])
-    assert [one.partition(". ")[0] + "." for one in found] == expected
-    frame = make_frame(runs)
-    (table,) = with_mixtures([make_table("main", RunData(frame))], frame)
-    assert [*table.notes[-len(found) :]] * bool(found) == found
-    assert len({row.name for row in table.rows}) == len(table.rows) == len(frame.names)
-    if not is_same:
-        sides = [frame.where(policy=one) for one in ("listener", "other")]
-        if (fields, sentence) in UNFAIR:
-            with pytest.raises(InvalidValueError, match="cannot be compared") as refused:
-                compare(*sides)
-            assert str(refused.value) == found[0]
-        else:
-            compare(*sides)
+    not_rendered = make_result(episode=2)  # and what decides verdicts is not known: fits all
+    return {"a": [*first, not_rendered], "b": second}
+
+
+@pytest.mark.parametrize("fields", [fields for fields, _ in UNFAIR])
+def test_what_would_be_unfair_is_not_compared(fields):
+    runs = two_runs("other", fields)
+    frame = make_frame([*runs.items()])
+    (sentence,) = mixtures([*runs["a"], *runs["b"]])
+
+    with pytest.raises(InvalidValueError, match="cannot be compared") as refused:
+        compare(frame.where(policy="listener"), frame.where(policy="other"))
+    assert str(refused.value) == sentence
+
+
+@pytest.mark.parametrize("fields", [fields for fields, _ in (*APART, *AVERAGED)])
+def test_policies_are_compared_over_devices_and_versions(fields):
+    frame = make_frame([*two_runs("other", fields).items()])
+    compare(frame.where(policy="listener"), frame.where(policy="other"))
 
 
 @pytest.mark.parametrize(
@@ -73,22 +87,32 @@ def test_each_difference_is_one_sentence(policy, fields, sentence) -> None:
         ({"verdict_code": "0a"}, {"verdict_code": None}),
     ],
 )
-def test_other_code_is_no_mixture_if_verdicts_are_decided_alike(fields, other_fields) -> None:
+def test_other_code_is_no_mixture_if_verdicts_are_decided_alike(fields, other_fields):
     """Known to be, or of the same version of the package, in earlier records."""
     assert not mixtures([make_result(code="0", **fields), make_result(code="1", **other_fields)])
 
 
-def test_other_words_are_refused_where_task_and_pool_are_the_same_and_split_no_rows() -> None:
+def test_other_words_are_refused_where_task_and_pool_are_the_same_and_split_no_rows():
     first, same_task = (make_result(words=words) for words in WORDS)
     other_task = make_result(words="StopCube/test@2c", task="StopCube")
-    own_words = make_result(words="PickXtimes/test/lab@3d", setting="lab")
-    assert not mixtures([first, other_task, own_words])
-    (_,) = mixtures([first, make_result(words=WORDS[1], wordings="mine@0a")])  # that alone
-    (sentence,) = mixtures([own_words, make_result(words="PickXtimes/test/lab@4e")])
-    assert sentence.startswith("Mixed words of a task and pool: PickXtimes/test/lab@3d, Pick")
+
     (sentence,) = mixtures([first, other_task, same_task])
+
+    with pytest.raises(InvalidValueError, match=sentence[:60]):
+        compare(frame_of([first]), frame_of([same_task]))
     both = [("a", [first, other_task]), ("b", [make_result(words=WORDS[1], episode=1)])]
     assert len(make_frame(both).names) == 1
-    frames = [frame_of([one]) for one in (first, same_task)]
-    with pytest.raises(InvalidValueError, match=sentence[:60]):
-        compare(*frames)
+
+
+def test_words_are_mixed_in_one_task_and_pool_alone():
+    first = make_result(words=WORDS[0])
+    other_task = make_result(words="StopCube/test@2c", task="StopCube")
+    own_words = make_result(words="PickXtimes/test/lab@3d", setting="lab")
+
+    assert not mixtures([first, other_task, own_words])
+
+    (sentence,) = mixtures([own_words, make_result(words="PickXtimes/test/lab@4e")])
+    assert sentence.startswith("Mixed words of a task and pool: PickXtimes/test/lab@3d, Pick")
+
+    other_words = make_result(words=WORDS[1], wordings="mine@0a")
+    assert len(mixtures([first, other_words])) == 1, "that alone"

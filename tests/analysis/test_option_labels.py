@@ -1,7 +1,5 @@
 """Labels and order of instruction options."""
 
-from __future__ import annotations
-
 from roboirg.analysis.results.option_labels import (
     has_default_options,
     options_label,
@@ -11,7 +9,7 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.settings import plain_settings, setting_names
 
 
-def test_labels_name_what_differs_from_the_defaults() -> None:
+def test_labels_name_what_differs_from_the_defaults():
     options = InstructionOptions("contextual", "resolved", (1, 5), "competing", 3, "camera")
     assert options_label(options) == (
         "contextual (resolved, stages 1,5, competing distractor, 3 distractors, camera frame)"
@@ -20,13 +18,14 @@ def test_labels_name_what_differs_from_the_defaults() -> None:
     assert options_label(InstructionOptions("direct", delivery="turns")) == "direct (in turns)"
 
 
-def test_settings_have_the_order_of_the_language_and_unknown_ones_are_last() -> None:
+def test_settings_have_the_order_of_the_language_and_unknown_ones_are_last():
     names = ["zeta", *reversed(setting_names()), "alpha"]
     options = [
         InstructionOptions(name, form) for name in names for form in ("resolved", "implicit")
     ]
     ordered = sorted(options, key=options_sort_key)
-    assert [one.setting for one in ordered[::2]] == [*setting_names(), "alpha", "zeta"]
-    assert {one.form for one in ordered[::2]} == {"implicit"}
-    shown = dict.fromkeys(one.setting for one in ordered if has_default_options(one))
+    assert [options.setting for options in ordered[::2]] == [*setting_names(), "alpha", "zeta"]
+    assert {options.form for options in ordered[::2]} == {"implicit"}
+
+    shown = dict.fromkeys(options.setting for options in ordered if has_default_options(options))
     assert list(shown) == [*plain_settings(), "alpha", "zeta"]

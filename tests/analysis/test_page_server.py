@@ -61,11 +61,12 @@ def ask(
     return response, body
 
 
-def test_videos_are_answered_whole_and_in_parts_and_only_read(server: AppServer) -> None:
+def test_videos_are_answered_whole_and_in_parts_and_only_read(server):
     path = "/videos/a%20b.mp4"
     response, body = ask(server, path)
     assert (response.status, body) == (200, FILM)
     assert response.headers["Accept-Ranges"] == "bytes"
+
     response, body = ask(server, path, Range="bytes=100-")
     assert (response.status, body) == (206, FILM[100:])
     assert response.headers["Content-Type"] == "video/mp4"
@@ -80,7 +81,7 @@ def test_videos_are_answered_whole_and_in_parts_and_only_read(server: AppServer)
         "//etc/passwd", "/link", "/..%2fsecret", "/videos", "/nothing", "/%00", "/" + "a" * 5000,
     ],
 )  # fmt: skip
-def test_nothing_outside_of_the_run_is_served(server: AppServer, path: str) -> None:
+def test_nothing_outside_of_the_run_is_served(server, path):
     # A raw socket: clients would tidy up the path.
     with socket.create_connection(("127.0.0.1", server.port)) as raw:
         host = f"127.0.0.1:{server.port}"
@@ -91,7 +92,7 @@ def test_nothing_outside_of_the_run_is_served(server: AppServer, path: str) -> N
     assert b"root:" not in answer
 
 
-def test_the_command_says_where_and_ends_with_ctrl_c(run: Path, wait_s: float) -> None:
+def test_the_command_says_where_and_ends_with_ctrl_c(run, wait_s):
     pytest.importorskip("jinja2")
     command = [sys.executable, "-m", "roboirg", "report", str(run), "--serve"]
     with subprocess.Popen(

@@ -28,11 +28,12 @@ from roboirg.tasks import all_tasks
 
 
 @given(st.integers(1, 5000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
-def test_rates_are_rounded_half_up_once(counts: tuple[int, int]) -> None:
+def test_rates_are_rounded_half_up_once(counts):
     exact = 100 * Fraction(*counts)
     printed = Fraction(percent(Fraction(*counts)))
     assert Fraction(-1, 200) < printed - exact <= Fraction(1, 200)
     assert str(percent(Fraction(*counts)))[-3] == "."
+
     # So are means of printed rates.
     rate = percent(Fraction(*counts))
     assert mean_percent([rate, more := rate + Decimal("0.01")]) == more
@@ -66,7 +67,7 @@ def table_of(which: str, *results: list, planned=(), **options) -> Table:
     return make_table(which, RunData(frame_of(*results, planned=planned)), **options)
 
 
-def test_what_is_incomplete_is_marked_and_compared_with_nothing() -> None:
+def test_what_is_incomplete_is_marked_and_compared_with_nothing():
     """The good policy wins all of BinFill and of the spatial setting.
 
     The poor one has an error of ButtonUnmask in direct, and an episode of StopCube still to play in
@@ -74,16 +75,18 @@ def test_what_is_incomplete_is_marked_and_compared_with_nothing() -> None:
     """
     settings = ("explicit", "direct", "spatial")
     good, poor = (
-        [one for one in whole(name, settings, split="val") if one.task != "PickXtimes"]
+        [result for result in whole(name, settings, split="val") if result.task != "PickXtimes"]
         for name in ("good", "poor")
     )
     good = [
-        replace(one, outcome="success") if "BinFill" in one.task or "sp" in one.setting else one
-        for one in good
+        replace(result, outcome="success")
+        if "BinFill" in result.task or "sp" in result.setting
+        else result
+        for result in good
     ]
-    planned = [one.identity for one in (*good, *poor)]
+    planned = [result.identity for result in (*good, *poor)]
     missing = ("StopCube", "explicit", 1)
-    poor = [one for one in poor if (one.task, one.setting, one.episode) != missing]
+    poor = [result for result in poor if (result.task, result.setting, result.episode) != missing]
     poor += [
         make_result("error", 2, policy="poor", task="ButtonUnmask", setting="direct", split="val"),
         make_result(
@@ -97,11 +100,13 @@ def test_what_is_incomplete_is_marked_and_compared_with_nothing() -> None:
         ),
         make_result("failure", 0, policy="poor", task="Other", split="val"),
     ]
+
     table = table_of("main", good, poor, planned=planned, floors=(CHANCE,))
+
     assert get_format("markdown").draw(table) == PRINTED.read_text("utf-8")
 
 
-def test_each_split_has_floors_of_its_own() -> None:
+def test_each_split_has_floors_of_its_own():
     """A mean over both would be no chance of either."""
     runs = {
         split: make_results("1" * 9, "direct", split=split, task="BinFill")
@@ -109,26 +114,31 @@ def test_each_split_has_floors_of_its_own() -> None:
     }
     both = table_of("main", *runs.values(), floors=(CHANCE,))
     found = []
+
     for split, run in runs.items():
         alone = entries(table_of("main", run, floors=(CHANCE,)), "direct", CHANCE, "chance")
         own = entries(both, "direct", f"{CHANCE}, split {split}", "chance")
         assert own["BinFill"].percent == alone["BinFill"].percent
         found.append(own["BinFill"].percent)
+
     assert found[0] != found[1]
 
 
-def test_only_informative_tables_are_wanted() -> None:
+def test_only_informative_tables_are_wanted():
     def wanted(*results: list) -> set[str]:
-        return {one for one in WHICH if is_informative(one, RunData(frame_of(*results)))}
+        data = RunData(frame_of(*results))
+        return {name for name in WHICH if is_informative(name, data)}
 
     two = [*whole(), *whole("b")]
+    planners = [with_version(result, "planner + scripted hands") for result in whole()]
+    contextual = whole(settings=("contextual",))
+    short = whole(settings=("contextual",), stages=(1, 5))
+
     assert wanted(whole(settings=("explicit", "contextual"))) == {"main"}
     assert wanted(two) == {"main"}
-    assert wanted([with_version(two[0], "planner + scripted hands"), *two]) == {"main", "planner"}
-    alone = [with_version(one, "planner + scripted hands") for one in whole()]
-    assert wanted(alone) == {"main"}
-    short = whole(settings=("contextual",), stages=(1, 5))
-    assert wanted(whole(settings=("contextual",)), short) == {"main", "context"}
+    assert wanted([planners[0], *two]) == {"main", "planner"}
+    assert wanted(planners) == {"main"}
+    assert wanted(contextual, short) == {"main", "context"}
     assert wanted([make_result(task="PutInBox")]) == {"real"}
     assert wanted([make_result(task="Outside")]) == {"other"}
     assert wanted([make_result(arm="silent"), *two]) == {"main"}
@@ -148,9 +158,7 @@ NAME = "a_package.with_a_long_name.policies:" + "Net" * 40
         (NAME, 60, None),
     ],
 )
-def test_wide_tables_are_drawn_in_parts_with_every_rate_and_name(
-    name: str, width: int, parts: int | None
-) -> None:
+def test_wide_tables_are_drawn_in_parts_with_every_rate_and_name(name, width, parts):
     table = table_of("main", whole(name))
     texts = []
     for terminal in (True, False):
@@ -159,7 +167,9 @@ def test_wide_tables_are_drawn_in_parts_with_every_rate_and_name(
         )
         console.print(renderable(table, console))
         texts.append(console.file.getvalue())
+
     folded, written = texts
+
     assert parts in (None, folded.count("Success by task and setting"))
     assert folded.count("50.00") == 2 * len(table.columns)
     # In terminals names are folded; in files lines are as long as they need.
@@ -168,27 +178,29 @@ def test_wide_tables_are_drawn_in_parts_with_every_rate_and_name(
     assert "…" not in folded + written
 
 
-def test_csv_has_every_entry_with_its_counts() -> None:
+def test_csv_has_every_entry_with_its_counts():
     error = make_results("--!", "direct", policy="a", task="BinFill")
     table = table_of("main", whole(), error)
     lines = list(csv.DictReader(io.StringIO(get_format("csv").draw(table))))
     assert len(lines) == sum(len(row.entries) for row in table.rows)
-    (line,) = [one for one in lines if (one["group"], one["column"]) == ("direct", "BinFill")]
+
+    (line,) = [line for line in lines if (line["group"], line["column"]) == ("direct", "BinFill")]
     counts = {"successes": "1", "trials": "2", "episodes": "2", "errors": "1", "missing": "0"}
     assert line.items() >= {"incomplete": "errors", **counts}.items()
 
 
-def test_tasks_outside_the_paper_have_a_table_of_their_own() -> None:
+def test_tasks_outside_the_paper_have_a_table_of_their_own():
     of_task = {"policy": "a", "task": "Outside"}
     outside = [*make_results("1", **of_task), *make_results("1", "direct", **of_task)]
     table = table_of("other", whole(), outside, published=True)
     assert [column.name for column in table.columns] == ["Outside", "Avg"]
     assert str(entries(table, "direct")["Outside"]) == "100.00 →0.00"
+
     main = table_of("main", whole(), outside)
     assert main.rows == table_of("main", whole()).rows
 
 
-def test_results_of_the_twin_are_marked_and_kept_apart_from_a_robots() -> None:
+def test_results_of_the_twin_are_marked_and_kept_apart_from_a_robots():
     table = table_of(
         "real",
         [make_result("success", task="PutInBox", privileged=True)],
@@ -196,6 +208,7 @@ def test_results_of_the_twin_are_marked_and_kept_apart_from_a_robots() -> None:
         published=True,
     )
     ours = {row.name: row.entries[0].text for row in table.rows if row.source == "ours"}
+
     assert ours == {
         "listener (privileged) (twin)": "100.00",
         "listener, on a robot (privileged)": "0.00",

@@ -33,12 +33,13 @@ def failed() -> Record:
         ("right", None, "hands"),
     ],
 )
-def test_the_act_that_ended_the_episode_names_the_failure(
-    failed: Record, verdicts: str, attribution: Attribution | None, named: str
-) -> None:
+def test_the_act_that_ended_the_episode_names_the_failure(failed, verdicts, attribution, named):
     """Or else the last wrong subgoal, as those before it were corrected."""
-    said = [SubgoalRecord(step=5, text="pick it up", verdict=one) for one in verdicts.split()]
+    said = [
+        SubgoalRecord(step=5, text="pick it up", verdict=verdict) for verdict in verdicts.split()
+    ]
     record = replace(failed, steps=9, subgoals=tuple(said), attribution=attribution)
+
     assert planner_failure(record) == named
     assert planner_failure(replace(record, policy_metadata={}, subgoals=())) is None
 
@@ -54,14 +55,14 @@ def test_the_act_that_ended_the_episode_names_the_failure(
         ("failed", None, 9, "hands"),
     ],
 )
-def test_the_last_subgoal_names_it_when_time_is_up(
-    failed: Record, ended: str | None, why: str | None, ago: int, named: str
-) -> None:
+def test_the_last_subgoal_names_it_when_time_is_up(failed, ended, why, ago, named):
     """Whatever replies could not be read before it."""
     steps = failed.environment.max_steps
     said = SubgoalRecord(
         step=steps - ago, text="pick up the cube", verdict="right", ended=ended, why=why
     )
     usage = {"unparsed": 2.0}
+
     record = replace(failed, steps=steps, subgoals=(said,), attribution=WRONG, usage=usage)
+
     assert planner_failure(record) == named

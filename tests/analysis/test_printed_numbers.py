@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -109,55 +109,60 @@ def rates_of(frame: Frame) -> Iterator[float]:
     for make, names in tables.items():
         with contextlib.suppress(InvalidValueError):  # nothing to show
             yield from numbers(make(data), *names)
-    for one in data.summaries.values():
-        yield 100 * float(one.rate or 0)
+    for summary in data.summaries.values():
+        yield 100 * float(summary.rate or 0)
+    for rate in results_of(data).rates().values():
+        yield 100 * rate
+
+
+def results_of(data: RunData) -> Results:
+    """Return what a caller gets, of results that were never stored."""
     results = Results(Path())
     results.__dict__["_data"] = data
-    yield from (100 * rate for rate in results.rates().values())
+    return results
 
 
 @settings(max_examples=60, deadline=None)
 @given(alike(), st.data())
-def test_no_rate_is_over_two_forms_arms_policies_words_or_worlds(
-    found: list[Words], data: st.DataObject
-) -> None:
+def test_no_rate_is_over_two_forms_arms_policies_words_or_worlds(told, data):
     """All episodes of the same words end alike, so that a rate over others too is in between."""
-    results: list[Summary] = []
     places = st.lists(st.tuples(st.sampled_from(TASKS), st.integers(0, 2)), min_size=1, unique=True)
-    for words in found:
+    results = []
+    for words in told:
+        fields = words._asdict()
+        fields["prompt_verdict"] = data.draw(st.sampled_from(["heard", "cut"]))
         outcome = data.draw(st.sampled_from(["success", "failure"]))
-        prompt = data.draw(st.sampled_from(["heard", "cut"]))
         for task, episode in data.draw(places):
-            fields = {**words._asdict(), "task": task, "prompt_verdict": prompt}
-            results.append(make_result(outcome, episode, **fields))
+            results.append(make_result(outcome, episode, task=task, **fields))
     frame = frame_of(results)
+
     assert {abs(rate) for rate in rates_of(frame)} <= {0, 100}
-    told = [one for one in found if one.arm == "told"] or found
-    holder = Results(Path())
-    holder.__dict__["_data"] = RunData(frame)
-    assert len(holder.rates()) == len(told), "none hides another one"
+
+    in_full = [words for words in told if words.arm == "told"]
+    assert len(results_of(RunData(frame)).rates()) == len(in_full or told), "none hides another one"
+
     by = data.draw(st.lists(st.sampled_from([*KEPT_APART, "setting"]), unique=True))
     with contextlib.suppress(InvalidValueError):  # refused
-        assert {one.rate for one in roboirg.measure(frame, by)} <= {0, 1}
+        assert {row.rate for row in roboirg.measure(frame, by)} <= {0, 1}
 
 
-def test_all_tasks_are_one_mean_in_the_terminal_on_the_page_and_in_python() -> None:
+def test_all_tasks_are_one_mean_in_the_terminal_on_the_page_and_in_python():
     """Nine of ten are won in one task and one of two in the other: 70 %, not ten of twelve."""
     results = [*make_results("0111111111"), *make_results("01", task="BinFill", policy_seed=1)]
     frame = frame_of(results)
     data = RunData(frame)
+
     (table,) = make_run_tables(frame)
+    (whole,) = (summary for key, summary in data.summaries.items() if key.scope == ALL_TASKS)
+
     assert [*numbers(table)][-1] == 70
-    (whole,) = (one for key, one in data.summaries.items() if key.scope == ALL_TASKS)
     assert cell_notes(whole, "")[1].startswith("70 % success, mean of 2 tasks")
-    holder = Results(Path())
-    holder.__dict__["_data"] = data
-    assert holder.rates() == {("listener", "explicit"): 0.7}
+    assert results_of(data).rates() == {("listener", "explicit"): 0.7}
 
 
-def intervals(one: Measured) -> Iterator[Interval | None]:
-    yield from (one.interval, one.other_interval)
-    for gap in (one.gap, one.second_gap):
+def intervals(measured: Measured) -> Iterator[Interval | None]:
+    yield from (measured.interval, measured.other_interval)
+    for gap in (measured.gap, measured.second_gap):
         if gap is not None:
             yield from (gap.interval, gap.retention_interval)
 
@@ -180,37 +185,53 @@ TABLES = st.dictionaries(
 
 @settings(max_examples=150, deadline=None)
 @given(TABLES)
-def test_an_interval_has_a_width_or_there_is_a_reason_why_there_is_none(
-    tables: dict[tuple[str, str, str, str, str, int], str],
-) -> None:
-    results = []
-    for (policy, task, setting, form, arm, seed), letters in tables.items():
-        words = {"policy": policy, "task": task, "setting": setting, "form": form, "arm": arm}
-        results += make_results(letters, policy_seed=seed, **words)
-    frame = frame_of(results)
+def test_an_interval_has_a_width_or_there_is_none(tables):
+    frame = frame_of_tables(tables)
     data = RunData(frame)
-    difficulty = break_down(frame, BREAKDOWNS["difficulty"])
-    ends = measure_ends(data, {ALL_TASKS}).values()
-    measured = [*data.summaries.values(), *difficulty, *arm_figures(frame), *sum(ends, ())]
-    found = [interval for one in measured for interval in intervals(one)]
+    measured = [*data.summaries.values(), *arm_figures(frame)]
+    measured += break_down(frame, BREAKDOWNS["difficulty"])
+    for ends in measure_ends(data, {ALL_TASKS}).values():
+        measured += ends
+
+    found = []
+    for row in measured:
+        found += intervals(row)
     for run in frame.names:
         headline = measure_headline(data.cells, run, ("direct", "reasoning"))
         found.append(headline and headline.interval)
+
     for interval in found:
         assert interval is None or interval.low < interval.high
         assert interval is None or not any(map(math.isnan, interval))
+
+
+@settings(max_examples=150, deadline=None)
+@given(TABLES)
+def test_where_there_is_no_interval_there_is_a_reason(tables):
+    frame = frame_of_tables(tables)
+
     table = make_breakdown_table(BREAKDOWNS["difficulty"], frame)
     for row in table.rows:
         *_, gap, ends, _ = row.entries
         assert (gap.text == "–") == (ends.text == "–")
         assert (" to " in ends.text) + (ends.text == TOO_FEW) + (ends.text == "–") == 1
-    for one in data.summaries.values():
-        lacks = one.rate is not None and one.interval is None
-        assert lacks == (TOO_FEW in cell_notes(one, ""))
+    for summary in RunData(frame).summaries.values():
+        lacks = summary.rate is not None and summary.interval is None
+        assert lacks == (TOO_FEW in cell_notes(summary, ""))
+
     try:
-        comparison = compare(*(frame.where(policy=one) for one in ("listener", "other")))
+        comparison = compare(frame.where(policy="listener"), frame.where(policy="other"))
     except InvalidValueError:
         return  # nothing in common
     for sentence in sentences(comparison, "listener", "other"):
         if " points" in sentence and "p = " in sentence:
             assert ("95 % interval" in sentence) != (TOO_FEW in sentence)
+
+
+def frame_of_tables(tables: Mapping[tuple, str]) -> Frame:
+    """Return the results whose outcomes are in these tables."""
+    results: list[Summary] = []
+    for (policy, task, setting, form, arm, seed), letters in tables.items():
+        words = {"policy": policy, "task": task, "setting": setting, "form": form, "arm": arm}
+        results += make_results(letters, policy_seed=seed, **words)
+    return frame_of(results)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections import defaultdict
 from fractions import Fraction
 from importlib import resources
 
@@ -62,45 +63,54 @@ def rows_of(table: Table, source: str) -> dict[tuple[str, str], dict[str, Entry]
     return found
 
 
-def test_every_rate_and_average_is_the_published_one(made: Table) -> None:
+def printed_entries(made, source):
+    """Return all that a reader sees of the rows of a source, by place and column."""
+    found = {}
+    for at, row in rows_of(made, source).items():
+        for name, entry in row.items():
+            found[at, name] = (entry.text, entry.marks, entry.change, entry.best)
+    return found
+
+
+def test_every_rate_and_average_is_the_published_one(made):
     """In our rows and in the published ones, which are drawn alike: arrows, dashes, bold."""
-    ours, theirs = (
-        {
-            at: {name: (one.text, one.marks, one.change, one.best) for name, one in row.items()}
-            for at, row in rows_of(made, source).items()
-        }
-        for source in ("ours", "published")
-    )
+    ours, theirs = (printed_entries(made, source) for source in ("ours", "published"))
     assert ours == theirs
+
     lines = printed(made.key)
-    assert {place(line) for line in lines} == set(ours)
+    assert {place(line) for line in lines} == {at for at, _ in ours}
+
     for line in lines:
         text = line["success_rate_percent"]
         expected = f"{float(text):.2f}" if text else "–"
-        assert (line, *ours[place(line)][line["task"]][:2]) == (line, expected, "")
+        shown, marks, *_ = ours[place(line), line["task"]]
+        assert (shown, marks) == (expected, ""), line
 
 
-def test_every_change_is_that_of_the_published_rates(made: Table) -> None:
+def test_every_change_is_that_of_the_published_rates(made):
     """Computed anew from the file: floats, no code of the package."""
-    rates: dict[tuple[str, str], dict[str, float]] = {}
+    rates: dict[tuple[str, str], dict[str, float]] = defaultdict(dict)
     for line in printed(made.key):
         if line["success_rate_percent"]:
-            rates.setdefault(place(line), {})[line["task"]] = float(line["success_rate_percent"])
+            rates[place(line)][line["task"]] = float(line["success_rate_percent"])
+
     for at, entries in rows_of(made, "ours").items():
-        before = rates[(at[0], "1,5") if made.key == "context" else ("explicit", at[1])]
-        tasks = [task for task in rates[at] if task != "Avg"]
+        reference = ("explicit", at[1])
+        if made.key == "context":
+            reference = (at[0], "1,5")
+        before = dict(rates[reference])
         # The average of the same tasks, as some settings have not all.
-        mean = round(sum(before[task] for task in tasks) / len(tasks) + 1e-9, 2)
-        for column, here in rates[at].items():
+        same_tasks = [before[task] for task in rates[at] if task != "Avg"]
+        before["Avg"] = round(sum(same_tasks) / len(same_tasks) + 1e-9, 2)
+        for column, rate in rates[at].items():
             change = entries[column].change
-            there = mean if column == "Avg" else before[column]
-            if rates[at] is before:
+            if at == reference:
                 assert change is None
             else:
-                assert (at, column, float(change)) == (at, column, round(here - there, 2))
+                assert float(change) == round(rate - before[column], 2), (at, column)
 
 
-def test_published_averages_are_means_of_the_printed_rates() -> None:
+def test_published_averages_are_means_of_the_printed_rates():
     """All rates are multiples of 1/150 (real world: 1/10), rounded half up, without exception."""
     count = 0
     for table in RATE_TABLES:
@@ -109,35 +119,36 @@ def test_published_averages_are_means_of_the_printed_rates() -> None:
             rates = [rate for rate in row.rates.values() if rate is not None]
             assert (row, mean_percent(rates)) == (row, row.average)
             exact = [Fraction(round(Fraction(rate) * trials / 100), trials) for rate in rates]
-            assert [percent(one) for one in exact] == rates
+            assert [percent(rate) for rate in exact] == rates
             count += len(rates)
     assert count == 255 + 30 + 36 + 20
 
 
-def test_the_coverage_of_this_benchmark_is_read_off_its_tasks() -> None:
+def test_the_coverage_of_this_benchmark_is_read_off_its_tasks():
     table = make_table("coverage", EMPTY)
     found = [(row.group, row.name, row.cells) for row in table.rows]
-    lines = [tuple(one.values()) for one in published_lines("coverage")]
+    lines = [tuple(line.values()) for line in published_lines("coverage")]
     published = [(kind, name, list(words)) for name, kind, *words in lines]
+
     assert found == published
     assert [row.name for row in table.rows if row.source == "ours"] == ["RoboIRGBench"]
 
 
 @pytest.mark.parametrize("which", WHICH)
 @pytest.mark.parametrize("name", FORMATS)
-def test_all_can_be_drawn_from_the_published_rows_alone(which: str, name: str) -> None:
+def test_all_can_be_drawn_from_the_published_rows_alone(which, name):
     text = FORMATS[name].draw(make_table(which, EMPTY, published=True))
     assert text.rstrip("\n") + "\n" == text
 
 
-def test_published_tables_fit_this_benchmark() -> None:
+def test_published_tables_fit_this_benchmark():
     for row in published_rows("main"):
         has = {task for task, rate in row.rates.items() if rate is not None}
         setting = row.options.setting
-        assert has == {name for name, one in all_tasks().items() if setting in settings_of(one)}
+        assert has == {name for name, task in all_tasks().items() if setting in settings_of(task)}
 
 
-def test_the_stored_notes_have_intervals_of_their_trials_and_stand_below_the_tables() -> None:
+def test_the_stored_notes_have_intervals_of_their_trials_and_stand_below_the_tables():
     """Computed anew: no code of the package."""
     for table, (first, *_) in NOTES.items():
         trials = math.prod(TRIALS[table])

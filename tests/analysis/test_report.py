@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 from page_text import PLAN, broken, played, render, store
-from syrupy.assertion import SnapshotAssertion
 
 from roboirg.analysis.page import report
 from roboirg.analysis.page.details import EpisodeDetails
@@ -65,7 +64,7 @@ def film(folder: Path, name: str = "x") -> str:
     return f"videos/{name}.mp4"
 
 
-def test_nothing_comes_from_outside_and_no_words_end_a_script() -> None:
+def test_nothing_comes_from_outside_and_no_words_end_a_script():
     text = render(records(), PICKS)
     assert not re.search(r"https?:|@import|url\(", text)
     assert "default-src 'none'" in text
@@ -75,29 +74,35 @@ def test_nothing_comes_from_outside_and_no_words_end_a_script() -> None:
     assert render(records()[::-1], PICKS) == text
 
 
-def test_mentions_and_the_resolved_form_are_those_of_the_episode() -> None:
+def test_mentions_and_the_resolved_form_are_those_of_the_episode():
     """The resolved form is said again where it was not played, of each goal by itself."""
     plan = PICKS.model_copy(update={"forms": PLAN.forms, "arms": ("told", "other-goal")})
-    found = [one for one in played(plan) if one.setting != "explicit"]
-    implicit, resolved = ([one for one in found if one.form == form] for form in PLAN.forms)
+    found = [record for record in played(plan) if record.setting != "explicit"]
+    implicit = [record for record in found if record.form == "implicit"]
+    resolved = [record for record in found if record.form == "resolved"]
+    texts = [" ".join(turn.text for turn in record.instruction) for record in resolved]
+
     page = Page(render(implicit))
-    texts = [" ".join(turn.text for turn in one.instruction) for one in resolved]
-    assert sorted(page.string(one["resolved"]) for one in page.details) == sorted(texts)
-    at = dict(zip(page.data["columns"]["key"], page.details, strict=True))
+
+    assert sorted(page.string(detail["resolved"]) for detail in page.details) == sorted(texts)
+    details = dict(zip(page.data["columns"]["key"], page.details, strict=True))
     for record in implicit:
-        mentions = at[record.slug.rpartition("-")[2]]["mentions"]
-        spans = [[one.utterance, one.start, one.end] for one in record.mentions]
-        assert [one[:3] for one in mentions] == spans
+        detail = details[record.slug.rpartition("-")[2]]
+        shown = [mention[:3] for mention in detail["mentions"]]
+        spans = [[mention.utterance, mention.start, mention.end] for mention in record.mentions]
+        assert shown == spans
 
 
-def test_what_is_of_other_versions_or_unknown_is_shown_as_it_is() -> None:
+def test_what_is_of_other_versions_or_unknown_is_shown_as_it_is():
     """Another version of the language may have other words, of the environment other stages."""
-    usual = next(one for one in records() if one.setting == "direct")
+    usual = next(record for record in records() if record.setting == "direct")
     turn = UtteranceRecord(stage="command", text="Do it.")
     mention = MentionSpan(
         utterance=0, start=3, end=5, role="anaphor", expression="it", slot="x", value=1
     )
+
     unknown = replace(usual, task="Homemade", instruction=(turn,), mentions=(mention,))
+
     for record, missing in (
         (usual, set()),
         (replace(usual, language_version="0.1"), {"resolved"}),
@@ -109,32 +114,38 @@ def test_what_is_of_other_versions_or_unknown_is_shown_as_it_is() -> None:
     assert page.string(page.details[0]["events"][-1][1]) == "took cube green off target"
 
 
-def test_things_of_one_look_have_numbers_and_what_ends_by_itself_is_not_shown() -> None:
+def test_things_of_one_look_have_numbers_and_what_ends_by_itself_is_not_shown():
     first, *_ = played(PICKS.model_copy(update={"tasks": ("BinFill",)}))
     event = EventRecord(step=1, kind="picked", subject="cube_red_1")
     over = replace(event, kind="over", place="bin", holds=False)
     page = Page(render([replace(first, events=(event, over))]))
+
     acts = [page.string(act) for _, act, _ in page.details[0]["events"]]
+
     assert acts == ["picked up the red cube (1)"]
 
 
-def test_what_is_amiss_is_said_first() -> None:
+def test_what_is_amiss_is_said_first():
     found = records()
     page = Page(render([*found[:-6], found[-1]], PICKS))
     assert f"Incomplete: 5 of {len(found)} planned" in page.notes
     assert f"1 of {len(found) - 5} episodes ended in an error (1 policy)" in page.notes
+
     cells = page.data["matrix"]["levels"][0]["cells"]
     assert sum(cell.get("missing", 0) for cell in cells) == 5
     assert Page(render(found[:-1])).notes == ""
-    lost = [replace(one, outcome="failure") for one in found if one.policy == "listener"]
+
+    lost = [replace(record, outcome="failure") for record in found if record.policy == "listener"]
     assert "Only one policy" in Page(render(lost)).notes
 
 
-def test_cells_choices_and_details_are_as_stored(snapshot: SnapshotAssertion) -> None:
+def test_cells_choices_and_details_are_as_stored(snapshot):
     """Of three scenes with other cubes, seeds and outcomes, with everything a record may hold."""
     settings = ("explicit", "contextual")
-    own = [one for one in records() if one.policy == "listener" and one.setting in settings]
-    *others, cut = sorted(own, key=lambda one: (one.episode, one.setting == "contextual"))
+    own = [
+        record for record in records() if record.policy == "listener" and record.setting in settings
+    ]
+    *others, cut = sorted(own, key=lambda record: (record.episode, record.setting == "contextual"))
     audit_record(cut, PreparedJob(cut.identity), PromptLimit(24, 0, most_tokens, "some.model"))
     said = [
         SubgoalRecord(step=0, text="pick it up", due="pick it up", verdict="right", ended="done"),
@@ -145,12 +156,14 @@ def test_cells_choices_and_details_are_as_stored(snapshot: SnapshotAssertion) ->
     cut = replace(cut, subgoals=tuple(said), started_at="2026-01-02T05:06:07", video_error="full")
     lost = {("contextual", 0), ("explicit", 1), ("contextual", 2)}
     found = [
-        replace(one, policy_seed=8 + one.episode, server_version="9",
-                outcome="failure" if (one.setting, one.episode) in lost else "success")
-        for one in (*others, cut)
+        replace(record, policy_seed=8 + record.episode, server_version="9",
+                outcome="failure" if (record.setting, record.episode) in lost else "success")
+        for record in (*others, cut)
     ]  # fmt: skip
     page = Page(render(found))
+
     assert "2026-01-02 03:04 to 05:06 UTC" in page.text
+
     shown = json.dumps([page.data, page.details, page.notes], indent=0, ensure_ascii=False)
     assert re.sub(r"language \S+, environment \d+", "", shown) == snapshot
 
@@ -167,11 +180,9 @@ def test_cells_choices_and_details_are_as_stored(snapshot: SnapshotAssertion) ->
         (None, None),
     ],
 )
-def test_a_failed_episode_shows_what_was_named_next_to_what_was_meant(
-    understood: object, goal: str | None
-) -> None:
+def test_a_failed_episode_shows_what_was_named_next_to_what_was_meant(understood, goal):
     """Of a planner, the last subgoal up to the failure; of an episode that succeeded, nothing."""
-    first = next(one for one in records() if one.attribution)
+    first = next(record for record in records() if record.attribution)
     said = tuple(
         SubgoalRecord(step=step, text=text, due="pick it up", verdict="lost")
         for step, text in ((51, "sing"), (60, "dance"), (61, "rest"))  # it failed at step 60
@@ -188,39 +199,42 @@ def test_a_failed_episode_shows_what_was_named_next_to_what_was_meant(
         assert texts[details.get("named", -1)] == expected
 
 
-def test_words_that_differ_stand_apart_and_are_named() -> None:
-    first = next(one for one in records() if one.setting == "direct")
+def test_words_that_differ_stand_apart_and_are_named():
+    first = next(record for record in records() if record.setting == "direct")
     page = Page(render([first, first.with_options(wordings="mine@1a")]))
     assert "Mixed words: our own words, the words of mine@1a." in page.notes
     assert page.data["matrix"]["policies"] == [
         "listener, the words of mine@1a (privileged)",
         "listener, our own words (privileged)",
     ]
+
     theirs, ours = page.details
     assert "resolved" in ours
     assert "resolved" not in theirs  # it can be derived in our own words only
     assert "in the words of mine@1a" in page.string(theirs["conditions"])
 
 
-def test_a_pair_is_of_one_scene_told_alike_under_equal_conditions() -> None:
+def test_a_pair_is_of_one_scene_told_alike_under_equal_conditions():
     """A number of two that lacks seed, form, arm or split; a value of a filter that is not ours."""
-    first, theirs = (one for one in records() if (one.setting, one.episode) == ("direct", 0))
+    first, theirs = (
+        record for record in records() if (record.setting, record.episode) == ("direct", 0)
+    )
     others = [
         replace(first, policy_seed=1), replace(first, arm="silent"),
         first.with_options(form="resolved"), replace(first, split="val", difficulty="odd"),
     ]  # fmt: skip
     page = Page(render([first, theirs, *others]))
     pairs, scenes = (Counter(page.data["columns"][name]) for name in ("pair", "scene"))
+
     assert sorted(pairs.values()) == [1, 1, 1, 1, 2]
     assert sorted(scenes.values()) == [1, 5]
-    choices = {one["name"]: one["values"] for one in page.data["choices"]}
+
+    choices = {choice["name"]: choice["values"] for choice in page.data["choices"]}
     assert choices["difficulty"] == [first.difficulty, "odd"]
     assert len(page.data["comparisons"]) == 3, "of the three policy runs that were told"
 
 
-def test_videos_are_in_the_page_or_next_to_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_videos_are_in_the_page_or_next_to_it(tmp_path, monkeypatch):
     first, second, *_ = records()
     filmed = replace(first, video=film(tmp_path, "a-b"))
     lost = replace(second, video="videos/gone.mp4", video_error="no room")
@@ -252,7 +266,7 @@ def test_videos_are_in_the_page_or_next_to_it(
     assert "plays them from the folder" not in packed.text
 
 
-def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
+def test_two_runs_are_held_against_each_other(tmp_path):
     theirs = tmp_path / "our theirs"
     found = records()
     runs = (
@@ -263,19 +277,27 @@ def test_two_runs_are_held_against_each_other(tmp_path: Path) -> None:
         os.write(log.descriptor, b"words")
     text = write_report(runs[0], against=runs[1]).read_text()
     page = Page(text)
+
     assert page.data["matrix"]["policies"] == [
         "listener, ours (privileged)", "forgetful, ours (privileged)",
         "listener, our theirs (privileged)", "forgetful, our theirs (privileged)",
     ]  # fmt: skip
     assert page.data["sides"] == [0, 2]
+
     # Videos and logs of the other run carry a key of their own, and are found from the page.
     key = f"{found[0].slug.rpartition('-')[2]}-2"
     assert page.scripts[f"film-{key}"].startswith("data:video")
+
     (link,) = [details["log"] for details in page.details if "log" in details]
     assert link == f"../our%20theirs/{log_path(Path(), found[0].slug)}"
     assert "Incomplete: 4 of" in page.notes
     # Other code that decides verdicts in the same way is a fact.
     assert f"<dd>0, {found[0].code}</dd>" in text
     assert "Mixed" not in page.notes
-    words = next(one for one in page.data["comparisons"] if (one["left"], one["right"]) == (0, 2))
+
+    words = next(
+        comparison
+        for comparison in page.data["comparisons"]
+        if (comparison["left"], comparison["right"]) == (0, 2)
+    )
     assert "listener, ours (privileged) against listener, our theirs" in words["sentences"][0]

@@ -20,7 +20,7 @@ def write_run(folder: Path, policies: tuple[str, ...], device: str | None = None
     plan = make_plan(
         policies, tasks="PickXtimes,StopCube", settings="explicit,direct", episodes="8"
     )
-    found = [replace(one, render_device=device) for one in played(plan)]
+    found = [replace(record, render_device=device) for record in played(plan)]
     return store(folder, found, plan).folder
 
 
@@ -35,31 +35,32 @@ def pack(run: Path) -> Path:
     return path
 
 
-def test_tables_are_written(run: Path, tmp_path: Path) -> None:
+def test_tables_are_written(run, tmp_path):
     out = tmp_path / "new" / "tables"
     printed = call("tables", run, "--format", "latex", "--out", out, "--published").split()
     names = ["coverage.tex", "main.tex", "planner.tex", "context.tex", "real.tex"]
     assert sorted(printed) == sorted(map(str, out.iterdir())) == sorted(str(out / n) for n in names)
+
     call("tables", "--format", "latex", "--out", out, "--published", "--which", "context")
     assert "29.11" in (out / "context.tex").read_text()
     assert "coverage,ours" in call("tables", "--which", "coverage", "--format", "csv")
 
 
-def test_several_tables_are_one_document_for_programs(run: Path) -> None:
+def test_several_tables_are_one_document_for_programs(run):
     """Pandas reads all rows of both tables and every number of them."""
     pandas = pytest.importorskip("pandas")
     words = ("tables", run, "--by", "difficulty,slots", "--format")
     rows = pandas.read_json(io.StringIO(call(*words, "json")))
     lines = pandas.read_csv(io.StringIO(call(*words, "csv")), na_values="–")
+
     assert set(rows["table"]) == set(lines["table"]) == {"by_difficulty", "by_slots"}
+
     gaps = lines[lines["column"] == "gap"]["word"].dropna().astype(float)
     assert gaps.min() == -100.0
     assert len(rows) == len(lines) / 5, "of each row five columns"
 
 
-def test_a_pack_is_read_like_the_folder_it_was_made_of(
-    run: Path, pack: Path, tmp_path: Path
-) -> None:
+def test_a_pack_is_read_like_the_folder_it_was_made_of(run, pack, tmp_path):
     for words in (
         ("tables", "--format", "csv"),
         ("tables", "--by", "difficulty", "--format", "json"),
@@ -67,41 +68,48 @@ def test_a_pack_is_read_like_the_folder_it_was_made_of(
         ("tables", "--which", "failures", "--format", "markdown"),
     ):
         assert call(*words, pack) == call(*words, run).replace(str(run), str(pack))
+
     sides = call("compare", f"{pack}:listener", f"{run}:forgetful", "--by", "difficulty")
     assert sides == call("compare", f"{run}:listener", f"{pack}:forgetful", "--by", "difficulty")
     assert "direct: listener (privileged) is better, +100.0 points" in sides
+
     drawn = call("figures", pack, "--published", "--which", "gaps", "--out", tmp_path).splitlines()
     assert [Path(path).name for path in drawn][:2] == ["gaps.png", "gaps.svg"]
 
 
-def test_a_page_is_written_next_to_a_pack_or_where_it_is_wanted(
-    run: Path, pack: Path, tmp_path: Path
-) -> None:
+def test_a_page_is_written_next_to_a_pack_or_where_it_is_wanted(run, pack, tmp_path):
     pages = [run / "report.html", pack.parent / "shipped.html", tmp_path / "page.html"]
     for words in ((run,), (pack,), (f"{pack}:listener", "--against", run, "--out", pages[2])):
         call("report", *words)
+
     folder, packed, both = (page.read_text("utf-8") for page in pages)
+
     assert packed == folder.replace("folder-run", "shipped")
     assert "<title>shipped:listener against folder-run" in both
 
 
-def test_policies_are_chosen_where_a_run_is_named(run: Path, pack: Path) -> None:
+def test_policies_are_chosen_where_a_run_is_named(run, pack):
     csv = ("--which", "main", "--format", "csv")
     whole = call("tables", run, *csv)
-    (head, *rows), one = whole.splitlines(), call("tables", f"{run}:forgetful", *csv)
+    (head, *rows) = whole.splitlines()
+    one = call("tables", f"{run}:forgetful", *csv)
+
     assert one.splitlines() == [head, *(row for row in rows if "forgetful" in row)]
     assert call("tables", f"{run}:forgetful", f"{run}:listener", run, *csv) == whole
+
     other = call("tables", f"{run}:forgetful", f"{pack}:listener", *csv)
     assert sorted(other.splitlines()) == sorted(whole.splitlines())
 
 
-def test_mixed_render_devices_are_named(run: Path, tmp_path: Path) -> None:
+def test_mixed_render_devices_are_named(run, tmp_path):
     devices = ("llvmpipe", "NVIDIA H100")
     runs = [
         write_run(tmp_path / name, (name,), device=device)
         for name, device in zip(("listener", "forgetful"), devices, strict=True)
     ]
+
     merged = tmp_path / "merged"
+
     for words in (
         ("records", "merge", *runs, "--out", merged),
         ("tables", *runs),
@@ -144,12 +152,11 @@ def test_mixed_render_devices_are_named(run: Path, tmp_path: Path) -> None:
         ("report RUN --serve --against RUN", "--serve shows one run"),
     ],
 )
-def test_what_cannot_be_shown_is_one_sentence(
-    run: Path, tmp_path: Path, words: str, says: str
-) -> None:
+def test_what_cannot_be_shown_is_one_sentence(run, tmp_path, words, says):
     (tmp_path / "file").write_text("")
     places = {"RUN": str(run), "EMPTY": str(tmp_path), "FILE": str(tmp_path / "file")}
     for name, place in places.items():
         words = re.sub(rf"\b{name}\b", place, words)
+
     with pytest.raises(RoboIRGError, match=says):
         call(*words.split())

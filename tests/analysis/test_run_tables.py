@@ -8,7 +8,6 @@ import pytest
 from flat_jobs import frame_of, make_result
 from flat_jobs import make_results as play
 from rich.console import Console
-from syrupy.assertion import SnapshotAssertion
 
 from roboirg.analysis.measures.breakdowns import BREAKDOWNS
 from roboirg.analysis.measures.run_data import RunData
@@ -65,7 +64,7 @@ listener: 8 episodes without success
 LONG = "picked up the green cube [1]; expected: pick up the red cube for the first time"
 
 
-def test_rates_gaps_what_is_incomplete_and_failures_are_printed() -> None:
+def test_rates_gaps_what_is_incomplete_and_failures_are_printed():
     """Gaps are on episodes that both have, also with other seeds; of all tasks the means over them.
 
     Direct wins 1 of 3 and 0 of 2, explicit 3 of 3 and 0 of 2; its 20 % of trials are no mean.
@@ -76,7 +75,7 @@ def test_rates_gaps_what_is_incomplete_and_failures_are_printed() -> None:
         play("0", "direct", form="resolved", policy_seed=2, cause=LONG),
         play("00", task="VideoUnmask", cause=LONG),
         play("00", "direct", task="VideoUnmask", cause=LONG),
-        planned=[one.identity for one in play("111111", "direct")],
+        planned=[result.identity for result in play("111111", "direct")],
     )
     assert printed(frame) == PRINTED.replace("LONG", LONG)
 
@@ -108,11 +107,11 @@ MIXED = frame_of(
 @pytest.mark.parametrize(
     ("name", "kind"),
     [
-        *((one, "markdown") for one in ("forms", "failures", "failure-names", "heard")),
+        *((name, "markdown") for name in ("forms", "failures", "failure-names", "heard")),
         ("heard", "csv"),
     ],
 )
-def test_other_tables_are_as_stored(snapshot: SnapshotAssertion, name: str, kind: str) -> None:
+def test_other_tables_are_as_stored(snapshot, name, kind):
     """Numbers of one row, column, form or outcome in place of another."""
     assert get_format(kind).draw(diagnostic_tables()[name].make(RunData(MIXED))) == snapshot
 
@@ -140,46 +139,51 @@ def ended(kinds: str, setting: str) -> list[Summary]:
     ],
 )
 def test_all_episodes_end_in_one_of_four_ways_and_gaps_are_sums_of_changes(
-    explicit: str, direct: str, rates: str, changes: str, shares: str
-) -> None:
+    explicit, direct, rates, changes, shares
+):
     """Of the same episodes: in the fourth case, the errors leave eight that both have."""
     data = RunData(frame_of(ended(explicit, "explicit"), ended(direct, "direct")))
     entries = make_failure_table(data).rows[1].entries
-    assert [f"{one.percent:.0f}" for one in entries[2:6]] == rates.split()
-    found = [one.text.split(".")[0] for one in entries[6:10]]
+    assert [f"{entry.percent:.0f}" for entry in entries[2:6]] == rates.split()
+
+    found = [entry.text.split(".")[0] for entry in entries[6:10]]
     assert found == changes.split()
-    assert [one.text for one in entries[10:]] == shares.split()
+    assert [entry.text for entry in entries[10:]] == shares.split()
 
 
-def test_a_failure_with_a_name_of_another_version_is_not_attributed() -> None:
+def test_a_failure_with_a_name_of_another_version_is_not_attributed():
     other = Attribution(kind="execution", failure="renamed", sentence="So.")
     data = RunData(frame_of(play("10", attribution=other)))
+
     (row,) = diagnostic_tables()["failure-names"].make(data).rows
-    assert [one.text for one in row.entries] == ["2", "1", "1"]
+
+    assert [entry.text for entry in row.entries] == ["2", "1", "1"]
 
 
-def test_the_breakdown_by_difficulty_is_as_stored(snapshot: SnapshotAssertion) -> None:
+def test_the_breakdown_by_difficulty_is_as_stored(snapshot):
     table = make_breakdown_table(BREAKDOWNS["difficulty"], MIXED)
     assert get_format("markdown").draw(table) == snapshot
 
 
-def test_the_legend_explains_only_what_occurs_and_many_failures_are_counted() -> None:
+def test_the_legend_explains_only_what_occurs_and_many_failures_are_counted():
     text = printed(frame_of(play("0" * 13, privileged=True, cause="late")))
     assert "success rate in %; privileged policies and scripted hands use the simulator's" in text
+
     lines = text.splitlines()
     assert [line.split()[1] for line in lines[-11:-1]] == [f"test/{index}" for index in range(10)]
     assert lines[-1] == "  and 3 more"
     assert "without success" not in printed(frame_of(play("1")))
+
     (silent,) = play("0", arm="silent", cause="late", wordings="mine@1a")
     assert failure_text(silent) == "PickXtimes test/0 explicit (silent): late"
 
 
-def test_rates_have_their_colors() -> None:
-    tables = [make_run_tables(frame_of(play(one)))[0] for one in ("1110", "110", "100")]
-    assert [one.rows[0].entries[0].style for one in tables] == ["green", "yellow", "red"]
+def test_rates_have_their_colors():
+    tables = [make_run_tables(frame_of(play(outcomes)))[0] for outcomes in ("1110", "110", "100")]
+    assert [table.rows[0].entries[0].style for table in tables] == ["green", "yellow", "red"]
 
 
-def test_policies_and_conditions_have_tables_of_their_own_in_the_order_of_the_plan() -> None:
+def test_policies_and_conditions_have_tables_of_their_own_in_the_order_of_the_plan():
     results = [
         *play("1"), *play("1", split="val"), *play("1", max_steps=200),
         *play("1", policy="random", privileged=True), *play("1", robot="Panda"),
@@ -199,6 +203,6 @@ def test_policies_and_conditions_have_tables_of_their_own_in_the_order_of_the_pl
         ]
 
 
-def test_points_have_a_sign() -> None:
+def test_points_have_a_sign():
     assert [points(gap) for gap in (-0.5, 0.25, 0.0, -0.001)] == ["−50", "+25", "±0", "±0"]
     assert [points(gap, 1) for gap in (-0.5, 0.0004, 0.0006)] == ["−50.0", "±0.0", "+0.1"]

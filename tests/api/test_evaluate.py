@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -41,8 +39,9 @@ def unplayed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Episodes are decided by their setting."""
 
     def play(job: Job) -> Record:
-        won = job.policy != "forgetful" or job.setting == "explicit"
-        return make_record(job, *(("success",) if won else ("failure", "wrong")))
+        if job.policy != "forgetful" or job.setting == "explicit":
+            return make_record(job, "success")
+        return make_record(job, "failure", "wrong")
 
     monkeypatch.setattr(python_run, "episode_runner", lambda plan, folder: play)
 
@@ -50,7 +49,7 @@ def unplayed(monkeypatch: pytest.MonkeyPatch) -> None:
 QUICK = {"tasks": "PickXtimes", "episodes": 3, "workers": 0, "progress": False}
 
 
-def test_results_are_those_of_the_records(unplayed: None, tmp_path: Path) -> None:
+def test_results_are_those_of_the_records(unplayed, tmp_path):
     results = roboirg.evaluate(
         ["listener", "forgetful"], settings=("explicit", "direct"), forms=["implicit", "resolved"],
         out=tmp_path, **QUICK,
@@ -70,42 +69,44 @@ def test_results_are_those_of_the_records(unplayed: None, tmp_path: Path) -> Non
     assert "forgetful explicit: 100.0 %" in repr(results)
     with pytest.raises(UnknownNameError):
         results.compare("listener", "nobody")
+
     *lines, _, _ = (tmp_path / RECORDS_FILE).read_text().splitlines(keepends=True)
     (tmp_path / RECORDS_FILE).write_text("".join(lines))
     cut = Results(tmp_path)
     assert (len(cut.frame), cut.errors, cut.missing) == (2 * 3 * 3 - 2, 0, 2)
 
 
-def test_results_have_figures_and_a_page(unplayed: None, tmp_path: Path) -> None:
+def test_results_have_figures_and_a_page(unplayed, tmp_path):
     results = roboirg.evaluate(
         "listener", settings="explicit,direct", forms="implicit,resolved", out=tmp_path, **QUICK
     )
     assert results.plot("gaps")._repr_png_().startswith(b"\x89PNG")
     assert results.report().read_text().startswith("<!doctype html>")
+
     results.plot("gaps", published=True).save(tmp_path / "a.svg")
     assert "<!-- MemER -->" in (tmp_path / "a.svg").read_text()
     with pytest.raises(InvalidValueError, match="nothing to draw for 'context'"):
         results.plot("context")
 
 
-def test_the_same_folder_resumes_and_none_makes_a_new_one(
-    unplayed: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_same_folder_resumes_and_none_makes_a_new_one(unplayed, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for settings in ("explicit", "all"):
         roboirg.evaluate("oracle", settings=settings, out="kept", **QUICK)
     assert len(read_records(tmp_path / "kept")) == 3 * 5
+
     first, second = (roboirg.evaluate("oracle", settings="explicit", **QUICK) for _ in range(2))
     assert first.folder.parent == second.folder.parent == tmp_path / "runs"
     assert first.folder != second.folder
 
 
-def test_classes_and_objects_play_in_this_process(unplayed: None, tmp_path: Path, capsys) -> None:
+def test_classes_and_objects_play_in_this_process(unplayed, tmp_path, capsys):
     given = Still(reach=0.5)
     options = {**QUICK, "out": tmp_path, "progress": True}
     results = roboirg.evaluate({"mine": given, "class": Still}, **options)
     assert read_plan(tmp_path).hosting.policy_process == "shared"
-    assert {one.policy for one in results.records} == {"mine", "class"}
+    assert {record.policy for record in results.records} == {"mine", "class"}
+
     heard = capsys.readouterr().err
     assert "No other process has mine: all episodes are played in this one" in heard
     for policy, options, words in (
@@ -123,20 +124,19 @@ class Insider(Still):
 
 
 @pytest.mark.parametrize("policy", [Insider(), f"{__name__}:Insider"])
-def test_privilege_is_declared(unplayed: None, tmp_path: Path, policy) -> None:
+def test_privilege_is_declared(unplayed, tmp_path, policy):
     options = {**QUICK, "out": tmp_path, "policy_process": "shared"}
     with pytest.raises(InvalidValueError, match=r"has attach\(\).*roboirg\.Privileged\(policy\)"):
         roboirg.evaluate(policy, **options)
+
     both = [roboirg.Privileged(policy), Still()]
     results = roboirg.evaluate(both, **options)
-    assert {(one.policy.split(":")[-1], one.privileged) for one in results.records} == {
+    assert {(record.policy.split(":")[-1], record.privileged) for record in results.records} == {
         ("Insider", True), ("Still", False),
     }  # fmt: skip
 
 
-def test_what_can_be_imported_has_a_spec_as_on_the_command_line(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_what_can_be_imported_has_a_spec_as_on_the_command_line(monkeypatch):
     """No other process finds what a script defines, although it is there under its name."""
     from roboirg.policies.builtin.random_policy import RandomPolicy
     from roboirg.policies.by_name.finding import policy_of
@@ -145,10 +145,10 @@ def test_what_can_be_imported_has_a_spec_as_on_the_command_line(
     scripts = type("OfScript", (Still,), {"__module__": "__main__"})
     monkeypatch.setattr(sys.modules["__main__"], "OfScript", scripts, raising=False)
     given = (RandomPolicy, RandomPolicy(seed=1), type("Made", (Still,), {}), scripts)
-    assert [policy_of(one).place for one in given] == ["own", "python", "python", "python"]
+    assert [policy_of(policy).place for policy in given] == ["own", "python", "python", "python"]
 
 
-def test_options_are_those_of_a_plan(unplayed: None, tmp_path: Path) -> None:
+def test_options_are_those_of_a_plan(unplayed, tmp_path):
     plan = python_run.python_plan(
         "oracle", tasks=["PickXtimes"], settings="contextual", episodes=[2],
         policy_seeds=(7, 42), stages=[(1, 5), (1, 2, 5)], max_steps=600, wordings=None,
@@ -166,8 +166,8 @@ def test_options_are_those_of_a_plan(unplayed: None, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", [5, b"runs", True, "", " ", "runs/\0"])
 def test_a_folder_that_is_none_is_refused_and_nothing_is_written(
-    unplayed: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: Any
-) -> None:
+    unplayed, tmp_path, monkeypatch, name
+):
     monkeypatch.chdir(tmp_path)
     for use in (lambda name: roboirg.evaluate("oracle", out=name, **QUICK), Results):
         with pytest.raises(InvalidValueError, match=r"The run's folder is .*; it must be a path"):
@@ -177,11 +177,10 @@ def test_a_folder_that_is_none_is_refused_and_nothing_is_written(
     assert not list(tmp_path.iterdir())
 
 
-def test_without_pandas_the_rest_works(
-    unplayed: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_pandas_the_rest_works(unplayed, tmp_path, monkeypatch):
     results = roboirg.evaluate("oracle", out=tmp_path, **QUICK)
     monkeypatch.setitem(sys.modules, "pandas", None)
+
     with pytest.raises(MissingDependencyError, match="needs pandas"):
         _ = results.frame
     assert Results(str(tmp_path)).rates()["oracle", "explicit"] == 1.0
@@ -189,13 +188,16 @@ def test_without_pandas_the_rest_works(
 
 
 @pytest.mark.sim
-def test_an_object_plays_its_episodes_itself(tmp_path: Path) -> None:
+def test_an_object_plays_its_episodes_itself(tmp_path):
     given = Still()
     results = roboirg.evaluate(
         given, tasks="PickXtimes", settings="explicit,direct", episodes=1, max_steps=32,
         out=tmp_path, progress=False,
     )  # fmt: skip
-    assert [one.outcome for one in results.records] == ["failure", "failure"]
+    assert [record.outcome for record in results.records] == ["failure", "failure"]
+
     opened, *heard = given.instructions  # on an episode that is made up, before the run
     assert opened == "Put the red cube on the target."
-    assert heard == [" ".join(turn.text for turn in one.instruction) for one in results.records]
+    assert heard == [
+        " ".join(turn.text for turn in record.instruction) for record in results.records
+    ]

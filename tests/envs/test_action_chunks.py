@@ -36,8 +36,8 @@ def assert_same(ours, theirs):
     assert set(ours) == set(theirs)
     for key, value in theirs.items():
         if key == "history":
-            for one, other in zip(ours[key], value, strict=True):
-                assert_same(one, other)
+            for own, other in zip(ours[key], value, strict=True):
+                assert_same(own, other)
         else:
             assert np.array_equal(ours[key], value), key
 
@@ -62,9 +62,11 @@ def test_sub_environments_that_take_chunks_equal_single_ones():
         **OPTIONS,
     )
     single = roboirg.make("VideoUnmaskSwap", **OPTIONS)
+
     batch, infos = vector.reset(seed=50)
     assert_second(batch, infos, *single.reset(options={"episode": 1}))
-    assert [one.length for one in infos["demonstration"]] == [114, 168]
+    assert [video.length for video in infos["demonstration"]] == [114, 168]
+
     for chunks in CHUNKS:
         batch, rewards, terminated, truncated, infos = vector.step(chunks)
         observation, *given, info = single.step_chunk(chunks[1])
@@ -72,16 +74,20 @@ def test_sub_environments_that_take_chunks_equal_single_ones():
         assert [rewards[1], terminated[1], truncated[1]] == given
     assert infos["steps"].tolist() == [10, 10]
     assert truncated.all()
+
     batch, *_, infos = vector.step(chunks)  # starts the next episodes
     assert_second(batch, infos, *single.reset(options={"episode": 2}))
+
     vector.close()
 
 
 def test_a_chunk_of_another_shape_is_refused_before_anything_moves():
     with pytest.raises(InvalidValueError, match="length is 0; it must be a whole number from 1"):
         ActionChunks(roboirg.make("PickXtimes", cameras=()), 0)
+
     env = ActionChunks(roboirg.make("PickXtimes", cameras=(), actions="ee_pose"), 3)
     assert env.action_space.shape == (3, 7)
+
     env.reset()
     for wrong in (np.zeros((2, 7)), np.zeros(7), np.full((3, 7), np.nan), "up"):
         with pytest.raises(InvalidActionError):
@@ -98,5 +104,7 @@ def test_the_example_in_the_documents_runs(tmp_path):
     ]
     script = tmp_path / "example.py"
     script.write_text(example.replace("4", "2"))  # environments
+
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False)
+
     assert done.stdout.strip() == "[False False] [16 16]", done.stderr

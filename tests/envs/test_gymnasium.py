@@ -26,8 +26,10 @@ def test_a_reset_chooses_episode_and_words():
     plain, _ = env.reset()
     chosen, _ = env.reset(options={"episode": 5, "setting": "spatial", "split": "val"})
     made = roboirg.make("PickXtimes", cameras=(), episode=5, setting="spatial", split="val")
+
     assert chosen["instruction"] == made.instruction.text == env.instruction.text
     assert env.episode == made.episode
+
     again, _ = env.reset(seed=8)  # options hold for one reset; the seed chooses nothing here
     assert again["instruction"] == plain["instruction"]
     assert env.episode.index == 3
@@ -35,6 +37,7 @@ def test_a_reset_chooses_episode_and_words():
         env.reset(options={"cameras": ()})
     with pytest.raises(InvalidValueError, match="no episode 50"):
         env.reset(options={"episode": 50})
+
     own = roboirg.make(get_episode("PickXtimes", "test", 3), cameras=())
     own.reset(options={"setting": "spatial"})
     with pytest.raises(InvalidValueError, match="made for one episode; reset takes no 'episode'"):
@@ -44,9 +47,11 @@ def test_a_reset_chooses_episode_and_words():
 def test_seeds_choose_episodes_if_none_is_named():
     env = roboirg.make("PickXtimes", cameras=(), episode=None)
     played = []
+
     for seed in (None, None, 1049, None, 7, 0, 53):
         env.reset(seed=seed)
         played.append(env.episode.index)
+
     assert played == [0, 1, 49, 0, 7, 0, 3]
 
 
@@ -57,11 +62,14 @@ def test_gymnasium_s_vector_environments_work_with_their_defaults():
     for key, value in observation.items():
         assert np.array_equal(batch[key][1], value), key
     assert infos["is_success"].tolist() == [False, False]
+
     for _ in range(2):
         *_, infos = vector.step(np.tile(HOME_ACTION, (2, 1)))
     assert infos["cause"].tolist() == ["not done after 2 steps"] * 2
+
     batch, *_ = vector.step(np.tile(HOME_ACTION, (2, 1)))  # starts the next episodes
     assert batch["instruction"][1] == roboirg.make("PickXtimes", episode=6).instruction.text
+
     vector.close()
 
 
@@ -91,6 +99,7 @@ def test_a_fork_after_drawing_fails_at_once_with_the_reason():
         Exception, match=r"forked from one that had drawn pictures.*context='spawn'"
     ):
         vector.reset()
+
     vector.close(terminate=True)
 
 
@@ -103,5 +112,7 @@ def test_videos_can_be_recorded(tmp_path):
     env.step(HOME_ACTION)
     env.step(HOME_ACTION)
     env.close()
+
     (video,) = folder.glob("*.mp4")
+
     assert video.stat().st_size > 0

@@ -145,9 +145,9 @@ def test_an_episode_of_each_is_played_and_shown(roboirg, names):
         "--episodes", "1", "--out", "played",
     )  # fmt: skip
     records = [json.loads(line) for line in (roboirg.folder / "played/records.jsonl").open()]
-    played = {(one["task"], one["options"]["setting"]) for one in records}
+    played = {(record["task"], record["options"]["setting"]) for record in records}
     assert {(task, "direct"), (WITH_SETTING, "direct"), (WITH_SETTING, setting)} <= played
-    assert {one["outcome"] for one in records} == {"success"}
+    assert {record["outcome"] for record in records} == {"success"}
     roboirg("report", "played")
     page = (roboirg.folder / "played/report.html").read_text()
     assert task in page
@@ -160,12 +160,14 @@ def test_the_package_of_the_page_adds_a_task_a_setting_a_kind_a_command_and_a_pl
     assert "Greet the lab." in roboirg("--help")
     roboirg("run", "--plan", "lab-quick", "--max-steps", "400", "--out", "lab")
     records = [json.loads(line) for line in (roboirg.folder / "lab/records.jsonl").open()]
-    played = {(one["policy"], one["task"], one["options"]["setting"]) for one in records}
+    played = {
+        (record["policy"], record["task"], record["options"]["setting"]) for record in records
+    }
     assert played == {
         (who, "LabPick", own) for who in ("oracle", "lab:any") for own in ("explicit", "lab")
     }
-    assert {one["outcome"] for one in records if one["policy"] == "oracle"} == {"success"}
-    assert {one["error"] for one in records} == {None}
+    assert {record["outcome"] for record in records if record["policy"] == "oracle"} == {"success"}
+    assert {record["error"] for record in records} == {None}
 
 
 def test_the_other_episodes_and_words_have_not_changed(outside, names):

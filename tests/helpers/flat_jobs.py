@@ -22,14 +22,15 @@ Stored = TypeVar("Stored", bound=Summary)
 def nested(**given: object) -> dict[str, object]:
     """Return fields of a job, in which options have their places."""
     others = dict(given)
-    version, privileged = others.pop("policy_version", None), others.pop("privileged", None)
+    version = others.pop("policy_version", None)
+    privileged = others.pop("privileged", None)
     if version is not None or privileged is not None:
         ref = unknown_policy(str(others.get("policy", "")))
         version = ref.version if version is None else str(version)
         others["ref"] = replace(ref, version=version, is_privileged=bool(privileged))
     for name, kind in (("options", InstructionOptions), ("environment", EnvironmentOptions)):
-        names = [one.name for one in fields(kind)]
-        own = {one: others.pop(one) for one in names if one in others}
+        names = [name.name for name in fields(kind)]
+        own = {name: others.pop(name) for name in names if name in others}
         others.setdefault(name, kind(**own))
     return others
 
@@ -76,7 +77,7 @@ def make_results(outcomes: str, setting: str = "explicit", **fields: object) -> 
 
 def frame_of(*results: Sequence[Summary], planned: Sequence[Job] = ()) -> Frame:
     """Return the frame of one run with all these results."""
-    return make_frame([("run", [one for own in results for one in own])], planned)
+    return make_frame([("run", [result for own in results for result in own])], planned)
 
 
 def with_version(record: Stored, version: str) -> Stored:

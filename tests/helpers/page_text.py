@@ -56,7 +56,8 @@ def played(plan: Plan) -> list[Record]:
 
 def broken(record: Record) -> Record:
     """Return it as that of a policy that raised an error with markup in its text."""
-    cause, details = "policy: ValueError: </script><b>&", "Traceback <script>alert(1)</script>"
+    cause = "policy: ValueError: </script><b>&"
+    details = "Traceback <script>alert(1)</script>"
     error = {"outcome": "error", "error": "policy", "cause": cause, "details": details}
     return replace(record, attribution=None, **error)
 
@@ -64,7 +65,7 @@ def broken(record: Record) -> Record:
 def store(folder: Path, records: Sequence[Record], plan: Plan | None = None) -> Source:
     """Write the records of a run, and its plan, and open it."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / RECORDS_FILE).write_bytes(b"".join(encode(one) + b"\n" for one in records))
+    (folder / RECORDS_FILE).write_bytes(b"".join(encode(record) + b"\n" for record in records))
     if plan is not None:
         write_plan(plan, folder)
     return Source(folder)

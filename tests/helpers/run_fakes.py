@@ -112,7 +112,7 @@ def fake_record(job: Job, **fields: object) -> Record:
 def comparable(record: Record) -> dict[str, object]:
     """Return the fields that depend only on the job."""
     told = msgspec.to_builtins(record)
-    return {name: one for name, one in told.items() if name not in NON_DETERMINISTIC_FIELDS}
+    return {name: value for name, value in told.items() if name not in NON_DETERMINISTIC_FIELDS}
 
 
 def starts(folder: Path, job: Job | None = None) -> list[str]:
@@ -157,5 +157,6 @@ def changed(plan: Plan, **options: object) -> Plan:
 
 
 if __name__ == "__main__":
-    folder, workers = Path(sys.argv[1]), int(sys.argv[2])
+    folder = Path(sys.argv[1])
+    workers = int(sys.argv[2])
     run_plan(small_plan(8), folder, FakePlay(folder, endless=2), LocalProcesses(workers))

@@ -11,9 +11,10 @@ def slow_but(fast: Collection[object], values: Iterable[object]) -> list[object]
     A tuple has values of several parameters.
     """
     values = list(values)
-    assert all(one in values for one in fast), fast
-    return [one if one in fast else _slow(one) for one in values]
+    assert all(value in values for value in fast), fast
+    return [value if value in fast else _slow(value) for value in values]
 
 
-def _slow(one: object) -> object:
-    return pytest.param(*(one if isinstance(one, tuple) else (one,)), marks=pytest.mark.slow)
+def _slow(value: object) -> object:
+    values = value if isinstance(value, tuple) else (value,)
+    return pytest.param(*values, marks=pytest.mark.slow)

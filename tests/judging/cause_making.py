@@ -13,7 +13,7 @@ what acts cannot show. A course that succeeds though it was to fail is not kept.
 `hands.stages` are those of the episode; `hands.stages_of(goal)` those of another goal of the scene
 (`hands.other_goals`). What the scene does not offer is refused with `need(...)`, and the cause is
 then not played there. A cause ends where the episode does; if it returns before, the arm rests
-until time is up. Then ``play_cause(one, episode)`` returns the course of facts to store, and
+until time is up. Then ``play_cause(cause, episode)`` returns the course of facts to store, and
 `write_courses` and `read_courses` keep many of them in a file. Give causes names of their own: they
 are the rows of a table.
 """
@@ -40,7 +40,8 @@ from roboirg.tasks.splits.splits import get_episode
 
 TIME = 1300
 """Steps that a cause has, unless it says otherwise."""
-OPEN, CLOSED = 1.0, -1.0
+OPEN = 1.0
+CLOSED = -1.0
 
 
 class NotOfferedError(Exception):
@@ -154,8 +155,8 @@ class Hands:
         """Names of the other objects of the same kind that are there, the nearest first."""
         same = self.episode.scene.of_kind(self.episode.scene[name].kind)
         absent = self.env.session.world.absent
-        names = [one.name for one in same if one.name != name and one.name not in absent]
-        return sorted(names, key=lambda one: math.dist(self.at(one), self.at(name)))
+        names = [thing.name for thing in same if thing.name != name and thing.name not in absent]
+        return sorted(names, key=lambda other: math.dist(self.at(other), self.at(name)))
 
     def at(self, name: str) -> Point:
         """Where an object is now, m."""
@@ -163,7 +164,7 @@ class Hands:
 
     def picks(self) -> list[int]:
         """Indices of the stages that pick something up."""
-        return [i for i, one in enumerate(self.stages) if one.primitive.kind.startswith("pick")]
+        return [i for i, stage in enumerate(self.stages) if stage.primitive.kind.startswith("pick")]
 
     @property
     def step(self) -> int:
@@ -243,23 +244,30 @@ class Hands:
         """Return the vector of a length that leads farthest from all other objects."""
         if not distance:
             return 0.0, 0.0
-        world, (x, y, _) = self.env.session.world, self.at(name)
-        others = [
-            body.position
+        x, y, _ = self.at(name)
+        others = self._places_of_others(name)
+
+        def space(way: tuple[float, float]) -> float:
+            right, ahead = way
+            gaps = [math.dist((x + right, y + ahead), place) for place in others]
+            # Not out of the arm's reach, or under it.
+            too_far = max(0.0, x + right - 0.15)
+            too_near = max(0.0, -0.2 - x - right)
+            return min((*gaps, 0.3)) - too_far - too_near
+
+        ways = []
+        for turn in np.arange(0.0, 2 * math.pi, math.pi / 8):
+            ways.append((distance * math.cos(turn), distance * math.sin(turn)))
+        return max(ways, key=space)
+
+    def _places_of_others(self, name: str) -> list[tuple[float, float]]:
+        """Return where on the table all other objects stand that have a height."""
+        world = self.env.session.world
+        return [
+            body.position[:2]
             for other, body in world.bodies.items()
             if other != name and other not in world.absent and body.item.kind not in _FLAT
         ]
-        ways = [
-            (distance * math.cos(turn), distance * math.sin(turn))
-            for turn in np.arange(0.0, 2 * math.pi, math.pi / 8)
-        ]
-
-        def space(way: tuple[float, float]) -> float:
-            gaps = [math.dist((x + way[0], y + way[1]), one[:2]) for one in others]
-            # Not out of the arm's reach, or under it.
-            return min((*gaps, 0.3)) - max(0.0, x + way[0] - 0.15) - max(0.0, -0.2 - x - way[0])
-
-        return max(ways, key=space)
 
 
 _FLAT = ("target", "site", "marker", "shuttle", "hidden_cube")
@@ -297,11 +305,11 @@ def _disturbed_expert(world: Any) -> Any:
     return Disturbed(world)
 
 
-def play_cause(one: Cause, episode: Episode) -> Course | None:
+def play_cause(cause: Cause, episode: Episode) -> Course | None:
     """Play a cause in an episode; None if the scene does not offer it, or the arm cannot do it."""
-    hands = Hands(episode, one.time)
+    hands = Hands(episode, cause.time)
     try:
-        one.play(hands)
+        cause.play(hands)
         while True:
             hands.wait(50)
     except (NotOfferedError, MotionPlanningError):
@@ -310,9 +318,9 @@ def play_cause(one: Cause, episode: Episode) -> Course | None:
         pass
     env = hands.env
     return Course(
-        one.name,
-        one.kind,
-        one.failure,
+        cause.name,
+        cause.kind,
+        cause.failure,
         (episode.task, episode.split, episode.index),
         env.status,
         hands.start,
@@ -326,13 +334,13 @@ def play_cause(one: Cause, episode: Episode) -> Course | None:
 
 def play_causes(causes: Sequence[Cause], indices: Sequence[int], scenes: int) -> Iterator[Course]:
     """Play each cause in the first scenes of each of its tasks that offer it."""
-    for one in causes:
-        for task in one.tasks:
+    for cause in causes:
+        for task in cause.tasks:
             found = 0
             for index in indices:
                 if found == scenes:
                     break
-                course = play_cause(one, get_episode(task, "test", index))
+                course = play_cause(cause, get_episode(task, "test", index))
                 if course is not None and (course.status == "success") <= (
                     course.kind in ("success", "unscored")
                 ):
@@ -342,10 +350,11 @@ def play_causes(causes: Sequence[Cause], indices: Sequence[int], scenes: int) ->
 
 def write_courses(path: Path, courses: Iterable[Course]) -> None:
     """Write courses, compressed."""
-    lines = [
-        json.dumps([*one[:-2], *([_short(event) for event in part] for part in one[-2:])])
-        for one in courses
-    ]
+    lines = []
+    for course in courses:
+        *rest, events, attempts = course
+        shortened = [*map(_short, events)], [*map(_short, attempts)]
+        lines.append(json.dumps([*rest, *shortened]))
     path.write_bytes(lzma.compress("\n".join(lines).encode(), preset=9))
 
 

@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
+import itertools
 import re
-from collections import Counter
-from collections.abc import Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -56,101 +57,150 @@ def attribute(course: Course) -> FailureAttribution | None:
     )
 
 
-def pairs(courses: Sequence[Course]) -> list[tuple[Course, str, str]]:
-    """Courses that failed, or had to succeed, with the kind and the name that they get."""
-    found = [(course, attribute(course)) for course in courses]
-    return [
-        (course, one.kind if one else "success", one.failure if one else "")
-        for course, one in found
-        if one is not None or course.kind == "success"
-    ]
+class Pair(NamedTuple):
+    """A course that failed, or had to succeed, with the kind and the name that it gets."""
+
+    course: Course
+    kind: str
+    failure: str
+
+    @property
+    def is_right(self) -> bool:
+        return self.kind == self.course.kind
+
+
+def pairs(courses: Sequence[Course]) -> list[Pair]:
+    found = []
+    for course in courses:
+        attribution = attribute(course)
+        if attribution is not None:
+            found.append(Pair(course, attribution.kind, attribution.failure))
+        elif course.kind == "success":
+            found.append(Pair(course, "success", ""))
+    return found
+
+
+def share_of_decided(found: Iterable[Pair]) -> float:
+    """Return the share whose kind is right, of those that are decided."""
+    decided = [pair.is_right for pair in found if pair.kind != "undecided"]
+    return sum(decided) / max(len(decided), 1)
+
+
+def share_undecided(found: Sequence[Pair]) -> float:
+    return sum(pair.kind == "undecided" for pair in found) / max(len(found), 1)
 
 
 def scores(courses: Sequence[Course]) -> Scores:
-    made = pairs(courses)
-    shown = [(c.cause, c.kind, kind) for c, kind, _ in made if c.kind in ("grounding", "execution")]
-    silent = [kind for c, kind, _ in made if c.kind == "undecided" and c.failure != "no_answer"]
-    causes = sorted({cause for cause, *_ in shown})
+    shown: dict[str, list[Pair]] = defaultdict(list)  # by cause
+    silent: list[Pair] = []
+    for pair in pairs(courses):
+        course = pair.course
+        if course.kind in ("grounding", "execution"):
+            shown[course.cause].append(pair)
+        if course.kind == "undecided" and course.failure != "no_answer":
+            silent.append(pair)
 
-    def share(chosen: Sequence[str]) -> float:
-        kinds = [pair for one in chosen for cause, *pair in shown if cause == one]
-        decided = [made == found for made, found in kinds if found != "undecided"]
-        return sum(decided) / max(len(decided), 1)
+    def share(causes: Iterable[str]) -> float:
+        return share_of_decided(itertools.chain.from_iterable(shown[cause] for cause in causes))
 
     rng = np.random.default_rng(0)
+    causes = sorted(shown)
     drawn = [share(rng.choice(causes, len(causes))) for _ in range(1000)]
     low, high = np.percentile(drawn, [2.5, 97.5])
     if low == high:
         low, high = without_spread(low, len(causes))
-    by_cause = [[a == b for cause, a, b in shown if cause == one] for one in causes]
+    by_cause = [np.mean([pair.is_right for pair in shown[cause]]) for cause in causes]
     return Scores(
         share(causes),
-        float(np.mean([np.mean(one) for one in by_cause])),
+        float(np.mean(by_cause)),
         (float(low), float(high)),
-        sum(kind == "undecided" for *_, kind in shown) / len(shown),
-        sum(kind == "undecided" for kind in silent) / max(len(silent), 1),
+        share_undecided([*itertools.chain.from_iterable(shown.values())]),
+        share_undecided(silent),
     )
 
 
-def classes(courses: Sequence[Course]) -> dict[str, tuple[int, int, int]]:
-    """For each name that was made: how many, of how many the kind is right, and the name."""
-    found: dict[str, tuple[int, int, int]] = {}
-    for course, kind, name in pairs(courses):
-        if course.failure is not None and course.kind != UNSCORED:
-            many, kinds, names = found.get(course.failure, (0, 0, 0))
-            right = kind == course.kind
-            found[course.failure] = many + 1, kinds + right, names + (name == course.failure)
+class Tally(NamedTuple):
+    """How many failures of a name were made, and of how many kind and name are right."""
+
+    made: int
+    kinds: int
+    names: int
+
+
+def classes(courses: Sequence[Course]) -> dict[str, Tally]:
+    """Return what is right of each name that was made."""
+    by_name = defaultdict(list)
+    for pair in pairs(courses):
+        if pair.course.failure is not None and pair.course.kind != UNSCORED:
+            by_name[pair.course.failure].append(pair)
+    found = {}
+    for name, made in by_name.items():
+        kinds = sum(pair.is_right for pair in made)
+        names = sum(pair.failure == name for pair in made)
+        found[name] = Tally(len(made), kinds, names)
     return found
+
+
+def percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
 
 
 def table(courses: Sequence[Course]) -> str:
     """The confusion of kinds, the scores, and the names."""
-    made = pairs(courses)
-    kinds = [*FAILURE_KINDS, "success"]
-    counts = Counter((course.kind, kind) for course, kind, _ in made)
-    lines = [
-        f"| made | {' | '.join(f'found {kind}' for kind in kinds)} |",
-        "| --- | " + "---: | " * 4,
-    ]
-    for kind in (*kinds, UNSCORED):
-        if any(counts[kind, other] for other in kinds):
-            cells = " | ".join(str(counts[kind, other]) for other in kinds)
-            lines.append(f"| {kind} | {cells} |")
-    one = scores(courses)
-    percent = "{:.0f} %".format
-    low, high = one.interval
-    causes = len({course.cause for course, *_ in made})
-    summary = (
-        f"{len(made)} episodes of {causes} causes. Kind right: {percent(100 * one.of_decided)} of "
-        f"the decided (95 % interval over causes {100 * low:.0f} to {100 * high:.0f}), "
-        f"{percent(100 * one.of_causes)} as the mean over causes. Not decided, though acts show "
-        f"it: {percent(100 * one.undecided)}. Idle, trembling and stopped hands that stay "
-        f"undecided: {percent(100 * one.kept_undecided)}."
-    )
-    lines += ["", summary, "", "| made | failures | kind right | name right |"]
+    lines = [*kinds_table(pairs(courses)), "", summary(courses), ""]
+    lines.append("| made | failures | kind right | name right |")
     lines.append("| --- | ---: | ---: | ---: |")
     found = classes(courses)
-    for name in [name for name in FAILURES if name in found]:
-        many, right, names = found[name]
-        lines.append(
-            f"| `{name}` | {many} | {percent(100 * right / many)} | {percent(100 * names / many)} |"
-        )
+    for name in FAILURES:
+        if name in found:
+            made, kinds, names = found[name]
+            shares = f"{percent(kinds / made)} | {percent(names / made)}"
+            lines.append(f"| `{name}` | {made} | {shares} |")
     return "\n".join(lines)
+
+
+def kinds_table(found: Sequence[Pair]) -> list[str]:
+    """Return lines of a table: how often what was made is found as each kind."""
+    kinds = [*FAILURE_KINDS, "success"]
+    counts = Counter((pair.course.kind, pair.kind) for pair in found)
+    heads = " | ".join(f"found {kind}" for kind in kinds)
+    lines = [f"| made | {heads} |", "| --- | " + "---: | " * 4]
+    for made in (*kinds, UNSCORED):
+        numbers = [counts[made, kind] for kind in kinds]
+        if any(numbers):
+            lines.append(f"| {made} | {' | '.join(map(str, numbers))} |")
+    return lines
+
+
+def summary(courses: Sequence[Course]) -> str:
+    """Return the scores in sentences."""
+    found = pairs(courses)
+    causes = len({pair.course.cause for pair in found})
+    share = scores(courses)
+    low, high = share.interval
+    return (
+        f"{len(found)} episodes of {causes} causes. Kind right: {percent(share.of_decided)} of "
+        f"the decided (95 % interval over causes {100 * low:.0f} to {100 * high:.0f}), "
+        f"{percent(share.of_causes)} as the mean over causes. Not decided, though acts show "
+        f"it: {percent(share.undecided)}. Idle, trembling and stopped hands that stay "
+        f"undecided: {percent(share.kept_undecided)}."
+    )
 
 
 def failures_table() -> str:
     """The names of failures as the documentation shows them."""
     rows = ["| kind | failure | the policy | for example |", "| --- | --- | --- | --- |"]
     rows += [
-        f"| {one.kind} | `{name}` | {one.meaning} | {one.example} |"
-        for name, one in FAILURES.items()
+        f"| {failure.kind} | `{name}` | {failure.meaning} | {failure.example} |"
+        for name, failure in FAILURES.items()
     ]
     return "\n".join(rows)
 
 
 def put_in(document: str, mark: str, text: str) -> str:
     """Return a document with the text between two marks replaced."""
-    begin, end = f"<!-- {mark} -->", f"<!-- end of {mark} -->"
+    begin = f"<!-- {mark} -->"
+    end = f"<!-- end of {mark} -->"
     pattern = re.compile(rf"{re.escape(begin)}.*{re.escape(end)}", re.DOTALL)
     return pattern.sub(lambda _: f"{begin}\n\n{text}\n\n{end}", document)
 

@@ -44,10 +44,12 @@ def wrong_thing(hands: Hands, name: str) -> str:
     colors = set() if hands.episode.task != "BinFill" else set(hands.episode.goal.texts("colors"))
     scene = hands.episode.scene
     wrong = [
-        one for one in hands.others(name) if one not in meant and scene[one].color not in colors
+        thing
+        for thing in hands.others(name)
+        if thing not in meant and scene[thing].color not in colors
     ]
     # An object in whose surroundings the right one lies cannot show what was meant.
-    wrong = [one for one in wrong if math.dist(hands.at(one), hands.at(name)) > 0.11]
+    wrong = [thing for thing in wrong if math.dist(hands.at(thing), hands.at(name)) > 0.11]
     need(wrong)
     return wrong[0]
 
@@ -66,8 +68,10 @@ def another_goal(
     """Mark as a cause a goal that agrees in some slots, has so many more repeats, and fits."""
 
     def play(hands: Hands) -> None:
-        meant, goals = hands.episode.goal, hands.other_goals
-        found = [goal for goal in goals if all(goal[slot] == meant[slot] for slot in same)]
+        meant = hands.episode.goal
+        found = list(hands.other_goals)
+        for slot in same:
+            found = [goal for goal in found if goal[slot] == meant[slot]]
         if by:
             repeats = meant.number("repeats") + by
             found = [goal for goal in found if goal.number("repeats") == repeats]
@@ -204,14 +208,14 @@ beside(
     "missed_grasp",
     ("PickXtimes", "SwingXtimes", "VideoRepick"),
     MISS,
-    lambda _, picks: picks * (len(picks) == 1),
+    lambda _, picks: picks if len(picks) == 1 else [],
 )
 beside(
     "misses_the_first_of_several",
     "missed_grasp",
     SEVERAL,
     MISS,
-    lambda _, picks: picks[:1] * (len(picks) >= 2),
+    lambda _, picks: picks[:1] if len(picks) >= 2 else [],
 )
 beside(
     "misses_the_last_of_several",
@@ -225,21 +229,21 @@ beside(
     "missed_grasp",
     ("PickXtimes", "BinFill"),
     MISS,
-    lambda _, picks: picks * (len(picks) >= 2),
+    lambda _, picks: picks if len(picks) >= 2 else [],
 )
 beside(
     "misses_the_first_of_two",
     "missed_grasp",
     (*UNMASK, "PickByCount"),
     MISS,
-    lambda _, picks: picks[:1] * (len(picks) == 2),
+    lambda _, picks: picks[:1] if len(picks) == 2 else [],
 )
 beside(
     "puts_one_beside",
     "misplaced",
     ("PickXtimes", "BinFill"),
     0.075,
-    lambda _, picks: [picks[0] + 1] * (len(picks) >= 2),
+    lambda _, picks: [picks[0] + 1] if len(picks) >= 2 else [],
 )
 beside(
     "the_last_visit_passes_beside",
@@ -253,7 +257,7 @@ beside(
     "missed_press",
     ("ButtonUnmask", "ButtonUnmaskSwap"),
     0.05,
-    lambda hands, _: [n for n, one in enumerate(hands.stages) if one.primitive.kind == "press"],
+    lambda hands, _: [n for n, stage in enumerate(hands.stages) if stage.primitive.kind == "press"],
 )
 
 
@@ -288,7 +292,7 @@ def presses_beside_in_time(hands: Hands) -> None:
 
 
 def press_at(hands: Hands, late: int) -> None:
-    run = next(one for one in hands.episode.scene.motions if isinstance(one, Shuttle))
+    run = next(motion for motion in hands.episode.scene.motions if isinstance(motion, Shuttle))
     need(abs(late) < run.interval / 2 - 6)
     press = hands.stages[-1].primitive
     hands.do(hands.stages[0])

@@ -70,7 +70,8 @@ class Staged:
         """Whatever the video is about; only its end matters here."""
         for stage in self.episode.demonstration:
             shown = set(self.now) | {stage.expects}
-            rest, self.now = self.now, shown
+            rest = self.now
+            self.now = shown
             for _ in range(stage.lasting + 1):
                 self.tick()
             self.now = rest
@@ -165,7 +166,8 @@ class Staged:
         return self.set(over).tick(3).set(off=(over,))
 
     def press(self, name: str = "button") -> Staged:
-        hover, down = Fact("hovering", "robot", name), Fact("pressed", name)
+        hover = Fact("hovering", "robot", name)
+        down = Fact("pressed", name)
         return self.set(hover).set(down).tick(2).set(off=(down,)).set(off=(hover,))
 
     def hover(self, name: str = "button") -> Staged:
@@ -175,7 +177,8 @@ class Staged:
         """A stage of a plan as the oracle does it, with some names taken for others."""
         kind, subject, place, steps, _ = stage.primitive
         swap = instead or {}
-        subject, place = swap.get(subject, subject), swap.get(str(place), str(place))
+        subject = swap.get(subject, subject)
+        place = swap.get(str(place), str(place))
         match kind:
             case "pick_cube" | "pick_container":
                 self.lift(subject)

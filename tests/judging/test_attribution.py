@@ -29,14 +29,14 @@ TASKS = tuple(sorted(every_task()))
 SAMPLE = [("test", index) for index in range(12)] + [("train", index) for index in range(4)]
 """Six easy, four medium and four hard episodes, at least."""
 MADE = read_courses(confusion.HALVES["development"])
-NAMES = sorted({str(one.failure) for one in MADE if one.kind not in ("success", "unscored")})
+NAMES = sorted({str(made.failure) for made in MADE if made.kind not in ("success", "unscored")})
 classes = functools.cache(lambda: confusion.classes(MADE))
 
 
 # Failures whose cause is known
 
 
-def test_kinds_are_right_where_the_cause_is_known() -> None:
+def test_kinds_are_right_where_the_cause_is_known():
     """More than of causes that the rules did not know."""
     found = confusion.scores(MADE)
     assert found.of_decided >= 0.95
@@ -46,16 +46,17 @@ def test_kinds_are_right_where_the_cause_is_known() -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_names_are_right_where_the_cause_is_known(name: str) -> None:
+def test_names_are_right_where_the_cause_is_known(name):
     many, kinds, names = classes()[name]
     assert kinds >= 0.8 * many
     assert names >= 0.6 * many
 
 
 @pytest.mark.parametrize("half", [half for half, path in confusion.HALVES.items() if path.exists()])
-def test_the_document_has_the_tables(half: str) -> None:
+def test_the_document_has_the_tables(half):
     text = confusion.DOCUMENT.read_text()
     assert confusion.put_in(text, "failures", confusion.failures_table()) == text
+
     courses = read_courses(confusion.HALVES[half])
     assert confusion.put_in(text, half, confusion.table(courses)) == text
 
@@ -65,23 +66,26 @@ def test_the_document_has_the_tables(half: str) -> None:
     "name",
     ["takes_the_nearest_of_another_kind", "presses_beside_in_time", "opens_half_way", "trembles"],
 )
-def test_what_is_stored_is_what_the_simulator_does(name: str) -> None:
+def test_what_is_stored_is_what_the_simulator_does(name):
     """Facts and attempts come from motion, not from the file.
 
     On another family of processors the motion, and so the step, may be another.
     """
-    stored = next(one for one in MADE if one.cause == name)
-    cause = next(one for one in CAUSES if one.name == name)
+    stored = next(made for made in MADE if made.cause == name)
+    cause = next(cause for cause in CAUSES if cause.name == name)
     played = play_cause(cause, stored.episode)
     assert played is not None
+
     found = confusion.attribute(played)
     expected = confusion.attribute(stored)
     assert found._replace(step=0) == expected._replace(step=0)
-    assert {one.fact for one in played.attempts} == {one.fact for one in stored.attempts}
-    assert {one.fact for one in played.events} == {one.fact for one in stored.events}
+    assert {attempt.fact for attempt in played.attempts} == {
+        attempt.fact for attempt in stored.attempts
+    }
+    assert {event.fact for event in played.events} == {event.fact for event in stored.events}
 
 
-def test_every_failure_is_of_a_kind_and_is_shown_to_users() -> None:
+def test_every_failure_is_of_a_kind_and_is_shown_to_users():
     assert get_args(FailureName) == tuple(FAILURES)
 
 
@@ -99,23 +103,23 @@ def says(play: Staged, failure: str) -> None:
     assert found.failure == failure
 
 
-def test_a_miss_that_was_noticed_excuses_no_count() -> None:
+def test_a_miss_that_was_noticed_excuses_no_count():
     play = staged("PickXtimes", 18)  # the blue cube, twice
     play.miss("cube_blue").play(play.episode.stages[:2]).press()
     says(play, "wrong_count")
 
 
-def test_a_wrong_container_put_back_before_the_press_is_no_wrong_one() -> None:
+def test_a_wrong_container_put_back_before_the_press_is_no_wrong_one():
     play = staged("ButtonUnmask", 0)  # container_0 is meant
     says(play.lift("container_1").put("container_1").rest(), "stopped")
 
 
-def test_fingers_that_close_between_two_things_decide_nothing() -> None:
+def test_fingers_that_close_between_two_things_decide_nothing():
     both = (Fact("clutched", "cube_blue"), Fact("clutched", "cube_red"))
     says(staged("PickXtimes", 2).attempt(*both).rest(), "ambiguous_act")
 
 
-def test_a_wrong_thing_only_touched_is_no_attempt() -> None:
+def test_a_wrong_thing_only_touched_is_no_attempt():
     play = staged("PickXtimes", 2)  # the blue cube is meant
     says(play.reach("cube_red").set(off=(Fact("reached", "cube_red"),)).rest(), "no_attempt")
 
@@ -123,7 +127,7 @@ def test_a_wrong_thing_only_touched_is_no_attempt() -> None:
 @pytest.mark.parametrize(
     ("late", "failure"), [(0.3, "mistimed"), (-0.7, "ambiguous_act"), (-1.0, "wrong_time")]
 )
-def test_when_the_moving_cube_is_stopped(late: float, failure: str) -> None:
+def test_when_the_moving_cube_is_stopped(late, failure):
     play = staged("StopCube", 0)
     interval = play.episode.scene.motions[0].interval  # type: ignore[union-attr]
     moment = play.episode.stages[-1].primitive.steps + round(late * interval)
@@ -139,14 +143,14 @@ def test_when_the_moving_cube_is_stopped(late: float, failure: str) -> None:
         (DeclaredIntent(verdicts=((0, "right"),)), "not_followed"),
     ],
 )
-def test_what_was_declared_comes_before_acts(intent: DeclaredIntent, failure: str) -> None:
+def test_what_was_declared_comes_before_acts(intent, failure):
     play = staged("PickXtimes", 2).rest()
     play.intent = intent
     says(play, failure)
 
 
 @pytest.mark.parametrize("understood", ["the red one", {"confidence": 0.9}, ["red"], 3])
-def test_what_another_policy_calls_understood_is_no_goal(understood: object) -> None:
+def test_what_another_policy_calls_understood_is_no_goal(understood):
     record = SimpleNamespace(
         policy_metadata={"understood": understood}, goal={"color": "red"}, subgoals=()
     )
@@ -163,9 +167,10 @@ def check(play: Staged, found: FailureAttribution) -> None:
 
 
 @pytest.mark.parametrize("task", TASKS)
-def test_a_pose_that_cannot_be_reached_and_what_came_before(task: str) -> None:
+def test_a_pose_that_cannot_be_reached_and_what_came_before(task):
     play = staged(task, 3).tick(5)
     found = play.finding(timed_out=False, cause="no way to (9, 9, 9)")
+
     assert found == FailureAttribution(
         "execution", "unreachable", None, 5, "Could not reach a pose: no way to (9, 9, 9)."
     )
@@ -177,9 +182,10 @@ def test_a_pose_that_cannot_be_reached_and_what_came_before(task: str) -> None:
 
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.parametrize("where", SAMPLE, ids=lambda where: f"{where[0]}-{where[1]}")
-def test_a_success_has_no_attribution(task: str, where: tuple[str, int]) -> None:
+def test_a_success_has_no_attribution(task, where):
     episode = get_episode(task, *where)
     play = Staged(episode).play(episode.stages)
+
     assert play.judge.status is Status.SUCCESS
     assert play.finding() is None
     assert play.finding(timed_out=False) is None
@@ -190,15 +196,15 @@ episodes = st.builds(get_episode, st.sampled_from(TASKS), st.just("test"), st.in
 
 @given(episodes, st.floats(0, 1, exclude_max=True))
 @settings(max_examples=80)
-def test_right_acts_that_stop_early_are_no_grounding_failure(
-    episode: Episode, share: float
-) -> None:
+def test_right_acts_that_stop_early_are_no_grounding_failure(episode, share):
     play = Staged(episode).play(episode.stages)
     end = play.turn + int(share * (play.step - play.turn))
     events = [event for event in play.events if event.step <= end]
+
     found = attribute_failure(
         episode, events, timed_out=True, policy_start_step=play.turn, elapsed_steps=end
     )
+
     assert found is not None
     assert found.kind != "grounding"
     assert found.step <= end - play.turn
@@ -206,28 +212,34 @@ def test_right_acts_that_stop_early_are_no_grounding_failure(
 
 @given(episodes, st.data())
 @settings(max_examples=120)
-def test_taking_one_thing_for_another_is_a_grounding_failure_or_none(
-    episode: Episode, data: st.DataObject
-) -> None:
-    starts = [
-        index
-        for index, stage in enumerate(episode.stages)
-        if stage.primitive.kind not in {"put_down", "press_below"}
-        and stage.primitive.subject != "robot"
-    ]
-    begin = data.draw(st.sampled_from(starts))
+def test_taking_one_thing_for_another_is_a_grounding_failure_or_none(episode, data):
+    begin = data.draw(st.sampled_from(stages_with_a_thing(episode)))
     primitive = episode.stages[begin].primitive
-    carried = primitive.kind in {"place_on", "drop_into", "put_into", "move_over"}
-    right = str(primitive.place) if carried else primitive.subject
-    kind = episode.scene[right].kind
-    wrong = data.draw(st.sampled_from([item.name for item in episode.scene.of_kind(kind)]))
+    right = primitive.subject
+    if primitive.kind in {"place_on", "drop_into", "put_into", "move_over"}:
+        right = str(primitive.place)
+    alike = episode.scene.of_kind(episode.scene[right].kind)
+    wrong = data.draw(st.sampled_from([item.name for item in alike]))
+
     play = Staged(episode).play(episode.stages[:begin])
     for stage in episode.stages[begin:]:
         play.do(stage, {right: wrong, wrong: right})
     found = play.rest().finding()
+
     assert (found is None) == (play.judge.status is Status.SUCCESS)
-    assert found is None or found.kind == "grounding"
-    assert right != wrong or found is None
+    if found is not None:
+        assert found.kind == "grounding"
+        assert right != wrong
+
+
+def stages_with_a_thing(episode: Episode) -> list[int]:
+    """Return the places of the stages that take a thing or go to one."""
+    found = []
+    for index, stage in enumerate(episode.stages):
+        primitive = stage.primitive
+        if primitive.kind not in {"put_down", "press_below"} and primitive.subject != "robot":
+            found.append(index)
+    return found
 
 
 # Anything at all
@@ -235,18 +247,20 @@ def test_taking_one_thing_for_another_is_a_grounding_failure_or_none(
 
 def anything(episode: Episode) -> st.SearchStrategy[list[frozenset[Fact]]]:
     """Courses of facts of which most make no sense, though they are about what is there."""
-    asked = set(named_facts(episode.stages))
-    names = sorted({fact.subject for fact in asked} & {o.name for o in episode.scene.objects})
-    touches = [Fact(kind, name) for name in names for kind in ("reached", "held", "lying")]
-    some = st.sampled_from([*sorted(asked, key=str), *touches, Fact("still", "robot")])
-    return st.lists(st.frozensets(some, max_size=4), max_size=25)
+    asked = sorted(set(named_facts(episode.stages)), key=str)
+    objects = {thing.name for thing in episode.scene.objects}
+    touches = []
+    for name in sorted(objects & {fact.subject for fact in asked}):
+        touches += [Fact(kind, name) for kind in ("reached", "held", "lying")]
+    fact = st.sampled_from([*asked, *touches, Fact("still", "robot")])
+    return st.lists(st.frozensets(fact, max_size=4), max_size=25)
 
 
 @given(episodes, st.data(), st.booleans())
 @settings(max_examples=120)
 def test_whatever_happens_there_is_one_attribution_of_a_failure_and_none_else(
-    episode: Episode, data: st.DataObject, timed_out: bool
-) -> None:
+    episode, data, timed_out
+):
     done = data.draw(st.integers(0, len(episode.stages) - 1))
     play = Staged(episode).play(episode.stages[:done])
     for facts in data.draw(anything(episode)):
@@ -254,7 +268,9 @@ def test_whatever_happens_there_is_one_attribution_of_a_failure_and_none_else(
         play.now = lasting | facts
         play.tick(data.draw(st.integers(1, 40)))
     found = play.finding(timed_out=timed_out)
+
     failed = play.judge.status is Status.FAILURE
+
     assert (found is not None) == (failed or (timed_out and play.judge.status is Status.ONGOING))
     if found is not None:
         check(play, found)
@@ -264,19 +280,23 @@ def test_whatever_happens_there_is_one_attribution_of_a_failure_and_none_else(
 # Details
 
 
-def test_what_shows_late_is_dated_when_it_was_done() -> None:
+def test_what_shows_late_is_dated_when_it_was_done():
     play = staged("BinFill", 2)  # green cubes are meant, three or more
     play.lift("cube_blue_0").fill("cube_blue_0", "bin")
     done = play.step
+
     found = play.play(play.episode.stages[2:]).finding()
+
     assert play.judge.status is Status.FAILURE
     assert found is not None
     assert (found.failure, found.subject) == ("wrong_object", "cube_blue_0")
     assert play.turn + found.step == done < play.step
 
 
-def test_how_a_failure_is_described_is_no_part_of_an_episode_s_identity() -> None:
-    named, other = Rule(Fact("pressed", "b"), "x", "wrong_time"), Rule(Fact("pressed", "b"), "y")
+def test_how_a_failure_is_described_is_no_part_of_an_episode_s_identity():
+    named = Rule(Fact("pressed", "b"), "x", "wrong_time")
+    other = Rule(Fact("pressed", "b"), "y")
+
     assert plain(named) == plain(other)
     assert plain(named) != plain(named._replace(condition=Fact("pressed", "c")))
     assert {("Rule", "cause"), ("Rule", "failure")} == NOT_COUNTED

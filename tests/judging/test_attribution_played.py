@@ -55,7 +55,7 @@ class Mistaken(ScriptedPolicy):
 @pytest.mark.parametrize(
     "task", slow_but(["PickXtimes", "VideoUnmask", "VideoRepick", "PutInBox"], every_task())
 )
-def test_hands_that_do_another_task_well_fail_by_grounding(task: str) -> None:
+def test_hands_that_do_another_task_well_fail_by_grounding(task):
     episode = get_episode(task, "test", 3)
     others = [goal for goal in get_task(task).goals(episode.scene) if goal != episode.goal]
     for goal in {others[0], others[-1]}:
@@ -69,16 +69,18 @@ def test_hands_that_do_another_task_well_fail_by_grounding(task: str) -> None:
         assert found is None or found.kind in ("grounding", UNSEEN.get(task)), (goal, found)
 
 
-def test_a_listener_who_takes_left_for_right_picks_the_mirrored_cube() -> None:
+def test_a_listener_who_takes_left_for_right_picks_the_mirrored_cube():
     episode = get_episode("PickXtimes", "train", 39)  # the green cube, all the way on the right
     mirrored = mirrored_objects(episode, instruct(episode, "spatial"))
     assert mirrored == {"cube_green": {"cube_red"}}
+
     env = roboirg.make(episode, setting="spatial", cameras=())
     info = play(env, Mistaken(Goal.of(color="red", repeats=5)))
     found = finding(env, info, mirrored)
     assert found is not None
     assert (found.kind, found.failure, found.subject) == ("grounding", "mirrored_pick", "cube_red")
     assert found.sentence.endswith("; the words mean it only with left and right exchanged.")
+
     untold = finding(env, info)
     assert untold is not None
     assert untold.failure == "wrong_object"

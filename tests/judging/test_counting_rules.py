@@ -83,6 +83,7 @@ def test_bin_fill_punishes_a_press_before_the_last_drop():
 )
 def test_bin_fill_punishes_a_wrong_mix_one_step_after_the_last_drop(cubes, cause):
     assert filled(*cubes).status is Status.ONGOING
+
     judge = filled(*cubes, then=[[]])
     assert judge.status is Status.FAILURE
     assert judge.cause == f"{cause}; expected: press the button"
@@ -100,6 +101,7 @@ def test_bin_fill_punishes_one_cube_too_many_as_it_lands_but_not_its_picking(ext
     right = ("cube_red_0", "cube_red_1", "cube_blue_0")
     held = filled(*right, then=[[], [picked(extra)], []])
     assert held.status is Status.ONGOING
+
     landed = filled(*right, then=[[], [picked(extra)], [Fact("binned", extra, "bin")]])
     assert landed.status is Status.FAILURE
     assert landed.cause.startswith(cause)
@@ -108,6 +110,7 @@ def test_bin_fill_punishes_one_cube_too_many_as_it_lands_but_not_its_picking(ext
 def test_bin_fill_does_not_punish_dropping_beside_and_picking_again():
     steps = [[picked("cube_green_0")], [], [picked("cube_red_0")], [], [picked("cube_red_0")], []]
     assert judged(FILL, FILL_SCENE, *steps).status is Status.ONGOING
+
     rest = fill("cube_red_0", "cube_red_1", "cube_blue_0")
     inside = [Fact("binned", c, "bin") for c in ("cube_red_0", "cube_red_1", "cube_blue_0")]
     judge = judged(FILL, FILL_SCENE, *steps, *rest, inside, [*inside, PRESSED])
@@ -118,7 +121,8 @@ def test_bin_fill_does_not_punish_dropping_beside_and_picking_again():
 
 SWING_SCENE = scene_of(swing_x_times, lambda _scene: True)
 SWING = swing_x_times.stages(SWING_SCENE, Goal.of(color="red", repeats=2))
-HELD, LYING = picked("cube_red"), Fact("lying", "cube_red")
+HELD = picked("cube_red")
+LYING = Fact("lying", "cube_red")
 RIGHT, LEFT = (Fact("over", "cube_red", f"target_{side}") for side in ("right", "left"))
 TAKE = [[LYING], [HELD]]
 SWUNG = [[HELD, RIGHT], [HELD, RIGHT], [HELD], [HELD, LEFT], [HELD]]
@@ -129,11 +133,13 @@ def swung(*steps):
 
 
 def test_swing_is_done_after_the_swings_the_put_down_and_the_press():
-    put_down = [[LYING], [LYING, PRESSED]]
-    judge = swung(*TAKE, *SWUNG, *SWUNG, *put_down)
+    judge = swung(*TAKE, *SWUNG, *SWUNG, [LYING], [LYING, PRESSED])
     assert judge.status is Status.SUCCESS
-    over_the_target = [*TAKE, *SWUNG, *SWUNG[:-1], [LEFT, LYING], [LEFT, LYING, PRESSED]]
-    assert swung(*over_the_target).status is Status.SUCCESS
+
+
+def test_swing_is_done_where_the_cube_was_put_down_over_the_target():
+    judge = swung(*TAKE, *SWUNG, *SWUNG[:-1], [LEFT, LYING], [LEFT, LYING, PRESSED])
+    assert judge.status is Status.SUCCESS
 
 
 def test_swing_punishes_another_cube_in_every_stage():
@@ -169,7 +175,8 @@ def test_swing_does_not_punish_dropping_on_the_way_nor_picking_after_the_put_dow
 
 # StopCube: 120 steps a pass, the third visit, whose middle is at step 300.
 
-INTERVAL, VISIT = 120, 3
+INTERVAL = 120
+VISIT = 3
 HOVER = Fact("hovering", "robot", "button")
 NEAR, STOPPED = (Fact(kind, "shuttle", "target") for kind in ("near", "stopped"))
 
@@ -209,11 +216,10 @@ def stop(**how):
     return judge, None
 
 
-OFF, EARLY = (
-    "pressed the button while the cube was off the target",
-    "stopped the cube on an earlier",
-)
-PASSED, OVER = "let the cube's third visit pass", 3 * INTERVAL + 1
+OFF = "pressed the button while the cube was off the target"
+EARLY = "stopped the cube on an earlier"
+PASSED = "let the cube's third visit pass"
+OVER = 3 * INTERVAL + 1
 
 
 @pytest.mark.parametrize("pressed_at", [292, 300, 308])

@@ -27,19 +27,20 @@ from roboirg.tasks.splits.splits import get_episode
 SOURCE = Path(roboirg.__file__).parent
 
 
-def test_every_kind_that_is_detected_has_traits_and_the_other_way_round() -> None:
+def test_every_kind_that_is_detected_has_traits_and_the_other_way_round():
     kinds = {
         path.stem: set(re.findall(r"\bFact\(\s*\"(\w+)\"", path.read_text()))
         for path in SOURCE.rglob("*.py")
     }
-    attempts = {kind for kind, one in FACT_TRAITS.items() if one.role is FactRole.ATTEMPT}
+    attempts = {kind for kind, traits in FACT_TRAITS.items() if traits.role is FactRole.ATTEMPT}
     assert kinds["attempt_detection"] - {"pressed"} == attempts
+
     facts = set(FACT_TRAITS) - attempts
     assert kinds["fact_detection"] == set().union(*kinds.values()) - attempts == facts
 
 
 @pytest.mark.parametrize("task", every_task())
-def test_facts_of_tasks_have_kinds_and_are_about_the_objects_of_their_kinds(task: str) -> None:
+def test_facts_of_tasks_have_kinds_and_are_about_the_objects_of_their_kinds(task):
     for index in range(8):
         episode = get_episode(task, "test", index)
         stages = (*episode.demonstration, *episode.stages)
@@ -57,16 +58,17 @@ def test_facts_of_tasks_have_kinds_and_are_about_the_objects_of_their_kinds(task
 
 
 @pytest.mark.parametrize("kind", FACT_TRAITS)
-def test_traits_agree(kind: str) -> None:
+def test_words_of_a_fact_name_what_its_traits_declare(kind):
     traits = FACT_TRAITS[kind]
     assert traits.holds_while
+
     words = traits.past.format(subject="SUBJECT", place="PLACE")
     assert ("PLACE" in words) == bool(traits.places)
     assert ("SUBJECT" in words) == (traits.subjects != ("robot",))
     assert (traits.role is FactRole.STATE) <= (not traits.grips)
 
 
-def test_an_unknown_kind_in_a_record_is_called_by_its_name() -> None:
+def test_an_unknown_kind_in_a_record_is_called_by_its_name():
     assert fact_words(Fact("turned_over", "cup")) == "cup turned over"
     assert not Fact("turned_over", "cup").traits.lasts
 
@@ -101,31 +103,40 @@ def stage(expects: Fact, *forbids: Fact | Rule) -> Stage:
     return Stage(expects, Primitive("hold", "robot"), "leave the pillar alone", forbids)
 
 
-def test_a_kind_from_outside_is_judged_and_described(toppled: FactTraits) -> None:
-    home = Fact("home", "robot")
+def test_a_kind_from_outside_is_judged(toppled):
     pillar = SceneObject("pillar", "pillar", Point(0.0, 0.0, 0.05), color="red")
-    judge = Judge([stage(home, TOPPLED)], Scene((pillar,)))
+    judge = Judge([stage(Fact("home", "robot"), TOPPLED)], Scene((pillar,)))
+
     judge.update(0, frozenset([TOPPLED]))
+
     assert judge.cause == "knocked the red pillar over; expected: leave the pillar alone"
-    assert fact_words(TOPPLED) == "pillar knocked over"
+
+
+def test_a_kind_from_outside_is_described(toppled):
     event = EventRecord(step=3, kind="toppled", subject="pillar", place=None, holds=True)
+
+    assert fact_words(TOPPLED) == "pillar knocked over"
     assert event_text(event, {"pillar": "the red pillar"}) == "knocked the red pillar over"
     over = replace(event, holds=False)
     assert event_text(over, {}) == "knocked pillar over; this no longer holds"
-    picked = Fact("picked", "cube")
-    plan = [stage(picked), stage(TOPPLED)]
+
+
+def test_a_kind_from_outside_is_attributed_by_its_traits(toppled):
+    plan = [stage(Fact("picked", "cube")), stage(TOPPLED)]
     assert classify_grounding_error(TOPPLED, plan, 0) == "wrong_count"
+
     carried = Fact("over", "cube", "target_left")  # ends no task, as a press does
     assert classify_grounding_error(carried, [*plan, stage(carried)], 0) == "wrong_order"
+
+
+def test_a_kind_is_registered_again_only_under_its_own_name(toppled):
     register_fact_kind("toppled", toppled)
     with pytest.raises(InvalidValueError, match="already a kind of fact 'picked'"):
         register_fact_kind("picked", toppled)
 
 
 @pytest.mark.sim
-def test_kinds_of_fact_and_object_from_outside_are_simulated(
-    toppled: FactTraits, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_kinds_of_fact_and_object_from_outside_are_simulated(toppled, monkeypatch):
     from sapien.wrapper.actor_builder import ActorBuilder
 
     from roboirg.simulation import bodies, fact_detection

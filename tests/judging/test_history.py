@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 from roboirg.core.conditions import All, Elapsed, Fact, FactCount, OccurrenceCount, absent
 from roboirg.judging.fact_history import FactHistory
 
-A, B, C = Fact("picked", "a"), Fact("picked", "b"), Fact("pressed", "button")
+A = Fact("picked", "a")
+B = Fact("picked", "b")
+C = Fact("pressed", "button")
 courses = st.lists(st.frozensets(st.sampled_from([A, B, C])), min_size=1, max_size=15)
 bounds = st.integers(0, 4)
 
@@ -31,12 +33,11 @@ def test_counts_are_of_now(course, least, most):
 @settings(max_examples=60)
 @given(courses, st.integers(1, 4), st.none() | st.integers(0, 15))
 def test_beginnings_are_counted_as_they_happen(course, least, until):
-    kept = [frozenset(), *(course if until is None else course[: until + 1])]
-    begun = sum(
-        fact in now and fact not in before
-        for before, now in itertools.pairwise(kept)
-        for fact in (A, C)
-    )
+    considered = course if until is None else course[: until + 1]
+    begun = 0
+    for before, now in itertools.pairwise([frozenset(), *considered]):
+        begun += sum(fact in now - before for fact in (A, C))
+
     assert followed(course).holds(OccurrenceCount((A, C), least, until)) == (begun >= least)
 
 
@@ -52,6 +53,7 @@ def test_a_fact_and_its_absence_exclude_each_other(course):
 def test_time_is_counted_from_reset_or_from_a_timer_that_starts_once():
     history = FactHistory()
     assert not history.holds(Elapsed(0, timer="pick"))
+
     for step in range(10):
         history.update(step, frozenset())
         if step in {3, 5}:

@@ -12,7 +12,9 @@ from roboirg.judging.judge import describe_object
 from roboirg.tasks import every_task
 from roboirg.tasks.splits.splits import get_episode
 
-A, B, BAD = Fact("picked", "a"), Fact("placed", "a", "target"), Fact("pressed", "button")
+A = Fact("picked", "a")
+B = Fact("placed", "a", "target")
+BAD = Fact("pressed", "button")
 
 
 def stage(expects: Fact, *forbids: Fact, lasting: int = 0) -> Stage:
@@ -30,9 +32,10 @@ def test_a_later_stage_does_not_complete_early():
     assert judged([stage(A), stage(B)], None, [B]).index == 0
 
 
-def test_one_stage_per_evaluation():
+def test_an_evaluation_ends_one_stage_at_most():
     judge = judged([stage(A), stage(A)], None, [A])
     assert (judge.index, judge.status) == (1, Status.ONGOING)
+
     judge.update(1, frozenset([A]))
     assert judge.status is Status.SUCCESS
 
@@ -54,6 +57,7 @@ def test_verdicts_are_final():
     judge = judged([stage(A, BAD)], None, [BAD], [A])
     judge.fail("too late")
     assert (judge.status, judge.cause) == (Status.FAILURE, "pressed button; expected: do it")
+
     judge = judged([stage(A, BAD)], None, [A], [BAD])
     assert judge.status is Status.SUCCESS
 
@@ -63,6 +67,7 @@ def test_lasting_stages_count_from_the_first_evaluation_and_start_again():
     watch = [stage(still, lasting=3)]
     assert judged(watch, None, *[[still]] * 3).status is Status.ONGOING
     assert judged(watch, None, *[[still]] * 4).status is Status.SUCCESS
+
     interrupted = [[still], [still], [], [still], [still]]
     assert judged(watch, None, *interrupted).status is Status.ONGOING
     assert judged(watch, None, *interrupted, [still]).status is Status.SUCCESS

@@ -31,6 +31,11 @@ def put_down(name):
     return Fact("put_down", name)
 
 
+def presses_alone(task):
+    """Return the presses of a task without the moments between them."""
+    return [press for press in PRESSES[task] if press]
+
+
 def verdict(episode, *steps):
     return judged(episode.stages, episode.scene, *steps)
 
@@ -53,7 +58,9 @@ def hard(task, seed):
 def test_one_pick_succeeds_when_the_container_over_the_cube_is_lifted(task, seed):
     episode = make_episode(task, seed, "medium")
     (target,), _ = named(episode)
+
     judge = verdict(episode, *PRESSES[task], [], [lifted(target)])
+
     assert judge.status is Status.SUCCESS
     assert judge.cause is None
 
@@ -61,30 +68,39 @@ def test_one_pick_succeeds_when_the_container_over_the_cube_is_lifted(task, seed
 @each_task
 def test_two_picks_succeed_in_order_with_the_first_put_down_between(task, seed):
     episode, first, second, _ = hard(task, seed)
-    begin = [*PRESSES[task], [lifted(first)], []]
-    end = [[put_down(first)], [], [lifted(second)]]
-    assert verdict(episode, *begin, *end).status is Status.SUCCESS
-    assert verdict(episode, *begin, *end[:-1]).status is Status.ONGOING
+    begin = [*PRESSES[task], [lifted(first)], [], [put_down(first)], []]
+
+    assert verdict(episode, *begin).status is Status.ONGOING
+    assert verdict(episode, *begin, [lifted(second)]).status is Status.SUCCESS
 
 
 @each_task
-def test_any_other_container_fails_the_putting_down_and_the_second_pick(task, seed):
+def test_any_other_container_fails_the_putting_down(task, seed):
     episode, first, second, others = hard(task, seed)
-    begin = [*PRESSES[task], [lifted(first)]]
+
     for wrong in (second, *others):
-        judge = verdict(episode, *begin, [put_down(first), lifted(wrong)])
+        steps = [[lifted(first)], [put_down(first), lifted(wrong)]]
+        judge = verdict(episode, *PRESSES[task], *steps)
         assert judge.status is Status.FAILURE
         assert str(judge.cause).endswith("; expected: put down the container")
+
+
+@each_task
+def test_any_other_container_fails_the_second_pick(task, seed):
+    episode, first, _, others = hard(task, seed)
+
     for wrong in (first, *others):
-        judge = verdict(episode, *begin, [put_down(first)], [lifted(wrong)])
-        assert judge.status is Status.FAILURE
+        steps = [[lifted(first)], [put_down(first)], [lifted(wrong)]]
+        assert verdict(episode, *PRESSES[task], *steps).status is Status.FAILURE
 
 
 @each_task
 def test_the_container_that_is_held_or_lifted_again_before_it_is_down_is_fine(task, seed):
     episode, first, second, _ = hard(task, seed)
-    steps = [*PRESSES[task], *[[lifted(first)]] * 5, [], [lifted(first)], []]
+    held = [[lifted(first)]] * 5
+    steps = [*PRESSES[task], *held, [], [lifted(first)], []]
     assert verdict(episode, *steps).status is Status.ONGOING
+
     steps += [[put_down(first)], [lifted(second)]]
     assert verdict(episode, *steps).status is Status.SUCCESS
 
@@ -93,7 +109,9 @@ def test_the_container_that_is_held_or_lifted_again_before_it_is_down_is_fine(ta
 def test_the_first_container_has_to_be_put_down_and_no_other_will_do(task, seed):
     episode, first, second, others = hard(task, seed)
     down = [put_down(name) for name in (second, *others)]
+
     judge = verdict(episode, *PRESSES[task], [lifted(first)], down)
+
     assert (judge.status, judge.index) == (Status.ONGOING, len(episode.stages) - 2)
 
 
@@ -101,10 +119,13 @@ def test_the_first_container_has_to_be_put_down_and_no_other_will_do(task, seed)
 def test_nothing_fails_while_a_button_is_due(task, seed):
     episode, first, second, others = hard(task, seed)
     everything = [lifted(name) for name in (first, second, *others)]
-    looked = [[lifted(name)] for name in (first, second, *others)]
-    pressed = [facts for press in PRESSES[task] if press for facts in (everything, press)]
-    judge = verdict(episode, *looked, *pressed, [lifted(first)], [put_down(first)])
+    steps = [[fact] for fact in everything]
+    for press in presses_alone(task):
+        steps += [everything, press]
+
+    judge = verdict(episode, *steps, [lifted(first)], [put_down(first)])
     assert judge.status is Status.ONGOING
+
     judge.update(100, frozenset([lifted(second)]))
     assert judge.status is Status.SUCCESS
 
@@ -113,10 +134,11 @@ def test_nothing_fails_while_a_button_is_due(task, seed):
 def test_what_is_up_after_the_last_press_counts_one_step_later(task, seed):
     episode = make_episode(task, seed, "medium")
     (target,), others = named(episode)
-    *before, last = [press for press in PRESSES[task] if press]
+    *before, last = presses_alone(task)
     for up, outcome in ((target, Status.SUCCESS), (others[0], Status.FAILURE)):
         judge = verdict(episode, *before, [*last, lifted(up)])
         assert judge.status is Status.ONGOING
+
         judge.update(100, frozenset([lifted(up)]))
         assert judge.status is outcome
 
@@ -124,21 +146,23 @@ def test_what_is_up_after_the_last_press_counts_one_step_later(task, seed):
 @each_button_task
 def test_pressing_again_later_has_no_effect(task, seed):
     episode, first, second, _ = hard(task, seed)
-    again = [press for press in PRESSES[task] if press]
+    again = presses_alone(task)
     steps = [*PRESSES[task], *again, [lifted(first)], *again, [put_down(first)], *again]
+
     assert verdict(episode, *steps).status is Status.ONGOING
     assert verdict(episode, *steps, [lifted(second)]).status is Status.SUCCESS
 
 
 @pytest.mark.parametrize("order", [(LEFT, RIGHT), (RIGHT, LEFT)])
 @pytest.mark.parametrize("between", [[], [[]]])
-def test_both_buttons_in_any_order(order, between):
+def test_both_buttons_may_be_pressed_in_any_order(order, between):
     episode = make_episode("ButtonUnmaskSwap", 3, "medium")
-    one, other = order
-    assert verdict(episode, [one]).index == 1
-    assert verdict(episode, [one], *between, [other]).index == 2
+    first, other = order
+
+    assert verdict(episode, [first]).index == 1
+    assert verdict(episode, [first], *between, [other]).index == 2
     # Already the other one while the first is still down.
-    assert verdict(episode, [one], [one, other]).index == 2
+    assert verdict(episode, [first], [first, other]).index == 2
 
 
 @pytest.mark.parametrize("button", [LEFT, RIGHT])

@@ -12,7 +12,8 @@ from roboirg.tasks.video_place_order import TASK as VIDEO_PLACE_ORDER
 from roboirg.tasks.video_repick import TASK as VIDEO_REPICK
 
 PRESSED = Fact("pressed", "button")
-STILL, HOME = Fact("still", "robot"), Fact("home", "robot")
+STILL = Fact("still", "robot")
+HOME = Fact("home", "robot")
 TOO_EARLY = "pressed the button too early; expected: "
 
 
@@ -25,7 +26,8 @@ def make(task, difficulty="medium", goal=None):
     """An episode for the goal of its scene, or another."""
     scene, own = sample(task, difficulty)
     goal = goal or own
-    stages, shown = task.stages(scene, goal), task.demonstration(scene)
+    stages = task.stages(scene, goal)
+    shown = task.demonstration(scene)
     return Episode(task.name, "test", 0, 0, difficulty, scene, goal, stages, shown)
 
 
@@ -50,6 +52,7 @@ def repick(repeats, difficulty="medium"):
 def test_repick_as_often_as_wanted_then_press(repeats):
     episode, picked, lying = repick(repeats)
     cycle = [[lying], [picked], [], [lying]]
+
     assert verdict(episode, *cycle * repeats, [lying, PRESSED]) is Status.SUCCESS
     assert verdict(episode, *cycle * repeats) is Status.ONGOING
 
@@ -59,6 +62,7 @@ def test_repick_of_any_other_cube_fails_at_any_time(done):
     episode, picked, lying = repick(2, "hard")
     start = [[picked], [lying], [picked], [lying]][:done]
     others = {cube.name for cube in episode.scene.of_kind("cube")} - {picked.subject}
+
     for other in others:
         judge = judge_of(episode, *start, [Fact("picked", other)])
         assert (judge.index, judge.status) == (done, Status.FAILURE)
@@ -69,6 +73,7 @@ def test_repick_dropping_and_grasping_again_counts_as_what_it_is():
     episode, picked, lying = repick(1)
     # Held low or in the air, neither picked nor lying: nothing happens.
     assert verdict(episode, [picked], [], [], [picked], [lying], [PRESSED]) is Status.SUCCESS
+
     episode, picked, lying = repick(2)
     # Let go is put down, wherever that is: the next lift is the second one.
     steps = [[picked], [lying], [picked], [lying], [PRESSED]]
@@ -76,7 +81,8 @@ def test_repick_dropping_and_grasping_again_counts_as_what_it_is():
 
 
 WINDOW = [(0, False), (49, False), (50, True), (51, True), (500, True), (501, False), (900, False)]
-PICK, DOWN = "pick up the correct cube for the first time", "put it down"
+PICK = "pick up the correct cube for the first time"
+DOWN = "put it down"
 AGAIN = "pick up the correct cube for the second time"
 
 
@@ -92,14 +98,18 @@ AGAIN = "pick up the correct cube for the second time"
         (["picked", "lying", "picked"], 3, 1, DOWN),
     ],
 )
-def test_repick_early_press(steps, index, start, due, elapsed, fails):
+def test_a_press_before_its_stage_is_over_fails_repick(steps, index, start, due, elapsed, fails):
     episode, picked, lying = repick(2)
     facts = {"": [], "picked": [picked], "lying": [lying]}
     judge = judge_of(episode, *(facts[step] for step in steps))
+
     judge.update(start + elapsed, frozenset([PRESSED]))
+
     assert judge.index == index
-    assert judge.status is (Status.FAILURE if fails else Status.ONGOING)
-    assert judge.cause == (f"{TOO_EARLY}{due}" if fails else None)
+    if fails:
+        assert (judge.status, judge.cause) == (Status.FAILURE, f"{TOO_EARLY}{due}")
+    else:
+        assert (judge.status, judge.cause) == (Status.ONGOING, None)
 
 
 def test_repick_timers_do_not_start_with_the_video():
@@ -109,10 +119,12 @@ def test_repick_timers_do_not_start_with_the_video():
     while judge.index < len(episode.demonstration):
         judge.update(step, frozenset([lying if step else picked, STILL, HOME]))
         step += 1
+
     assert step > 100
     for elapsed in (0, 49):
         judge.update(step + elapsed, frozenset([PRESSED]))
         assert judge.status is Status.ONGOING
+
     judge.update(step + 50, frozenset([PRESSED]))
     assert judge.status is Status.FAILURE
 
@@ -136,7 +148,7 @@ PLACE_EPISODES = [
 every_place_goal = pytest.mark.parametrize(
     "episode",
     PLACE_EPISODES,
-    ids=lambda one: "-".join([one.task, *(str(value) for _, value in one.goal.slots)]),
+    ids=lambda episode: "-".join([episode.task, *(str(value) for _, value in episode.goal.slots)]),
 )
 
 
@@ -151,9 +163,10 @@ def place_facts(episode):
 
 
 @every_place_goal
-def test_place_pick_and_place(episode):
+def test_a_place_task_is_done_by_a_pick_and_the_right_place(episode):
     picked, placed = place_facts(episode)
     lying = Fact("lying", picked.subject)
+
     assert verdict(episode, [lying], [picked], [], [placed, lying]) is Status.SUCCESS
     assert verdict(episode, [placed]) is Status.ONGOING
     assert verdict(episode, [picked]) is Status.ONGOING
@@ -187,7 +200,9 @@ def test_place_picking_another_cube_fails_until_the_right_one_is_picked(episode)
 @every_place_goal
 def test_place_press_drop_and_site_do_not_matter(episode):
     picked, placed = place_facts(episode)
-    lying, site = Fact("lying", picked.subject), Fact("placed", picked.subject, "site")
+    lying = Fact("lying", picked.subject)
+    site = Fact("placed", picked.subject, "site")
     steps = [[PRESSED, site, lying], [picked], [PRESSED], [lying], [lying, site], [picked]]
+
     assert verdict(episode, *steps) is Status.ONGOING
     assert verdict(episode, *steps, [placed, PRESSED]) is Status.SUCCESS

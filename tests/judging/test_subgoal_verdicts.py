@@ -15,17 +15,17 @@ from roboirg.tasks.splits.splits import get_episode
 def verdict(
     said: str, due: Stage | None, episode: Episode, pointed_at: set[str | None] | None = None
 ) -> str:
-    points = None if pointed_at is None else {str(one) for one in pointed_at}
+    points = None if pointed_at is None else {str(point) for point in pointed_at}
     return judge_subgoal(said, due, points, episode)
 
 
-def test_points_are_split_off() -> None:
+def test_points_are_split_off():
     assert split_point("pick up the cube at <12, 200> now") == ("pick up the cube now", (12, 200))
     assert split_point("put it down") == ("put it down", None)
 
 
 @pytest.mark.parametrize("task", every_task())
-def test_what_is_due_is_right_and_another_act_is_lost(task: str) -> None:
+def test_what_is_due_is_right_and_another_act_is_lost(task):
     episode = get_episode(task, "test", 3)
     for stage in episode.stages:
         words = plain_subgoal(stage)
@@ -61,13 +61,13 @@ def test_what_is_due_is_right_and_another_act_is_lost(task: str) -> None:
         ("StopCube", 1, "remain static for 30 steps", "right"),
     ],
 )
-def test_what_is_wrong(task: str, number: int, said: str, expected: str) -> None:
+def test_a_subgoal_is_judged_by_what_is_wrong_with_it(task, number, said, expected):
     index = 30 if task == "PutInBox" else 0
     episode = get_episode(task, "test", index)
     assert verdict(said, episode.stages[number], episode) == expected
 
 
-def test_a_point_off_the_thing_is_wrong_whatever_the_words() -> None:
+def test_a_point_off_the_thing_is_wrong_whatever_the_words():
     episode = get_episode("VideoPlaceOrder", "test", 0)
     pick, place = episode.stages[:2]
     assert verdict(plain_subgoal(pick), pick, episode, {pick.points_at}) == "right"
@@ -75,16 +75,18 @@ def test_a_point_off_the_thing_is_wrong_whatever_the_words() -> None:
     assert verdict("pick the cube up", pick, episode, {"target_0"}) == "wrong_thing"
     assert verdict(plain_subgoal(place), place, episode, {place.points_at, "cube"}) == "right"
     assert verdict(plain_subgoal(place), place, episode, set()) == "wrong_place"
+
     waits = get_episode("StopCube", "test", 0)
     assert verdict("remain static", waits.stages[1], waits, {"button"}) == "right"
 
 
-def test_equal_cubes_stand_for_each_other_in_any_order_as_often_as_they_are_meant() -> None:
+def test_equal_cubes_stand_for_each_other_in_any_order_as_often_as_they_are_meant():
     episode = get_episode("BinFill", "test", 7)  # one blue cube and four green ones
     first = episode.stages[0]
     for color, last in (("blue", "cube_blue_3"), ("green", "cube_green_5")):
         assert verdict(f"pick up the {color} cube", first, episode) == "right"
         assert verdict("pick up the cube", first, episode, {last}) == "right"
+
     done = frozenset({Fact("binned", "cube_blue_3", "bin")})
     said = "pick up the blue cube"
     assert judge_subgoal(said, episode.stages[2], None, episode, done) == "wrong_thing"

@@ -22,7 +22,8 @@ def bin_fill(self):
 
 def pick_x_times(self):
     world = self.env.unwrapped
-    color, count = world.target_color_name, world.num_repeats
+    color = world.target_color_name
+    count = world.num_repeats
     if count == 1:
         return f"grab the {color} cube and set it on the target, then press the button to stop"
     return (
@@ -33,7 +34,8 @@ def pick_x_times(self):
 
 def swing_x_times(self):
     world = self.env.unwrapped
-    color, count = world.target_color_name, world.num_repeats
+    color = world.target_color_name
+    count = world.num_repeats
     again = "" if count == 1 else f", doing this {NUMBERS[count]} times"
     return (
         f"grab the {color} cube, swing it from above the right-side target to above the left-side "

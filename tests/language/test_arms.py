@@ -26,7 +26,6 @@ def options_of(episode: Episode) -> list[InstructionOptions]:
 
 @pytest.mark.parametrize("task", TASKS)
 def test_other_goals_take_as_many_picks_and_none_begins_the_other(task):
-    picks = {"pick_cube", "pick_container"}
     for index in range(50):
         episode = get_episode(task, "test", index)
         found = other_goals(episode)
@@ -34,11 +33,14 @@ def test_other_goals_take_as_many_picks_and_none_begins_the_other(task):
         assert set(found) <= set(get_task(task).goals(episode.scene))
         for goal in found:
             stages = with_goal(episode, goal).stages
-            both = [sum(one.primitive.kind in picks for one in each) for each in (
-                stages, episode.stages)]  # fmt: skip
-            assert both[0] == both[1]
+            assert picks_in(stages) == picks_in(episode.stages)
             assert not begins_with(stages, episode.stages)
             assert not begins_with(episode.stages, stages)
+
+
+def picks_in(stages):
+    """Return how many stages pick something up."""
+    return sum(stage.primitive.kind in {"pick_cube", "pick_container"} for stage in stages)
 
 
 def test_the_other_goal_is_drawn_evenly_and_not_by_the_words():
@@ -49,6 +51,7 @@ def test_the_other_goal_is_drawn_evenly_and_not_by_the_words():
         assert drawn == draw_other_goal(episode)
         assert drawn is not None
         counts[episode.goal.number("visit"), drawn.number("visit")] += 1
+
     assert len(counts) == 12  # each of four visits, with each of the other three
     assert min(counts.values()) > 25
     assert max(counts.values()) < 80
@@ -59,6 +62,7 @@ def test_a_scene_without_another_goal_says_so():
     assert draw_other_goal(episode) is None
     with pytest.raises(InvalidValueError, match="no other goal"):
         say_arm(episode, InstructionOptions(), "other-goal")
+
     say_arm(episode, InstructionOptions(), "silent")
 
 
@@ -91,15 +95,18 @@ def test_the_words_of_every_arm_that_states_a_goal_mean_it(task):
 
 @pytest.mark.parametrize("setting", ["explicit", "contextual", "reasoning"])
 def test_told_silent_and_scrambled_words(setting):
-    episode, options = get_episode("PickXtimes", "test", 3), InstructionOptions(setting)
+    episode = get_episode("PickXtimes", "test", 3)
+    options = InstructionOptions(setting)
     told = instruct_with(episode, options)
     for arm in ("told", "again"):
         assert say_arm(episode, options, arm).instruction == told
     assert say_arm(episode, options, "silent").instruction.turns == ("Please do your task.",)
     assert say_arm(episode, options, "silent-empty").instruction.text == ""
+
     scrambled = say_arm(episode, options, "scrambled").instruction
     assert scrambled == say_arm(episode, options, "scrambled").instruction
     assert len(scrambled.utterances) == len(told.utterances)
+
     words = told.text.lower().replace(",", "").replace(".", "").split()
     content = [word for word in words if word not in FUNCTION_WORDS.split()]
     assert Counter(scrambled.text.split()) == Counter(content)
@@ -107,7 +114,7 @@ def test_told_silent_and_scrambled_words(setting):
     assert not scrambled.mentions
 
 
-def test_names_of_arms():
+def test_arms_are_read_by_name_and_anything_else_is_refused():
     assert parse_arm("other-goal") == ("other-goal",)
     assert parse_arm("paraphrase:3") == ("paraphrase-1", "paraphrase-2", "paraphrase-3")
     assert len(parse_arm("paraphrase")) == PARAPHRASES

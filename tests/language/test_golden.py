@@ -29,7 +29,9 @@ GOLDEN: dict[str, str] = {
 def digest(task):
     """A hash of all instructions, with all options, of the first episodes of train and of test."""
     sha = hashlib.sha256()
-    for episode in (one for split in ("train", "test") for one in first_episodes(task, split, 8)):
+    for episode in (
+        episode for split in ("train", "test") for episode in first_episodes(task, split, 8)
+    ):
         for options in expressible_options(episode):
             said = instruct_with(episode, options)
             told = (episode.key, options.setting, options.form, said.turns, said.mentions)

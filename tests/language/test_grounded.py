@@ -37,7 +37,7 @@ def test_exactly_the_touched_slots_are_hidden(task):
     for episode, said in told(task):
         touched = said.metadata["touched"]
         assert touched
-        pointed = {one.slot for one in said.mentions if one.role == "anaphor"}
+        pointed = {mention.slot for mention in said.mentions if mention.role == "anaphor"}
         assert pointed - {"reference"} <= {*touched, "colors"}
         assert said.metadata["hidden_slots"] >= 1
         assert row(episode, said)["touched"] == ", ".join(touched)
@@ -60,11 +60,14 @@ def test_no_thing_is_described_by_a_color(task):
 )
 def test_the_words_do_not_go_with_the_goal(task, slot):
     """A guess from the description, with hindsight, is hardly better than the commonest value."""
-    values, prior = defaultdict(Counter), Counter()
+    values = defaultdict(Counter)
+    prior = Counter()
     for episode, said in told(task):
         if slot in said.metadata["touched"]:
             spans = [
-                said.span(one) for one in said.mentions if one.utterance == 0 and one.slot == slot
+                said.span(mention)
+                for mention in said.mentions
+                if mention.utterance == 0 and mention.slot == slot
             ]
             # Left and right, and colors are exchangeable; many texts are rare.
             exchangeable = {"red", "green", "blue", "left", "right"}

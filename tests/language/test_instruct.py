@@ -22,8 +22,14 @@ WITHOUT_SPATIAL = ("StopCube", "VideoRepick", "VideoPlaceButton", "VideoPlaceOrd
 def test_every_task_has_the_settings_of_the_paper():
     four = ["explicit", "direct", "reasoning", "contextual"]
     assert [*plain_settings()] == [*four, "spatial"]
-    harder = {one.name: one.plain for one in all_settings().values() if one.plain is not None}
+
+    harder = {
+        setting.name: setting.plain
+        for setting in all_settings().values()
+        if setting.plain is not None
+    }
     assert harder == {"direct-rival": "direct", "grounded": "direct"}
+
     expected = {
         (name, setting)
         for name in every_task()
@@ -59,16 +65,19 @@ def test_invalid_options_are_refused(options):
 
 
 def test_explicit_is_its_own_resolved_form():
-    implicit, resolved = instruct(EPISODE), instruct(EPISODE, "explicit", "resolved")
+    implicit = instruct(EPISODE)
+    resolved = instruct(EPISODE, "explicit", "resolved")
     assert (implicit.text, implicit.form, resolved.form) == (resolved.text, "implicit", "resolved")
 
 
 def test_distractors_are_as_many_as_asked_for():
     for distractor in ("neutral", "competing"):
         said = instruct(EPISODE, "contextual", distractors=64, distractor=distractor)
-        remarks = [one.text for one in said.utterances if one.stage == "distractor"]
+        remarks = [
+            utterance.text for utterance in said.utterances if utterance.stage == "distractor"
+        ]
         assert len(remarks) == 64
-        assert all(one != two for one, two in itertools.pairwise(remarks))
+        assert all(remark != two for remark, two in itertools.pairwise(remarks))
 
 
 def test_an_episode_without_landmark_is_refused_in_the_spatial_setting():
@@ -84,5 +93,7 @@ def test_the_same_words_in_another_process():
         "print(instruct(get_episode('PickXtimes', 'test', 2), 'contextual').text, end='')"
     )
     command = [sys.executable, "-c", program]
+
     other = subprocess.run(command, capture_output=True, text=True, check=True)
+
     assert other.stdout == instruct(EPISODE, "contextual").text

@@ -107,7 +107,7 @@ def test_another_value_in_the_introduction_is_another_goal(task):
                     continue
                 other = min(others, key=str)
                 changed = term._replace(
-                    operands=tuple(other if one == operand else one for one in term.operands)
+                    operands=tuple(other if part == operand else part for part in term.operands)
                 )
                 goals = meaning.meant_goals(Meaning({**said.meaning.terms, name: changed}), episode)
                 if term.operation == "same":
@@ -127,6 +127,7 @@ def test_no_words_leave_all_goals_and_scrambled_ones_have_no_meaning():
     options = InstructionOptions("direct")
     silent = say_arm(SCENE, options, "silent").instruction
     assert understood_goals(silent, SCENE) == goals_of(SCENE)
+
     scrambled = say_arm(SCENE, options, "scrambled").instruction
     assert scrambled.meaning is None
     assert understood_goals(scrambled, SCENE) == goals_of_command(scrambled, SCENE) == ()
@@ -212,20 +213,29 @@ def another_if(kind, described_thing, described, episode):
 def test_a_fault_in_operations_pointers_places_or_clues_is_found(fault, monkeypatch):
     FAULTS[fault](monkeypatch)
     texts = itertools.chain.from_iterable(said_of(task, 4) for task in WRITTEN)
-    assert any(not is_goal_alone(understood_goals(said, one), one) for one, _, said in texts)
+    assert any(
+        not is_goal_alone(understood_goals(said, episode), episode) for episode, _, said in texts
+    )
 
 
 def test_amounts_have_no_order_and_them_may_be_of_any_number_of_colors():
-    episode = next(one for one in scenes_of("BinFill", 0) if len(one.goal["colors"]) == 2)
-    (first, one), (second, other) = episode.goal.amounts
-    values = {"colors.0": second, "counts.0": other, "colors.1": first, "counts.1": one}
-    terms = {field: Term("same", (value,)) for field, value in values.items()}
+    episodes = scenes_of("BinFill", 0)
+    episode = next(found for found in episodes if len(found.goal["colors"]) == 2)
+    (color, count), (other_color, other_count) = episode.goal.amounts
+    exchanged = {
+        "colors.0": other_color, "counts.0": other_count, "colors.1": color, "counts.1": count,
+    }  # fmt: skip
+    terms = {field: Term("same", (value,)) for field, value in exchanged.items()}
+
     assert meaning.meant_goals(Meaning(terms), episode) == (episode.goal,)
     assert meaning.command_goals(Meaning(terms), episode) == goals_of(episode)
+
     stated = Meaning(terms, frozenset({"counts.0", "colors.1", "counts.1"}))
     left = [dict(goal.amounts) for goal in meaning.command_goals(stated, episode)]
-    assert dict(episode.goal.amounts) in left
-    assert all(len(amounts) == 2 and amounts[first] == one for amounts in left)
+    assert {color: count, other_color: other_count} in left
+    for given in left:
+        assert len(given) == 2
+        assert given[color] == count
 
 
 def test_the_rest_is_all_cubes_but_those_that_are_kept():

@@ -76,6 +76,7 @@ def printed(*tables):
 def test_a_setting_is_in_the_lists_of_its_tasks(register):
     register(DUMMY)
     counting = [task.name for task in all_tasks().values() if task.suite == "counting"]
+
     assert setting_names()[-1] == "dummy"
     assert [name for name, task in all_tasks().items() if "dummy" in settings_of(task)] == counting
     with pytest.raises(InvalidValueError, match="has no dummy setting"):
@@ -90,6 +91,7 @@ def test_a_refusal_says_why_wherever_it_shows(register):
     with pytest.raises(InvalidValueError, match=f"dummy setting cannot express .*{REASON}"):
         instruct(EPISODE, "dummy")
     assert REASON in printed(instructions_table(EPISODE, ["dummy"], InstructionOptions()))
+
     plan = make_plan(["listener"], tasks="PickXtimes", settings="all", episodes="0,3")
     assert ["dummy" in plan.settings_of("PickXtimes", index) for index in (0, 3)] == [False, True]
 
@@ -98,6 +100,7 @@ def test_a_new_setting_does_not_change_the_splits(register, monkeypatch):
     slot = EpisodeSlot("PickXtimes", "test", 0)
     register(DUMMY)
     assert check_words(slot, EPISODE.seed) is None
+
     monkeypatch.setattr(seed_selection, "ACCEPTANCE_SETTINGS", ("direct", "dummy"))
     rejection = check_words(slot, EPISODE.seed)
     assert (rejection.reason, rejection.cause) == ("not expressible", f"dummy: {REASON}")
@@ -106,16 +109,20 @@ def test_a_new_setting_does_not_change_the_splits(register, monkeypatch):
 def test_statistics_and_export_have_the_setting(register):
     register(DUMMY)
     episodes = [get_episode("PickXtimes", "test", index) for index in range(12)]
-    found = list(instructions(episodes, setting_names(), FORMS))
-    dummies = [one for one in (row(*one) for one in found) if one["setting"] == "dummy"]
-    assert len(dummies) == 2 * sum(episode.difficulty != "easy" for episode in episodes)
-    said = [one for _, one in found if one.form == "implicit"]
+
+    jobs = list(instructions(episodes, setting_names(), FORMS))
+
+    settings = [row(*job)["setting"] for job in jobs]
+    harder = [episode for episode in episodes if episode.difficulty != "easy"]
+    assert settings.count("dummy") == 2 * len(harder)
+    said = [instruction for _, instruction in jobs if instruction.form == "implicit"]
     assert "dummy" in printed(*statistics_tables.overview_tables(said))
 
 
 @pytest.mark.parametrize("name", ["direct", "reasoning", "spatial", "grounded", "direct-rival"])
 def test_a_setting_says_scenarios_of_its_own_in_the_ways_of_one_of_ours(name, register, tmp_path):
-    lab, episode = f"lab-{name}", get_episode("PickXtimes", "test", 6)
+    lab = f"lab-{name}"
+    episode = get_episode("PickXtimes", "test", 6)
     ours = (FOLDER / "color_and_number.toml").read_text()
     path = tmp_path / "lab.toml"
     path.write_text(ours.replace(f'setting = "{name}"', f'setting = "{lab}"'))
@@ -124,19 +131,21 @@ def test_a_setting_says_scenarios_of_its_own_in_the_ways_of_one_of_ours(name, re
     unwritten = r"\): color_and_number\.toml has no lab-\S+ scenario for it in the pool test; leave"
     with pytest.raises(InvalidValueError, match=unwritten):
         instruct(episode, lab)
+
     register(dataclasses.replace(setting, words=str(path)))
     setting_scenarios.cache_clear()
+    scenarios = setting_scenarios(lab)["PickXtimes"].scenarios
+    of_the_pool = [scenario for scenario in scenarios if scenario.fields.pool == "test"]
+
     for form in FORMS:
         said = instruct(episode, lab, form)
         assert understood_goals(said, episode) == (episode.goal,)
-        (scenario,) = [
-            one
-            for one in setting_scenarios(lab)["PickXtimes"].scenarios
-            if (one.fields.frame, one.fields.pool) == (said.metadata["scenario"], "test")
-        ]
+        frame = said.metadata["scenario"]
+        (scenario,) = [found for found in of_the_pool if found.fields.frame == frame]
         assert scenario.fields.setting == lab
     states_color = episode.goal.text("color") in said.command
     assert states_color or name not in ("direct", "direct-rival")
+
     setting_scenarios.cache_clear()
 
 
@@ -209,8 +218,10 @@ def test_a_wording_file_comes_before_the_file_of_a_setting_and_this_before_the_t
     wordings = register_wordings(parse_wordings(MINE + mine, "mine.toml")) if mine else None
     said = instruct(HARD, "lab", wordings=wordings)
     color = HARD.goal.text("color")
+
     assert said.turns[0] == introduction.format(times(HARD.goal["repeats"]))
     assert said.command.startswith(command.format(color))
+
     explicit = instruct(HARD, wordings=wordings).command
     assert "Lab" not in explicit
     assert explicit.startswith("Mine: ") == (MY_COMMAND in mine)

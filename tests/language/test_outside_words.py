@@ -213,6 +213,7 @@ found.append(language_label(["PickXtimes"], "test", ["direct", "colored"]))
     assert [row[:3] for row in own] == [
         [task, pool, "colored"] for task in ("PickXtimes", "SwingXtimes") for pool in POOLS
     ]
+
     name = r"PickXtimes/test/colored@[0-9a-f]{12}"
     assert re.fullmatch(name, own[1][-1])
     assert label.split()[1:] == [words_of("PickXtimes", "test"), own[1][-1]]
@@ -263,6 +264,7 @@ for split, index, name in itertools.product(("train", "test"), range(12), settin
 found.append(sorted(spoken))
 """)
     assert not found
+
     names = ("contextual", "direct", "direct-rival", "explicit", "grounded", "reasoning")
     assert settings == [[name, split] for name in names for split in ("test", "train")]
 
@@ -318,6 +320,7 @@ def test_what_words_from_outside_lack_is_said_in_a_sentence(
     outside = Package(tmp_path)
     text = (outside.files / file).read_text()
     assert before in text
+
     (outside.files / file).write_text(text.replace(before, after))
     (printed,) = outside.run(f"found.append(refused({task!r}, {setting!r}))")
     assert sentence.format(outside.files).rstrip(".") in printed

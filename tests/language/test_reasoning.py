@@ -49,13 +49,18 @@ def test_every_pattern_that_makes_sense_for_a_task_is_in_the_test_split(task):
     assert found == PATTERNS_OF[task]
 
 
-def test_patterns_take_turns_in_every_difficulty():
+@pytest.mark.parametrize("size", [2, 3, 4])
+@pytest.mark.parametrize("first", range(4))
+def test_patterns_take_turns_in_every_difficulty(size, first):
     """Difficulties repeat every four episodes."""
-    for size, first in itertools.product((2, 3, 4), range(4)):
-        patterns = [str(number) for number in range(size)]
-        episodes = [get_episode("PickXtimes", "test", index) for index in range(first, 48, 4)]
-        found = Counter(in_turn(episode, patterns) for episode in episodes)
-        assert max(found.values()) - min(found.get(name, 0) for name in patterns) <= 1
+    patterns = [str(number) for number in range(size)]
+    episodes = [get_episode("PickXtimes", "test", index) for index in range(first, 48, 4)]
+
+    found = Counter(in_turn(episode, patterns) for episode in episodes)
+
+    counts = [found[name] for name in patterns]
+    assert max(counts) - min(counts) <= 1
+    assert sum(counts) == len(episodes)
 
 
 def test_as_few_colors_are_excluded_as_leave_one():
@@ -95,6 +100,7 @@ def test_a_relation_leaves_the_number_open():
     # Of one to three only three is two more than something.
     names = [relation.name for relation, _ in deductions([3], [(1,), (2,), (3,)])]
     assert names == ["one fewer", "one more", "two fewer", "half"]
+
     found = deductions([1, 3], [(1, 3), (2, 2), (1, 1), (3, 1)])
     assert [(relation.name, references) for relation, references in found] == [
         ("one fewer", [2, 4]),

@@ -1,7 +1,5 @@
 """Rivals: a second value on equal terms, and words that single one of the two out."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 from collections import Counter
@@ -35,7 +33,7 @@ def test_the_notes_are_those_of_the_words(task):
         notes = said.metadata
         slot = notes["rival_slot"]
         meant = contents(episode.goal, slot)[0]
-        introduced = [one.value for one in said.mentions if one.utterance == 0]
+        introduced = [mention.value for mention in said.mentions if mention.utterance == 0]
         values = [value for value in introduced if value in (meant, notes["rival"])][:2]
         assert notes["candidates"] == {slot: values}
         assert set(values) == {meant, notes["rival"]}
@@ -63,25 +61,29 @@ def test_no_other_setting_has_a_rival():
 
 def test_what_cannot_have_a_rival_is_refused_by_name():
     episodes = (get_episode("BinFill", "test", index) for index in itertools.count())
-    episode = next(one for one in episodes if one.difficulty == "hard")
+    episode = next(episode for episode in episodes if episode.difficulty == "hard")
     reason = "The direct-rival setting cannot express .*counts cubes of several colors"
+
     with pytest.raises(InvalidValueError, match=reason):
         instruct(episode, "direct-rival")
 
 
 @functools.cache
 def all_told():
-    return [one for task in all_tasks() for one in told(task, "train", 60)]
+    return [said for task in all_tasks() for said in told(task, "train", 60)]
+
+
+@pytest.mark.parametrize("task", ["StopCube", "VideoRepick"])
+def test_each_kind_of_pointer_comes_once_in_a_block_of_four(task):
+    drawn = [instruct(get_episode(task, "test", index), "direct-rival") for index in range(8)]
+    for block in (drawn[:4], drawn[4:]):
+        assert len({said.metadata["rival_reference"] for said in block}) == 4
 
 
 def test_each_value_is_meant_equally_often():
-    """Whatever the episode: in blocks of four, each order comes with each kind of pointer once."""
-    for task in ("StopCube", "VideoRepick"):
-        drawn = [instruct(get_episode(task, "test", index), "direct-rival") for index in range(8)]
-        for block in (drawn[:4], drawn[4:]):
-            assert len({said.metadata["rival_reference"] for said in block}) == 4
     found = Counter(said.metadata["rival_position"] for _, said in all_told())
     assert abs(found["first"] / found.total() - 0.5) < 0.01
+
     kinds = Counter(said.metadata["rival_reference"] for _, said in all_told())
     assert set(kinds) == {"former", "latter", "not_former", "not_latter"}
     assert min(kinds.values()) > 0.2 * kinds.total()
@@ -89,10 +91,12 @@ def test_each_value_is_meant_equally_often():
 
 def test_no_rule_is_above_chance():
     episodes = all_told()
-    chance = sum(right_share(blind_goals(said, one), one) for one, said in episodes)
+    chance = sum(right_share(blind_goals(said, episode), episode) for episode, said in episodes)
+
     assert 0.49 < chance / len(episodes) <= 0.5
     for rule in SURFACE_RULES:
         right = sum(
-            goal_share(guess_goal(rule, said.text, one.task), one) for one, said in episodes
+            goal_share(guess_goal(rule, said.text, episode.task), episode)
+            for episode, said in episodes
         )
         assert right / len(episodes) < 0.55, rule

@@ -31,6 +31,7 @@ def test_other_sentences_are_refused_under_the_name():
 def test_the_fingerprint_is_of_what_is_said(monkeypatch):
     own = fingerprint("StopCube", words("mine").tasks["StopCube"].literals)
     monkeypatch.setitem(FINGERPRINTS, "StopCube", own)
+
     assert words().name == "robomme"
     with pytest.raises(InvalidValueError, match="StopCube"):
         words(verb="Halt")

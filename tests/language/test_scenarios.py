@@ -174,6 +174,7 @@ STEP = "{step} fewer [step: time|times] than <that reference: {he} did>"
 def test_of_a_pointer_that_does_not_exist_the_five_nearest_are_named_each_once():
     with pytest.raises(InvalidValueError) as found:
         read(DIRECT.replace('["<it color: it>"]', f'["{STEP}"]'))
+
     nearest = re.search("for a reference: (.*) .* is any noun", str(found.value))[1].split("; ")
     assert len(nearest) == len(set(nearest)) == 5
     assert "{step:*} fewer than <that reference: that>" in nearest
@@ -204,8 +205,10 @@ def test_every_mistake_of_a_file_is_named_by_scenario_and_field():
     wrong = wrong.replace("{repeats} today", "{repeat} today").replace("{color} c", "{colr} c")
     wrong = wrong.replace("<it color: it>.", "<them color: it>")
     again = RIVAL.replace("not_latter", "latest").partition("\n[")[2]
+
     with pytest.raises(InvalidValueError) as found:
         read_task_scenarios(f"{wrong}\n[{again}\n[{again}", "mine.toml")
+
     named = [line.removeprefix("mine.toml, scenario ") for line in str(found.value).splitlines()]
     begun = [
         "'birthday', pool is",
@@ -217,7 +220,7 @@ def test_every_mistake_of_a_file_is_named_by_scenario_and_field():
         "'two' has no remarks.not_latter",
         "'two' stands twice in the setting direct-rival, test.",
     ]
-    assert [line[: len(one)] for line, one in zip(named, begun, strict=True)] == begun
+    assert [line[: len(beginning)] for line, beginning in zip(named, begun, strict=True)] == begun
 
 
 @pytest.mark.parametrize(
@@ -247,12 +250,13 @@ def test_the_checker_names_the_rule_that_a_scenario_breaks(text, before, after, 
     scenes = scenes_of("PickXtimes", 0)[::10]
     assert not check_scenarios(read(text), None, scenes)[0].broken
     assert before in text
+
     try:
         words = read(text.replace(before, after))
         broken = list(check_scenarios(words, None, scenes)[0].broken)
     except InvalidValueError as error:  # said no expression of the table
         broken = [str(error)]
-    assert any(rule in one for one in broken), broken
+    assert any(rule in sentence for sentence in broken), broken
 
 
 def test_a_value_after_pointers_and_a_place_are_given_away_and_pointers_are_not():
@@ -261,12 +265,14 @@ def test_a_value_after_pointers_and_a_place_are_given_away_and_pointers_are_not(
         Mention(0, command.index(word), command.index(word) + 5, "anaphor", word, "colors", "red")
         for word in ("first", "other")
     ]
+
     said = Instruction(
         *("VideoUnmask", "VideoUnmask/test/3", "direct", "implicit"),
         (Utterance("command", command),),
         tuple(pointers),
         {"landmarks": ["at the far left", "closest to you"]},
     )
+
     assert find_leaks(said, Goal.of(colors=("green", "red"))) == {"red", "at the far left"}
     assert find_leaks(said, Goal.of(visit=1)) == {"at the far left"}
 
@@ -286,14 +292,21 @@ def test_that_one_is_no_number_but_one_time_is():
 @pytest.mark.parametrize(("text", "setting"), [(DIRECT, "direct"), (FEWER, "reasoning")])
 def test_one_more_scenario_moves_no_text_but_those_that_say_it(text, setting):
     (added,) = read(text).scenarios
-    ours = [one for one in task_scenarios("PickXtimes").scenarios if one.fields.setting == setting]
-    known = [one for one in ours if one.fields.pool == "train"]
+    ours = [
+        scenario
+        for scenario in task_scenarios("PickXtimes").scenarios
+        if scenario.fields.setting == setting
+    ]
+    known = [scenario for scenario in ours if scenario.fields.pool == "train"]
     told = 0
+
     for episode in scenes_of("PickXtimes", 0):
         request = request_of(episode, InstructionOptions(setting, wordings="train"))
-        before, after = choose(request, setting, known), choose(request, setting, [*known, added])
+        before = choose(request, setting, known)
+        after = choose(request, setting, [*known, added])
         told += after.scenario is added
         assert after == before or after.scenario is added
+
     assert 3 < told < 60
 
 
@@ -305,7 +318,9 @@ def test_the_example_of_the_page_breaks_no_rule_in_any_scene():
 def test_the_page_s_file_is_one_of_ones_own_and_its_two_places_serve_every_scene():
     scenes = scenes_of("PickXtimes", 0)[::4]
     words = parse_wordings(OWN + PLACES, "mine.toml").tasks["PickXtimes"]
+
     reports = check_scenarios(words, None, scenes)
+
     assert [report.scenario.fields.frame for report in reports if report.broken] == []
     assert len(reports) == 3
     assert not list(unserved_settings(reports, scenes, Path("mine.toml")))
@@ -322,7 +337,9 @@ def test_the_page_s_file_is_one_of_ones_own_and_its_two_places_serve_every_scene
 def test_of_a_scenario_that_fits_no_scene_the_reason_is_given(text, before, after, reason):
     scenes = scenes_of("PickXtimes", 0)[:3]
     (report,) = check_scenarios(read(text.replace(before, after)), None, scenes)
+
     fits_none = f"fits none of the scenes; in PickXtimes/train/0 {reason}"
+
     assert [rule[: len(fits_none)] for rule in report.broken][-1:] == [fits_none]
 
 
@@ -331,9 +348,9 @@ def test_authors_see_a_competing_remark_where_a_setting_has_one():
     for text, number in ((DIRECT, 1), (RIVAL, 0)):
         (report,) = check_scenarios(read(text), None, scenes)
         (*texts, _, _) = report_lines(report, "PickXtimes")
-        shown = [one for one in texts if one.startswith("  With a competing remark: ")]
+        shown = [text for text in texts if text.startswith("  With a competing remark: ")]
         assert len(shown) == number
-        assert all(" one. Let's surprise" in one for one in shown)
+        assert all(" one. Let's surprise" in text for text in shown)
 
 
 CONTAINER = """
@@ -360,7 +377,9 @@ say."colors.0" = ["WORDS"]
 )
 def test_words_for_a_container_that_point_at_its_cube_name_the_container(words, is_broken):
     scenario = read(CONTAINER.replace("WORDS", words), "VideoUnmask").scenarios[0]
-    broken = any("a container is lifted" in one for one in broken_sentences(scenario, "container"))
+    broken = any(
+        "a container is lifted" in sentence for sentence in broken_sentences(scenario, "container")
+    )
     assert broken == is_broken
 
 
@@ -368,7 +387,9 @@ def test_a_resolved_text_that_is_too_long_is_marked():
     longer = "<it color: it> is much prettier than {person.2}'s {rival color} one."
     text = DIRECT.replace("{person.2} has a {rival color} one.", longer)
     (report,) = check_scenarios(read(text), None, scenes_of("PickXtimes"))
+
     (*_, complaint, example, _) = report_lines(report, "PickXtimes")
+
     assert re.match(r"  BROKEN needs \d+ tokens; only 64 are heard", complaint)
     assert re.match(r"    resolved: .*Pick up the \w+ cube and put it on the target", example)
 
@@ -380,7 +401,9 @@ def test_words_that_only_look_like_a_value_may_be_said_and_people_only_in_passin
     text = DIRECT.replace("The cake", words).replace("{person} turns", "My cat turns")
     text = text.replace("{he}", "it").replace("surprise {him}", "surprise it")
     scenes = scenes_of("PickXtimes", 0)[::20]
+
     (report,) = check_scenarios(read(text), None, scenes)
+
     assert not set(report.broken) - {f"needs {tokens_of(report.longest)} tokens; only 64 are heard"}
 
 
@@ -388,8 +411,11 @@ def test_words_that_only_look_like_a_value_may_be_said_and_people_only_in_passin
 @pytest.mark.parametrize("step", [25, pytest.param(1, marks=pytest.mark.slow)])
 def test_no_scenario_breaks_a_rule_in_published_and_random_scenes(task, step):
     reports = check_scenarios(task_scenarios(task), None, scenes_of(task)[::step])
-    broken = {one.scenario.fields.frame: dict(one.broken) for one in reports if one.broken}
+    broken = {
+        report.scenario.fields.frame: dict(report.broken) for report in reports if report.broken
+    }
     assert step > 1 or not broken
+
     rules = {rule.partition(";")[0] for found in broken.values() for rule in found}
     assert rules <= {"fits none of the scenes"}, broken
 
@@ -428,8 +454,8 @@ def test_instructions_keep_the_rules(task):
         assert (notes["frame"] is not None) == (options.setting == "spatial")
         assert told == instruct_with(episode, options)
         assert not re.search(r"[{}<>|\[\]]|  | [.,]|[.]{2}", told.text), told.text
-        for one in told.mentions:
-            assert told.span(one).strip() == told.span(one) != ""
+        for mention in told.mentions:
+            assert told.span(mention).strip() == told.span(mention) != ""
         if options.setting == "contextual" and options.stages == (1, 5):
             direct = replace(options, setting="direct")
             assert told.turns == instruct_with(episode, direct).turns
@@ -464,26 +490,29 @@ def test_of_several_amounts_one_color_has_to_be_found_out_and_the_others_are_sta
     hidden = defaultdict(set)
     for index, pool in itertools.product(range(120), POOLS):
         episode = get_episode("BinFill", "random", index)
+        colors = list(episode.goal["colors"])
         options = InstructionOptions(name, wordings=pool)
-        if len(episode.goal["colors"]) < 2 or find_refusal(episode, options) is not None:
+        if len(colors) < 2 or find_refusal(episode, options) is not None:
             continue
         said = instruct_with(episode, options)
-        named = re.findall(r"(\w+) (red|green|blue) cube", said.turns[1])
-        stated = {(color, cardinal(count)) for color, count in episode.goal.amounts}
-        assert {(color, count) for count, color in named} < stated, said.text
-        assert len(named) == len(stated) - 1
+        stated = re.findall(r"(\w+) (red|green|blue) cube", said.turns[1])
+        amounts = {(cardinal(count), color) for color, count in episode.goal.amounts}
+        assert set(stated) < amounts, said.text
+        assert len(stated) == len(amounts) - 1
         assert said.metadata["hidden_slots"] == 1
-        (color,) = set(episode.goal["colors"]) - {color for _, color in named}
-        hidden[len(stated)].add(episode.goal["colors"].index(color))
+        (color,) = set(colors) - {color for _, color in stated}
+        hidden[len(colors)].add(colors.index(color))
+
     # That it is found out says nothing about its place among the goal's colors.
     assert hidden[2] == {0, 1}
 
 
 def test_all_amounts_are_said_in_one_phrase_each_count_and_color_a_mention():
     scenes = scenes_of("BinFill", 0)
-    episode = next(one for one in scenes if len(one.goal["colors"]) == 3)
+    episode = next(scene for scene in scenes if len(scene.goal["colors"]) == 3)
     said = instruct(episode)
     assert re.search(r"\w+ red cubes?, \w+ blue ones? and \w+ green ones? ", said.text)
+
     values = [mention.value for mention in said.mentions]
     assert values == [value for color, count in episode.goal.amounts for value in (count, color)]
 
@@ -510,17 +539,20 @@ def test_a_long_context_begins_with_the_shorter_one(kind):
     assert (many[:4], many[-2:], len(many)) == (few[:4], few[-2:], 13)
 
 
-def test_arms_say_scenarios():
+def test_each_arm_says_other_words_of_a_scenario():
     episode = get_episode("PickXtimes", "train", 2)
     options = InstructionOptions("direct")
     told = instruct_with(episode, options).text
+
     arms = [say_arm(episode, options, arm) for arm in ("paraphrase-1", "other-goal", "scrambled")]
-    assert len({told, *(one.instruction.text for one in arms)}) == 4
+
+    assert len({told, *(arm.instruction.text for arm in arms)}) == 4
 
 
 def test_a_task_without_words_is_refused_in_a_sentence(monkeypatch):
     take_words(monkeypatch, "VideoRepick")
     lacking = "has no commands of VideoRepick in the pool train."
+
     with pytest.raises(InvalidValueError, match=lacking):
         read(DIRECT.replace("PickXtimes", "VideoRepick"))
     with pytest.raises(InvalidValueError, match="VideoRepick names no file of words"):
@@ -556,14 +588,16 @@ say.color = ["the cube <there place: there>"]
 
 
 def test_a_file_serves_several_tasks_each_with_its_own_commands_and_scenarios():
-    pick, swing = read(TWO_TASKS), read(TWO_TASKS, "SwingXtimes")
+    pick = read(TWO_TASKS)
+    swing = read(TWO_TASKS, "SwingXtimes")
+
     assert pick.commands["train"] == swing.commands["train"] == ("Move {color} {repeats}.",)
     assert pick.commands["test"] == ("Take {color} {repeats}.",)
     assert swing.commands["test"] == ("Swing {color} {repeats}.",)
     assert pick.stated["color"] == swing.stated["color"]
     assert pick.stated["repeats"] != swing.stated["repeats"]
-    assert [one.fields.frame for one in pick.scenarios] == ["here"]
-    assert [one.fields.frame for one in swing.scenarios] == ["here", "there"]
+    assert [scenario.fields.frame for scenario in pick.scenarios] == ["here"]
+    assert [scenario.fields.frame for scenario in swing.scenarios] == ["here", "there"]
 
 
 def test_a_file_without_commands_has_those_of_each_task():
@@ -606,23 +640,27 @@ def test_every_pointer_is_said_in_both_pools():
         for scenario in written:
             text = str(scenario).replace('"', "'")
             said[scenario["pool"]] += re.sub(r"<[a-z]+ [^:<>]+: ", "<", text)
+
     lacking = [
         (row.words, pool)
         for row, pool in itertools.product(pointer_table(), POOLS)
         if not is_said(row, said[pool])
     ]
+
     assert not lacking
 
 
 def test_no_implicit_text_of_the_test_split_is_said_in_training():
     said = dict.fromkeys(POOLS, frozenset())
     settings = [name for name in all_settings() if name != "explicit"]
+
     for task, split in itertools.product(WRITTEN, ("train", "val", "test")):
         pool = "test" if split == "test" else "train"
         episodes = split_episodes([task], [split])
         options = InstructionOptions()
         told = instructions(episodes, settings, ["implicit"], options)
-        said[pool] |= {one.text for _, one in told}
+        said[pool] |= {instruction.text for _, instruction in told}
+
     assert said["train"]
     assert not said["train"] & said["test"]
 
@@ -648,17 +686,21 @@ def test_no_introduction_of_a_test_is_one_of_training_with_other_nouns():
 
 def test_nobody_says_that_many_times_of_one():
     """But of a one that was spun, where another number was, too."""
-    words, found = task_scenarios("PickXtimes"), defaultdict(set)
-    direct = [each for each in words.scenarios if each.fields.setting == "direct"]
-    for episode, scenario in itertools.product(scenes_of("PickXtimes", 0), direct):
-        if "that many times" in str(scenario.texts):
-            pool = scenario.fields.pool
-            options = InstructionOptions("direct", wordings=pool)
-            request = request_of(episode, options)
-            chosen = choose(request, "direct", [scenario])
-            said = spoken_instruction(request, say_chosen(request, words, chosen)).command
-            if "that many times" in said:
-                found[pool].add(episode.goal["repeats"])
+    words = task_scenarios("PickXtimes")
+    scenarios = []
+    for scenario in words.scenarios:
+        if scenario.fields.setting == "direct" and "that many times" in str(scenario.texts):
+            scenarios.append(scenario)
+
+    found = defaultdict(set)
+    for episode, scenario in itertools.product(scenes_of("PickXtimes", 0), scenarios):
+        pool = scenario.fields.pool
+        request = request_of(episode, InstructionOptions("direct", wordings=pool))
+        chosen = choose(request, "direct", [scenario])
+        said = spoken_instruction(request, say_chosen(request, words, chosen)).command
+        if "that many times" in said:
+            found[pool].add(episode.goal["repeats"])
+
     assert found == {pool: {2, 3, 4, 5} for pool in POOLS}
 
 
@@ -679,21 +721,26 @@ say.placement = ["<that reference: that one>"]
 def test_words_for_both_directions_mean_that_of_the_relations_of_their_scenario(relation, way):
     text = ONE_STEP.replace("one earlier", relation).replace("back", way)
     scenes = scenes_of("VideoPlaceOrder", 0)[::4]
+
     (report,) = check_scenarios(read(text, "VideoPlaceOrder"), None, scenes)
+
     assert report.scenes > report.broken.total() == 0
-    assert all(f"go {way} one. " in one for one in report.renderings)
+    assert all(f"go {way} one. " in text for text in report.renderings)
 
 
 def test_where_nothing_is_said_of_one_the_command_has_no_gap():
-    words, found = task_scenarios("VideoRepick"), {}
+    words = task_scenarios("VideoRepick")
+    found = {}
     for episode in scenes_of("VideoRepick", 0)[::9]:
         request = request_of(episode, InstructionOptions("direct", wordings="train"))
-        (reps,) = (one for one in words.scenarios if one.fields.frame == "gym reps")
+        (reps,) = (scenario for scenario in words.scenarios if scenario.fields.frame == "gym reps")
         said = spoken_instruction(
             request, say_chosen(request, words, choose(request, "direct", [reps]))
         )
         found[episode.goal["repeats"]] = said.command, len(said.mentions), said.meaning
+
     command, mentions, meaning = found[1]
+
     assert re.fullmatch("Pick up .* and put it back, then press the button.", command)
     assert (mentions, meaning.settled, meaning.agrees) == (1, frozenset(), {"repeats": True})
     assert "put it back once for each rep, then" in found[2][0]
@@ -713,15 +760,20 @@ def test_any_of_the_asides_of_a_scenario_can_be_said_before_the_others():
     for index in range(240):
         episode = get_episode("StopCube", "random", index)
         said = instruct_with(episode, InstructionOptions("contextual"))
-        (aside,) = (one.text for one in said.utterances if one.stage == "distractor")
+        (aside,) = (
+            utterance.text for utterance in said.utterances if utterance.stage == "distractor"
+        )
         found[said.metadata["scenario"]].add(re.sub(r"^(?:He|She)", "", aside))
     assert all(len(asides) == 3 for asides in found.values()), found
 
 
 def test_a_list_and_a_position_in_it_before_the_command_give_the_value():
     """*It's the second one's turn, so lift the container over it.*"""
-    words, scenes = task_scenarios("VideoUnmask"), scenes_of("VideoUnmask", 0)[::10]
+    words = task_scenarios("VideoUnmask")
+    scenes = scenes_of("VideoUnmask", 0)[::10]
+
     (report,) = check_scenarios(words, "video series", scenes)
+
     assert report.scenes > report.broken.total() == 0
 
 
@@ -754,7 +806,9 @@ say.colors.0 = ["the container over <other place.0: mine>"]
 say.colors.1 = ["the one over <latter colors.1: {person.2}'s>"]
 """
     scenes = scenes_of("ButtonUnmask", 40)
+
     (report,) = check_scenarios(read(text, "ButtonUnmask"), None, scenes)
+
     assert report.scenes > report.broken.total() == 0
 
 
@@ -762,9 +816,11 @@ def test_a_person_stands_for_what_he_or_she_wants():
     text = RIVAL.replace("We have", "{person} wants").replace("they still sell", "{person.2} wants")
     text = text.replace("<former list.0: the former>", "<former list.0: {hers}>")
     words = read(text)
+
     (report,) = check_scenarios(words, None, scenes_of("PickXtimes", 0)[::4])
+
     assert not report.broken
-    assert any(re.search(r" (?:his|hers): ", one) for one in report.renderings)
+    assert any(re.search(r" (?:his|hers): ", text) for text in report.renderings)
 
 
 def test_where_no_container_moves_none_is_followed():
@@ -822,21 +878,29 @@ def test_of_three_colors_the_other_one_is_open_if_only_one_is_named():
     text = text.replace("on <other taken: the other one it used>", "<other taken: the other one>")
     words = read(text, "VideoPlaceButton")
     (report,) = check_scenarios(words, None, scenes_of("VideoPlaceButton", 0)[::10])
+
     assert "means no goal, another one, or several" in report.broken
+
     either = "say.color must stand for the goal's value; it stands for blue or red"
     assert either in report.broken
 
 
 def test_a_cube_and_a_moment_are_not_taken_for_each_other():
-    words, scenes = task_scenarios("VideoPlaceButton"), scenes_of("VideoPlaceButton", 0)[::10]
+    words = task_scenarios("VideoPlaceButton")
+    scenes = scenes_of("VideoPlaceButton", 0)[::10]
+
     (report,) = check_scenarios(words, "belongs there", scenes)
+
     assert report.scenes > report.broken.total() == 0
 
 
 def test_a_target_may_be_called_there_though_it_has_moved():
-    words, scenes = task_scenarios("VideoPlaceButton"), scenes_of("VideoPlaceButton", 0)
+    words = task_scenarios("VideoPlaceButton")
+    scenes = scenes_of("VideoPlaceButton", 0)
     moved = [scene for scene in scenes if scene.scene.motions_of(Swap)][::5]
+
     (report,) = check_scenarios(words, "target to test", moved)
+
     assert report.scenes > report.broken.total() == 0
 
 
@@ -845,5 +909,6 @@ def test_a_target_on_one_side_is_no_target_with_words_that_point_back():
     (report,) = check_scenarios(
         task_scenarios("VideoPlaceButton"), "going with that target", scenes
     )
-    assert any("target on the left" in one for one in report.resolved)
+
+    assert any("target on the left" in text for text in report.resolved)
     assert not report.broken

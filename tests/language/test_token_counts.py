@@ -53,12 +53,14 @@ def every_second(task):
 @pytest.mark.slow
 def test_default_instructions_are_counted_right_and_heard_by_a_policy_that_reads_64(tokenizer):
     said = [
-        one
+        instruction
         for task in every_task()
-        for _, one in instructions(every_second(task), plain_settings(), FORMS)
+        for _, instruction in instructions(every_second(task), plain_settings(), FORMS)
     ]
-    texts = list(dict.fromkeys(one.text for one in said))
+    texts = list(dict.fromkeys(instruction.text for instruction in said))
+
     counts = [len(pieces) + ADDED_TOKENS for pieces in tokenizer.encode(texts)]
+
     assert [count_tokens(text) for text in texts] == counts
     assert max(counts) <= USUAL_LIMIT
 

@@ -42,6 +42,7 @@ def test_the_commands_take_a_pool(pool, tmp_path):
     episode = get_episode("StopCube", "test", 0)
     expected = instruct_with(episode, InstructionOptions(wordings=pool)).text
     assert expected in words(call("show", "StopCube", "0", "--words", "--wordings", pool))
+
     run = ("run", "--policy", "random", "--out", str(tmp_path / "run"), "--dry-run")
     assert "1 episode" in call(
         *run, "--tasks", "StopCube", "--settings", "direct", "--episodes", "1",

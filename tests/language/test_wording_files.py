@@ -61,9 +61,9 @@ def opened(text):
 def episode_with(task, **slots):
     """Return a training episode with such a goal."""
     return next(
-        one
-        for one in train_episodes(task, 0, 100)
-        if slots.items() <= one.goal.as_mapping().items()
+        episode
+        for episode in train_episodes(task, 0, 100)
+        if slots.items() <= episode.goal.as_mapping().items()
     )
 
 
@@ -75,7 +75,8 @@ def options_of(task, **changes):
 
 
 def test_a_whole_sentence_is_explicit_and_all_other_settings_say_ours():
-    identity, episode = opened(LITERALS), episode_with("PickXtimes", color="red", repeats=2)
+    identity = opened(LITERALS)
+    episode = episode_with("PickXtimes", color="red", repeats=2)
     for ours in options_of("PickXtimes"):
         if find_refusal(episode, ours) is not None:
             continue
@@ -93,10 +94,12 @@ def test_a_whole_sentence_is_explicit_and_all_other_settings_say_ours():
 
 
 def test_a_goal_without_its_sentence_is_refused_in_explicit_only():
-    identity, episode = opened(LITERALS), episode_with("PickXtimes", color="green", repeats=2)
+    identity = opened(LITERALS)
+    episode = episode_with("PickXtimes", color="green", repeats=2)
     complaint = (
         f"{identity} has no sentence of PickXtimes for the goal: green, twice; leave explicit out"
     )
+
     with pytest.raises(InvalidValueError, match=complaint):
         instruct(episode, wordings=identity)
     assert instruct(episode, "direct", wordings=identity).text
@@ -108,7 +111,9 @@ def test_a_task_without_words_of_ours_can_have_sentences(monkeypatch):
     head = 'name = "a"\ntasks = ["VideoRepick"]\n'
     identity = opened(f'{head}[[literal]]\ntask = "VideoRepick"\n{slots}\ntext = "go"')
     goal = next(iter(find_wordings(identity).tasks["VideoRepick"].literals))
+
     episode = replace(episode_with("VideoRepick"), goal=goal)
+
     assert instruct(episode, wordings=identity).text == "go"
     with pytest.raises(InvalidValueError, match="VideoRepick names no file of words"):
         instruct(episode, "direct", wordings=identity)
@@ -121,9 +126,11 @@ def test_a_sentence_means_each_goal_for_which_the_file_says_it():
     )
     episode = episode_with("PickXtimes", color="red", repeats=1)
     said = instruct(episode, wordings=identity)
+
     wanted = {
         goal for goal in goals_of(episode) if goal["color"] == "red" and goal["repeats"] in (1, 2)
     }
+
     for goals in (understood_goals, goals_of_command, blind_goals):
         assert set(goals(said, episode)) == wanted
 
@@ -131,6 +138,7 @@ def test_a_sentence_means_each_goal_for_which_the_file_says_it():
 def test_the_words_of_the_page_are_checked_and_said(tmp_path):
     """Whoever follows the page sees what it promises."""
     assert len(PAGE.split()) <= 950
+
     file = tmp_path / "mine.toml"
     file.write_text(SPOKEN)
     checked = CliRunner().invoke(
@@ -139,8 +147,10 @@ def test_the_words_of_the_page_are_checked_and_said(tmp_path):
     assert checked.exit_code == 0, checked.output
     assert "explicit (PickXtimes)" in checked.output
     assert "photos (PickXtimes, direct, both pools)" in checked.output
+
     identity = open_wordings(file)
     assert re.fullmatch("workshop@[0-9a-f]{8}", identity)
+
     told = {}
     for episode in train_episodes("PickXtimes", 0, 100):
         for setting, form in itertools.product(("explicit", "direct", "contextual"), FORMS):
@@ -148,6 +158,7 @@ def test_the_words_of_the_page_are_checked_and_said(tmp_path):
             assert understood_goals(said, episode) == (episode.goal,)
             told[said.text] = said.metadata.get("scenario")
     assert set(told.values()) == {None, "fresh paint", "photos"}
+
     (shown,) = re.findall(r"\*(We have just\spainted the red cube\.[^*]*)\*", PAGE)
     assert told[shown.replace("\n", " ")] == "fresh paint"
 
@@ -161,6 +172,7 @@ def check(file, text):
 def test_the_commands_of_the_page_state_every_goal_of_their_tasks(tmp_path):
     rows = re.findall(r"\n\| ([A-Z]\w+)[^|]* \| (`[^|]+`) \|", PAGE)
     assert [task for task, _ in rows] == ["SwingXtimes", "StopCube", "BinFill", "VideoUnmask"]
+
     commands = [f"{task} = {re.findall('`(.*?)`', cell)}" for task, cell in rows]
     head = f'name = "mine"\ntasks = {[task for task, _ in rows]}\n[commands]\n'
     checked = check(tmp_path / "mine.toml", head + "\n".join(commands))
@@ -172,9 +184,11 @@ def test_up_to_ten_goals_without_a_sentence_are_named_in_a_line_and_not_broken(t
     checked = check(tmp_path / "theirs.toml", WHOLE)
     assert checked.exit_code == 0
     assert "3 goals, such as: on visit 3; on visit 4; on visit 5. Episodes" in checked.output
+
     many = check(tmp_path / "hand.toml", HEAD + literal("red", 2)).output
     (listed,) = re.findall(r"No sentence of 14 goals, such as: (.*)\. Episodes", many)
     assert len(set(listed.split("; "))) == 10
+
     never = WHOLE.replace("visit = 2", "visit = 77")
     assert "BROKEN states no goal" in check(tmp_path / "theirs.toml", never).output
 
@@ -208,6 +222,7 @@ def test_the_check_finds_a_setting_without_a_scenario_for_some_scenes(tmp_path):
     file.write_text(HEAD + SCENARIO)
     checked = CliRunner().invoke(cli.app, ["language", "check-scenarios", str(file)])
     assert isinstance(checked.exception, RoboIRGError)
+
     found = re.search(
         r"BROKEN PickXtimes: spatial has no scenario that fits \d+ scenes, such as "
         r"PickXtimes/(\w+)/(\d+) \(\w+, .*\), so a run refuses them; see why with "
@@ -245,7 +260,8 @@ def test_scenarios_of_ones_own_replace_ours_setting_by_setting_and_move_no_draw(
                 continue
             assert find_refusal(episode, ours) == find_refusal(episode, theirs)
             if find_refusal(episode, ours) is None:
-                own, said = instruct_with(episode, ours), instruct_with(episode, theirs)
+                own = instruct_with(episode, ours)
+                said = instruct_with(episode, theirs)
                 assert (said.turns, said.mentions) == (own.turns, own.mentions)
 
 
@@ -260,6 +276,7 @@ def test_a_scenario_with_a_pool_is_said_in_this_one_only():
 def test_stated_values_of_ones_own_leave_the_others_ours():
     identity = opened(HEAD + '[stated.PickXtimes]\ncolor = "our {color} cube"\n')
     said = instruct(episode_with("PickXtimes", color="red", repeats=3), wordings=identity).text
+
     assert "our red cube" in said
     assert "three times" in said
 
@@ -279,20 +296,25 @@ def test_the_digest_of_words_is_of_what_is_said():
         name: words_digest("PickXtimes", "test", "explicit", opened(text))
         for name, text in texts.items()
     }
+
     assert found.pop("comment") == found["same"]
     assert len({ours, *found.values()}) == len(found) + 1
+
     other = texts["dust"].replace('"PickXtimes"', '"PickXtimes", "SwingXtimes"')
     assert words_digest("PickXtimes", "test", "explicit", opened(other)) == found["dust"]
     assert words_digest("PickXtimes", "test") == ours
+
     identity = opened(texts["same"])
     said = instruct(get_episode("PickXtimes", "test", 0), wordings=identity)
     assert said.metadata["words"] == words_of("PickXtimes", "test", wordings=identity)
 
 
 def test_what_a_file_cannot_serve_is_refused_in_a_sentence():
-    spoken, episode = opened(HEAD + SCENARIO), episode_with("PickXtimes")
+    spoken = opened(HEAD + SCENARIO)
+    episode = episode_with("PickXtimes")
     stop = episode_with("StopCube")
     lacking = f"^The wording file {spoken} has no words of StopCube; name .*: --tasks PickXtimes"
+
     with pytest.raises(InvalidValueError, match=lacking):
         instruct(stop, wordings=spoken)
     with pytest.raises(InvalidValueError, match="are not open"):
@@ -406,16 +428,19 @@ def test_a_file_with_a_byte_order_mark_is_the_same_wordings(tmp_path):
     path.write_text(LITERALS)
     usual = open_wordings(path)
     path.write_text(LITERALS, encoding="utf-8-sig")
+
     assert open_wordings(path) == usual
 
 
 def test_a_task_named_twice_has_its_words_once():
     twice = HEAD.replace('"PickXtimes"', '"PickXtimes", "PickXtimes"')
     needing = SCENARIO + 'needs.tasks = ["PickXtimes", "PickXtimes"]\n'
+
     digests = [
         words_digest("PickXtimes", "test", "spatial", opened(text))
         for text in (HEAD + SCENARIO, twice + SCENARIO, twice + needing)
     ]
+
     assert len(set(digests)) == 1
 
 
@@ -426,7 +451,8 @@ def bin_literals(goals, step):
     """Return a sentence for each goal, with its colors from the first to the last or back."""
     tables = [BIN]
     for goal in goals:
-        colors, counts = list(goal["colors"])[::step], list(goal["counts"])[::step]
+        colors = list(goal["colors"])[::step]
+        counts = list(goal["counts"])[::step]
         when = f"when = {{ colors = {colors}, counts = {counts} }}"
         tables.append(f'[[literal]]\ntask = "BinFill"\n{when}\ntext = "fill {goal.amounts}"\n')
     text = "".join(tables)
@@ -437,7 +463,9 @@ def bin_literals(goals, step):
 def test_a_sentence_of_amounts_is_found_in_any_order_of_colors(step):
     episodes = [get_episode("BinFill", "test", index) for index in range(12)]
     goals = {goal for episode in episodes for goal in goals_of(episode)}
+
     identity = opened(bin_literals(goals, step))
+
     assert max(len(episode.goal["colors"]) for episode in episodes) > 1
     for episode in episodes:
         said = instruct(episode, wordings=identity)
@@ -447,7 +475,9 @@ def test_a_sentence_of_amounts_is_found_in_any_order_of_colors(step):
 def test_the_check_names_a_sentence_for_a_goal_that_no_scene_has(tmp_path):
     file = tmp_path / "theirs.toml"
     file.write_text(WHOLE.replace("visit = 2", "visit = 99"))
+
     checked = CliRunner().invoke(cli.app, ["language", "check-scenarios", str(file)])
+
     assert "  No scene has the goal of a sentence: on visit 99\n" in checked.output
 
 
@@ -491,8 +521,9 @@ def test_a_field_whose_value_the_command_names_is_settled_whatever_points_back(b
         instruct(episode, "direct", wordings=opened(HEAD + text))
         for text in (LED, LED.replace(before, after))
     ]
-    assert [len(command_goals(one.meaning, episode)) for one in said] == [3, 1]
-    assert [one.metadata["hidden_slots"] for one in said] == [1, 0]
+
+    assert [len(command_goals(instruction.meaning, episode)) for instruction in said] == [3, 1]
+    assert [instruction.metadata["hidden_slots"] for instruction in said] == [1, 0]
 
 
 def test_the_terms_of_a_meaning_stand_in_the_order_of_the_goal():
@@ -518,6 +549,7 @@ def test_a_scenario_that_speaks_of_what_is_not_there_is_refused_by_file_and_fram
     episode = get_episode("PickXtimes", "test", 3)
     sentence = f"words.toml, scenario 'paint', lacks {lacking}"
     options = {"stages": (1, 2, 3, 5), "distractor": "competing"} if setting == "contextual" else {}
+
     with pytest.raises(InvalidValueError, match=f"^{re.escape(sentence)}"):
         instruct(episode, setting, wordings=identity, **options)
 
@@ -526,7 +558,9 @@ def test_a_list_of_a_slot_that_only_another_task_has_fits_no_episode():
     head = HEAD.replace('"PickXtimes"', '"PickXtimes", "StopCube"')
     identity = opened(head + LED + 'list = "visit"\n')
     options = InstructionOptions("direct", wordings=identity)
+
     refused = find_refusal(get_episode("PickXtimes", "test", 3), options)
+
     assert "has no direct scenario for it in the pool test" in refused
 
 
@@ -562,8 +596,10 @@ def test_a_changed_file_is_other_wordings(tmp_path):
     identity = open_wordings(path)
     path.write_text(LITERALS.replace("lift", "take"))
     changed = open_wordings(path)
+
     assert changed != identity
     assert open_wordings(path, identity) == identity  # this process still has it
+
     gone = "hand@00000000"
     with pytest.raises(InvalidValueError, match=f"holds {changed}, but the episodes need {gone}"):
         open_wordings(path, gone)

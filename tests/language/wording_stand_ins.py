@@ -60,5 +60,7 @@ def train_episodes(task: str, first: int, last: int) -> Iterator[Episode]:
 def train_goals(task: str) -> frozenset[Goal]:
     """Every goal that the published training scenes of a task allow."""
     return frozenset(
-        goal for one in train_episodes(task, 0, 100) for goal in get_task(task).goals(one.scene)
+        goal
+        for episode in train_episodes(task, 0, 100)
+        for goal in get_task(task).goals(episode.scene)
     )

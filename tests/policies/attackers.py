@@ -62,7 +62,8 @@ class Served:
     """A policy behind ``roboirg serve`` in a process of its own."""
 
     def __init__(self, process, url):
-        self.process, self.url = process, url
+        self.process = process
+        self.url = url
         self.port = int(url.rsplit(":", 1)[1])
         self._first_peak = self.status("VmHWM")
 

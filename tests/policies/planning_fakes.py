@@ -24,14 +24,16 @@ from roboirg.policies.vlm.vlm_listener import ListenerOptions, VLMListener
 
 TOKENS = 100, 7
 """Input and output tokens of every reply."""
-KEY_VARIABLE, KEY = "PLANNING_TEST_KEY", "sk-very-secret-0123456789"
+KEY_VARIABLE = "PLANNING_TEST_KEY"
+KEY = "sk-very-secret-0123456789"
 
 
 class Late:
     """Reply after some seconds; with drip=True, send a space every 50 ms meanwhile."""
 
     def __init__(self, seconds, drip=False):
-        self.seconds, self.drip = seconds, drip
+        self.seconds = seconds
+        self.drip = drip
 
 
 class Status:
@@ -45,7 +47,8 @@ class Garbage:
     """Reply with something malformed."""
 
     def __init__(self, body, kind="application/json"):
-        self.body, self.kind = body, kind
+        self.body = body
+        self.kind = kind
 
 
 class FakeVLM(ThreadingHTTPServer):
@@ -61,7 +64,9 @@ class FakeVLM(ThreadingHTTPServer):
     def __init__(self, answer):
         super().__init__(("127.0.0.1", 0), _Handler)
         self.answer = answer
-        self.requests, self.headers, self.paths = [], [], []
+        self.requests = []
+        self.headers = []
+        self.paths = []
 
     @property
     def url(self):

@@ -38,7 +38,8 @@ def scenes(count: int = COUNT) -> tuple[Scene, ...]:
 
 @functools.cache
 def words(task: str, index: int, arm: str) -> ArmWords | None:
-    episode, options = get_episode(task, "test", index), InstructionOptions(SETTING)
+    episode = get_episode(task, "test", index)
+    options = InstructionOptions(SETTING)
     try:
         return say_arm(episode, options, arm)
     except InvalidValueError:
@@ -65,10 +66,13 @@ def succeeds(policy: str, scene: Scene, arm: str, seed: int = 0) -> bool | None:
 
 def rate(policy: str, *arms: str) -> float:
     """Return the share of scenes with all arms in which a policy succeeds in all of them."""
-    found = [[succeeds(policy, scene, arm) for arm in arms] for scene in scenes()]
-    whole = [each for each in found if None not in each]
-    assert len(whole) > COUNT
-    return sum(map(all, whole)) / len(whole)
+    wins = []
+    for scene in scenes():
+        successes = {succeeds(policy, scene, arm) for arm in arms}
+        if None not in successes:
+            wins.append(successes == {True})
+    assert len(wins) > COUNT
+    return sum(wins) / len(wins)
 
 
 def test_language_use_of_who_listens_and_who_does_not():
@@ -82,7 +86,9 @@ def test_language_use_of_who_listens_and_who_does_not():
 def test_in_silence_who_listens_is_at_chance():
     won = [succeeds("listener", scene, "silent") for scene in scenes(15)]
     low, high = wilson_interval(sum(map(bool, won)), len(won))
+
     chance = sum(silent_chance(task, "test", index) for task, index in scenes(15)) / len(won)
+
     assert low <= chance <= high
 
 
@@ -106,4 +112,4 @@ def test_the_planted_cheats_are_found_by_the_arms_alone():
     assert rate("habit", *(arm for arm in ALL_ARMS if arm != "other-goal")) == 1.0
     # All paraphrases at once are harder than one for who guesses.
     both = rate("forgetful", "paraphrase-1", "paraphrase-2")
-    assert both < min(rate("forgetful", f"paraphrase-{one}") for one in (1, 2))
+    assert both < min(rate("forgetful", f"paraphrase-{number}") for number in (1, 2))

@@ -81,7 +81,9 @@ def answers(text):
     return answer
 
 
-TIMEOUT, REPLY, CONNECTION = "PolicyTimeoutError", "PolicyReplyError", "PolicyConnectionError"
+TIMEOUT = "PolicyTimeoutError"
+REPLY = "PolicyReplyError"
+CONNECTION = "PolicyConnectionError"
 LARGE = "&max_reply_mib=64"
 QUICK = "?connect=1&timeout=1"
 PATIENT = "?connect=60&timeout=60"
@@ -114,11 +116,12 @@ def clients():
         yield found
 
 
-@pytest.mark.parametrize("attack", ATTACKS, ids=[one[0] for one in ATTACKS])
+@pytest.mark.parametrize("attack", ATTACKS, ids=[attack[0] for attack in ATTACKS])
 def test_a_bad_server_is_an_error_in_time_and_within_memory(attack, clients, good):
     _, answer, options, kind, words = attack
     with answering(answer) as place:
         error, message, mib = clients.play(f"openpi://{place}{options}", good)
+
     if options == QUICK:  # on a loaded machine even the connection may take too long
         assert error in (TIMEOUT, CONNECTION)
         assert words in message or "tried for 1 s" in message

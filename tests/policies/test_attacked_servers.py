@@ -38,6 +38,7 @@ def test_a_body_without_a_key_is_not_read():
         answer = read_all(raw)
         raw.close()
         sender.join()
+
         # A client waits for the answer before it sends more; of one that does not, the connection
         # is cut.
         assert answer.startswith(b"HTTP/1.1 401 ") or not answer
@@ -77,7 +78,9 @@ def test_a_server_that_stops_by_itself_is_an_error(monkeypatch):
         policy_server, "open_server", lambda *_, **__: PolicyServer(stopped, "openpi://here:1")
     )
     monkeypatch.setattr("signal.signal", lambda *_: None)
+
     result = CliRunner().invoke(app, ["serve", "random"])
+
     assert result.exit_code != 0
     assert "openpi://here:1 has stopped by itself" in str(result.exception)
 
@@ -94,6 +97,7 @@ def test_a_message_is_as_large_as_a_video_needs_and_no_larger(scheme):
         step = {name: step[name] for name in ("front_rgb", "joint_positions", "gripper")}
     lists = {name: [value] * 10 for name, value in step.items() if name != "instruction"}
     longest = 1187 * len(pack(lists)) / 10
+
     assert longest < protocols_by_scheme()[scheme].service.max_request_bytes < 1.3 * longest
 
 
@@ -103,5 +107,6 @@ def test_a_larger_message_is_refused(lenient):
         assert raw.recv(65536).startswith(b"HTTP/1.1 101 ")
         raw.sendall(header)
         assert struct.pack("!H", 1009) in read_all(raw)
+
     assert lenient.grown_mib() <= MAX_MIB
     assert lenient.is_healthy()

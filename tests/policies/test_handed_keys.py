@@ -9,7 +9,6 @@ import json
 import re
 import sqlite3
 import struct
-from pathlib import Path
 from string import Template
 from urllib.parse import quote
 
@@ -55,28 +54,30 @@ def key(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("spelling", SPELLINGS)
-def test_a_key_is_found_however_software_writes_it(spelling: str) -> None:
+def test_a_key_is_found_however_software_writes_it(spelling):
     handed_keys.remember_key(KEY)
     cleaned = printable(f"Error: no key {spelling} here")
     # What stands before a key in Base64 may stay.
     assert re.fullmatch(r"Error: no key (\w{0,5})\*{20,} here", cleaned)
 
 
-def test_the_key_behind_its_scheme_is_found_alone() -> None:
+def test_the_key_behind_its_scheme_is_found_alone():
     handed_keys.remember_key(f"Bearer {KEY}")
     assert KEY not in printable(f"401: {KEY}")
     assert printable("Bearer") == "Bearer"
 
 
 @pytest.mark.parametrize("letters", ["\\", "s", "\\s", "sk-", "&amp;", "%73", "=\n"])
-def test_what_looks_like_a_key_over_and_over_is_searched_to_its_end(letters: str) -> None:
+def test_what_looks_like_a_key_over_and_over_is_searched_to_its_end(letters):
     handed_keys.remember_key("\\" * 20)
     handed_keys.remember_key("sk-" * 20)
+
     text = f"{letters * 19}x" * 5_000
+
     assert len(printable(text)) >= len(text)
 
 
-def test_a_short_text_is_no_key() -> None:
+def test_a_short_text_is_no_key():
     handed_keys.remember_key("none")
     assert printable("none of the cubes") == "none of the cubes"
 
@@ -90,7 +91,7 @@ SAYS = {
 
 
 @pytest.mark.parametrize("place_of_key", SAYS)
-def test_a_key_that_a_policy_server_sends_back_is_not_kept(place_of_key: str) -> None:
+def test_a_key_that_a_policy_server_sends_back_is_not_kept(place_of_key):
     def answer(peer: object) -> None:
         shake_hands(peer)
         peer.sendall(SAYS[place_of_key])  # type: ignore[attr-defined]
@@ -106,38 +107,41 @@ def test_a_key_that_a_policy_server_sends_back_is_not_kept(place_of_key: str) ->
             kept = f"{described.cause} {described.details}"
         kept += f"{policy.metadata} {policy.version}"
         policy.close()
+
     assert "****" in kept
     assert KEY[:6] not in kept
     assert KEY[-6:] not in kept
 
 
-def test_a_key_in_the_reply_of_a_model_is_neither_shown_nor_stored(tmp_path: Path) -> None:
+def test_a_key_in_the_reply_of_a_model_is_neither_shown_nor_stored(tmp_path):
     query = ModelQuery("system", (ChatTurn("user", ("words",)),))
     with fake_vlm([f"my key is {KEY}"]) as server:
         vlm = VLMQuery(model_options(server, api_key_env=VARIABLE), Template("$why"))
         with use_replies(ReplySettings(tmp_path), "a"):
             shown = vlm.ask(query, str)
+
     with contextlib.closing(sqlite3.connect(tmp_path / REPLIES_FILE)) as database:
         (stored,) = database.execute("SELECT text FROM replies").fetchone()
+
     assert shown == stored == f"my key is {'*' * len(KEY)}"
 
 
-def test_a_key_that_a_library_prints_is_not_in_the_log(tmp_path: Path) -> None:
+def test_a_key_that_a_library_prints_is_not_in_the_log(tmp_path):
     handed_keys.remember_key(KEY)
     with EpisodeLog(tmp_path / "log.txt") as log:
         log.path.write_text(f"closed: {KEY}\n")
     assert (tmp_path / "log.txt").read_text() == f"closed: {'*' * len(KEY)}\n"
 
 
-def test_the_password_of_a_proxy_is_removed_from_what_it_sends(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_password_of_a_proxy_is_removed_from_what_it_sends(monkeypatch):
     monkeypatch.delenv("NO_PROXY", raising=False)
     monkeypatch.delenv("no_proxy", raising=False)
     monkeypatch.setenv("HTTPS_PROXY", "http://me:pass%21word@proxy.example:3128")
     monkeypatch.setenv("https_proxy", "http://me:pass%21word@proxy.example:3128")
     proxy_of("https://models.example/v1")
+
     sent = base64.b64encode(b"me:pass!word").decode()
+
     assert printable(f"407 pass!word Basic {sent}") == f"407 {'*' * 9} Basic {'*' * len(sent)}"
 
 
@@ -150,7 +154,7 @@ def test_the_password_of_a_proxy_is_removed_from_what_it_sends(
         "openpi://host:8000?token={key}",
     ],
 )
-def test_a_policy_that_is_named_with_a_key_is_refused_without_showing_it(spec: str) -> None:
+def test_a_policy_that_is_named_with_a_key_is_refused_without_showing_it(spec):
     with pytest.raises(InvalidValueError, match="holds a key or password") as caught:
         make_policy(spec.format(key="hunter2hunter2"), 0)
     assert "hunter2" not in str(caught.value)

@@ -1,9 +1,9 @@
 """The adapter for LeRobot, in front of stand-ins for models and their loading."""
 
+import math
 import sys
 from collections import deque
 from dataclasses import dataclass
-from itertools import cycle
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
@@ -26,7 +26,9 @@ WRIST = "observation.images.wrist"
 def test_a_url_is_checked_without_loading(tmp_path):
     find_policy("lerobot://lerobot/some-checkpoint?device=cpu&execute=8")
     folder = write_checkpoint(tmp_path / "last")
+
     policy = make_policy(f"lerobot://{folder}?version=step-3", 0)
+
     assert isinstance(policy, Policy)
     assert (policy.version, policy.place) == ("step-3", str(folder))
     assert find_policy("lerobot://x/y").version == "unknown"
@@ -42,7 +44,8 @@ def test_without_lerobot_one_sentence_says_so(monkeypatch):
 
 class Processor:
     def __init__(self, change, *steps):
-        self.change, self.steps = change, steps
+        self.change = change
+        self.steps = steps
 
     def __call__(self, value):
         return self.change(value)
@@ -63,15 +66,17 @@ def make_model(torch, config):
 
         def update(self, rows):
             plans = [] if self.plans is None else self.plans
-            self.plans = [one[:, 1:] for one in plans if one.shape[1] > 1] + [rows]
-            return torch.stack([one[:, 0] for one in self.plans]).mean(dim=0)
+            self.plans = [plan[:, 1:] for plan in plans if plan.shape[1] > 1] + [rows]
+            return torch.stack([plan[:, 0] for plan in self.plans]).mean(dim=0)
 
     class Model(torch.nn.Module):
         def __init__(self):
             super().__init__()
             self.weight = torch.nn.Parameter(torch.zeros(1, dtype=torch.bfloat16))
-            self.batches, self.resets = [], []
-            self.averages, self.config = Averages(), config
+            self.batches = []
+            self.resets = []
+            self.averages = Averages()
+            self.config = config
 
         def reset(self):
             self.resets.append(self)
@@ -163,15 +168,18 @@ def test_a_checkpoint_is_fed_its_own_names(checkpoint):
     policy = begun(5, "?execute=4")
     first = policy.act(moment(1))
     assert first.shape == (4, 8)
+
     facts = inference_facts(policy)
     assert (facts.dtypes, facts.devices) == (("bfloat16",), ("cpu",))
     for name in ("tokenizer_processor", "unnormalizer_processor"):
         assert name in policy.metadata["preprocessing"]
     assert policy.metadata["text_normalization"] == "tokenizer_processor"
     assert (policy.metadata["chunk"], policy.metadata["execute"]) == (6, 4)
+
     batch = checkpoint.model.batches[0]
     assert batch["task"] == [INSTRUCTION]
     assert batch[FRONT].shape == (1, 3, 8, 8)
+
     shown = batch[FRONT][0].permute(1, 2, 0).numpy() * 255
     assert np.allclose(shown, moment(1)["front_rgb"])
     assert set(batch) == {"task", STATE, FRONT, WRIST}
@@ -185,10 +193,13 @@ def test_pictures_have_the_checkpoint_s_size(checkpoint):
     checkpoint.config.input_features = {STATE: None, FRONT: sized}
     begun().act(moment(1))
     batch = checkpoint.model.batches[0]
+
     assert set(batch) == {"task", STATE, FRONT}
+
     means = moment(1)["front_rgb"].reshape(4, 2, 4, 2, 3).mean(axis=(1, 3))
     shown = batch[FRONT][0].permute(1, 2, 0).numpy() * 255
     assert np.allclose(shown, means, atol=0.51)
+
     checkpoint.config.input_features = {FRONT: SimpleNamespace(shape=(3, 4, 6))}
     begun().act(moment(1))
     assert checkpoint.model.batches[1][FRONT].shape == (1, 3, 8, 8)  # what is no square stays
@@ -215,31 +226,39 @@ def looped(model, length):
     ensembles=st.booleans(),
 )
 def test_actions_are_those_of_lerobot_s_own_loop(checkpoint, kind, remembered, steps, ensembles):
-    config, model = checkpoint.config, checkpoint.model
-    config.type, config.n_obs_steps = kind, remembered
+    config = checkpoint.config
+    config.type = kind
+    config.n_obs_steps = remembered
     config.n_action_steps = 1 if ensembles else steps
     config.temporal_ensemble_coeff = 0.01 if ensembles else None
-    expected = looped(model, 24)
-    # Two episodes take turns, the second a step late: neither sees anything of the other.
-    episodes, played = [begun(), begun()], [[], []]
-    model.batches.clear()
-    for number in cycle((0, 1)):
-        if len(played[number]) < len(expected):
-            rows = episodes[number].act(moment(len(played[number])))
-            played[number] += list(rows)
-        elif min(map(len, played)) >= len(expected):
-            break
+    expected = looped(checkpoint.model, 24)
+    checkpoint.model.batches.clear()
+
+    played = act_in_turns([begun(), begun()], len(expected))
+
     for rows in played:
         assert np.allclose(np.stack(rows)[: len(expected)], expected, atol=1e-6)
-    assert len(model.batches) <= 2 * -(-len(expected) // config.n_action_steps)
+    calls = math.ceil(len(expected) / config.n_action_steps)
+    assert len(checkpoint.model.batches) <= 2 * calls
     if kind != "somebody_s_plugin" and not ensembles:
         assert len(begun().act(moment(0))) == max(1, steps - remembered + 1)
+
+
+def act_in_turns(episodes, length):
+    """Return the actions of two episodes that take turns: neither may see anything of the other."""
+    played = [[], []]
+    while min(map(len, played)) < length:
+        for policy, rows in zip(episodes, played, strict=True):
+            if len(rows) < length:
+                rows += list(policy.act(moment(len(rows))))
+    return played
 
 
 def test_an_option_executes_more_or_fewer_actions(checkpoint):
     checkpoint.config.n_action_steps = 2
     assert len(begun().act(moment(1))) == 2
     assert len(begun(options="?execute=5").act(moment(1))) == 5
+
     checkpoint.config.temporal_ensemble_coeff = 0.01
     assert len(begun(options="?execute=3").act(moment(1))) == 3
     with pytest.raises(InvalidValueError, match=r"loaded: ValueError: The chunk size is the upper"):
@@ -248,28 +267,35 @@ def test_an_option_executes_more_or_fewer_actions(checkpoint):
 
 @pytest.mark.parametrize(("kind", "reads"), [("act", "no, "), ("groot", "")])
 def test_a_checkpoint_without_a_tokenizer_may_have_one_inside(checkpoint, kind, reads):
-    checkpoint.config.type, checkpoint.before.steps = kind, ()
+    checkpoint.config.type = kind
+    checkpoint.before.steps = ()
+
     policy = begun()
+
     assert policy.metadata.get("reads_text", "").startswith(reads)
     assert ("reads_text" in policy.metadata) == bool(reads)
 
 
 def test_rows_of_a_batch_depend_on_their_own_episode(checkpoint):
     checkpoint.config.max_action_dim = 32
-    episodes = [begun(seed, "?batch=4") for seed in range(5)]
     moments = [moment(number) for number in range(5)]
+
+    episodes = [begun(seed, "?batch=4") for seed in range(5)]
     together = episodes[0].act_together(episodes, moments)
     assert [len(batch["task"]) for batch in checkpoint.model.batches] == [4, 4]  # always as many
-    again = [begun(seed, "?batch=4") for seed in range(5)]
-    for one, now, expected in zip(again, moments, together, strict=True):
-        assert np.array_equal(one.act(now), expected)
-    assert not np.array_equal(again[0].act(moments[0]), together[0])  # other noise in each call
+
+    alone = [begun(seed, "?batch=4") for seed in range(5)]
+    for policy, now, expected in zip(alone, moments, together, strict=True):
+        assert np.array_equal(policy.act(now), expected)
+    assert not np.array_equal(alone[0].act(moments[0]), together[0])  # other noise in each call
 
 
 @pytest.mark.parametrize("changes", [{"type": "diffusion"}, {"temporal_ensemble_coeff": 0.01}])
 def test_checkpoints_that_remember_are_asked_one_by_one(checkpoint, changes):
     vars(checkpoint.config).update(changes, is_noisy=True)
     episodes = [begun(seed, "?batch=4") for seed in range(3)]
+
     together = episodes[0].act_together(episodes, [moment(1)] * 3)
+
     assert [len(batch["task"]) for batch in checkpoint.model.batches] == [1, 1, 1]
     assert np.array_equal(begun(2, "?batch=4").act(moment(1)), together[2])

@@ -13,7 +13,9 @@ SQUARE = [3, 96, 96]
 def test_a_checkpoint_asks_for_its_own_cameras_and_sizes(tmp_path):
     one = write_checkpoint(tmp_path / "one", pictures(front=SQUARE), tokenizer_max_length=48)
     both = write_checkpoint(tmp_path / "both", pictures(wrist=[3, 256, 256], front=SQUARE))
+
     none = write_checkpoint(tmp_path / "none")
+
     assert read_facts(str(one)) == ({"front": 96}, 48)
     assert find_policy(f"lerobot://{one}").needs.cameras == ("front",)
     assert find_policy(f"lerobot://{both}").needs.cameras == ("front", "wrist")

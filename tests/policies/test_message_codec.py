@@ -27,14 +27,14 @@ MESSAGES = st.dictionaries(
 )
 
 
-def same(one, other):
-    if isinstance(one, np.ndarray):
-        return one.dtype == other.dtype and one.tobytes() == other.tobytes()
-    if isinstance(one, dict):
-        return list(one) == list(other) and all(same(one[key], other[key]) for key in one)
-    if isinstance(one, list):
-        return len(one) == len(other) and all(map(same, one, other))
-    return type(one) is type(other) and one == other
+def same(first, other):
+    if isinstance(first, np.ndarray):
+        return first.dtype == other.dtype and first.tobytes() == other.tobytes()
+    if isinstance(first, dict):
+        return list(first) == list(other) and all(same(first[key], other[key]) for key in first)
+    if isinstance(first, list):
+        return len(first) == len(other) and all(map(same, first, other))
+    return type(first) is type(other) and first == other
 
 
 @settings(max_examples=50)
@@ -70,6 +70,7 @@ def test_any_description_of_an_array_is_one_or_refused(described):
 def test_arrays_are_read_only_and_in_c_order():
     array = np.asfortranarray(np.arange(6).reshape(2, 3))[:, ::-1]
     found = unpack(pack({"x": array}))["x"]
+
     assert np.array_equal(found, array)
     with pytest.raises(ValueError, match="read-only"):
         found[0] = 1
@@ -132,8 +133,10 @@ def test_arrays_of_other_dialects_are_read():
     }
     sent = {"x": text, "y": numpy, "z": {b"nd": False, b"type": "<f4", b"data": b"\0\0\0\x3f"}}
     found = unpack(msgpack.packb(sent))
+
     assert same([found["x"], found["y"]], [array, array])
     assert found["z"] == 0.5
+
     pickled = {**numpy, b"type": "O", b"kind": b"O"}
     assert list(unpack(msgpack.packb({"x": pickled}))["x"]) == list(pickled)
 

@@ -64,19 +64,26 @@ def hearing(episode, setting="explicit"):
 @pytest.mark.parametrize("task", every_task())
 def test_every_goal_of_every_split_can_be_answered_and_nothing_else(task):
     slots = goal_schema(task)
-    properties = slots.schema()["properties"]
-    seen = set()
+    possible = set()
     for episode in split_episodes([task], SPLITS):
-        seen.update(every_task()[task].goals(episode.scene))
-    assert set(slots.goals.values()) == seen
-    for goal in seen:
+        possible.update(every_task()[task].goals(episode.scene))
+
+    assert set(slots.goals.values()) == possible
+    for goal in possible:
         assert slots.read(slots.answers[goal]) == goal
-        for name, value in json.loads(slots.answers[goal]).items():
-            field = properties[name]
-            one = field.get("items", field)
+
+
+@pytest.mark.parametrize("task", every_task())
+def test_every_answer_fits_the_schema(task):
+    slots = goal_schema(task)
+    fields = slots.schema()["properties"]
+    for answer in slots.answers.values():
+        for name, value in json.loads(answer).items():
+            field = fields[name]
+            kind = field.get("items", field)
             items = value if isinstance(value, list) else [value]
-            assert set(items) <= set(one["enum"])
-            assert {type(item) for item in items} == {int if one["type"] == "integer" else str}
+            assert set(items) <= set(kind["enum"])
+            assert {type(item) for item in items} == {int if kind["type"] == "integer" else str}
             assert field.get("minItems", 1) <= len(items) <= field.get("maxItems", 1)
 
 
@@ -188,7 +195,9 @@ def test_what_is_not_in_the_scene_is_counted_and_nothing_is_done():
         policy = make_listener(server)
         policy.make_primitives = lambda env: None  # there is no arm here
         policy.attach(stand_in(get_episode("PickXtimes", "test", 0)))  # has a green cube alone
+
         policy.reset("Do it.", {})
+
         assert spent(policy) == usage(calls=1, impossible=1)
         assert policy.metadata["understood"] == {"color": "red", "repeats": 1}
 
@@ -227,7 +236,8 @@ OTHERS = [
 
 @pytest.mark.parametrize(
     ("provider", "mishap", "error", "words"),
-    [("openai", *one) for one in MISHAPS + OTHERS] + [("google", *one) for one in MISHAPS],
+    [("openai", *mishap) for mishap in MISHAPS + OTHERS]
+    + [("google", *mishap) for mishap in MISHAPS],
 )
 def test_mishaps_have_their_own_errors(provider, mishap, error, words, monkeypatch):
     monkeypatch.setenv(KEY_VARIABLE, KEY)
@@ -261,7 +271,9 @@ def test_a_key_goes_only_where_it_is_meant_to_and_never_into_records(monkeypatch
         make_listener(server).decide(env, env.instruction.text)
         assert KEY not in json.dumps(server.headers)
         policy = make_listener(server, api_key_env=KEY_VARIABLE)
+
     told = json.dumps([policy.metadata, policy.usage(), policy.version])
+
     assert KEY not in told
     assert server.url in told
 
@@ -302,6 +314,7 @@ def test_requests_are_as_captured(provider, shown):
         policy._demonstration = video(shown)
         policy.decide(stand_in(episode, shade=9), instruct(episode, "direct").text)
     assert spent(policy) == usage(1)
+
     name = f"listener-{provider}-{'video' if shown else 'none'}"
     check_capture(name, golden(server.requests[0]))
 

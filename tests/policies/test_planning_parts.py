@@ -1,6 +1,7 @@
 """Points, key frames, forms of subgoals, pictures and merged requirements, without a model."""
 
 import itertools
+import math
 import re
 from fractions import Fraction
 
@@ -9,7 +10,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from roboirg.core.environment_options import DemonstrationFrames
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.policy_needs import (
     merge_demonstration_frames,
@@ -71,31 +71,36 @@ def test_broken_subgoals_are_unparsable(text):
 
 
 @given(st.lists(st.integers(0, 200)), st.integers(0, 20))
-def test_merged_key_frames(steps, near):
+def test_merged_key_frames_are_one_of_each_chain_of_near_ones(steps, near):
     kept = merge_keyframes(steps, near)
+
     assert set(kept) <= set(steps)
     assert kept == tuple(sorted(kept))
     assert merge_keyframes(reversed(steps), near) == kept == merge_keyframes(kept, near)
     assert all(later - sooner > near for sooner, later in itertools.pairwise(kept))
-    # Every frame is in a chain of near ones that has exactly one representative.
-    ordered = sorted(set(steps))
-    breaks = sum(b - a > near for a, b in itertools.pairwise(ordered))
-    assert len(kept) == (breaks + 1 if ordered else 0)
+    chains = 0
+    end = -math.inf
+    for step in sorted(steps):
+        chains += step - end > near
+        end = step
+    assert len(kept) == chains
 
 
 def test_every_subgoal_of_every_task_has_a_form_that_planners_know():
     forms = load_prompts("subgoals").lines("forms")
     patterns = [_pattern(form) for form in forms]
     used = set()
+
     for task in every_task():
         for index in range(40):
             for stage in get_episode(task, "train", index).stages:
                 for at in ("at <3, 200>", ""):
                     text = " ".join(stage.subgoal.replace("{at}", at).split())
-                    found = {n for n, one in enumerate(patterns) if one.fullmatch(text)}
+                    found = {n for n, pattern in enumerate(patterns) if pattern.fullmatch(text)}
                     assert found, text
                     used |= found
                     assert not says_finished(text)
+
     assert used == set(range(len(forms))), "a form that no task has"
 
 
@@ -121,20 +126,22 @@ def test_chosen_frames_are_spread_evenly(length, most):
         assert kept[-1] == length - 1
         gaps = np.diff(kept)
         assert max(1, gaps.max() - 1) <= gaps.min()
+
     clip = summary_clip(frames, most, length)
     assert len(kept) / clip.rate == Fraction(length, 30)
 
 
 def test_a_sheet_shows_frames_in_reading_order_each_with_its_label():
     shades = [10 * number for number in range(18)]
-    frames = np.uint8(shades)[:, None, None, None].repeat(128, 1).repeat(128, 2).repeat(3, 3)
-    tiles = [
-        sheet[row : row + 64, column : column + 64]
-        for sheet in contact_sheets(frames, ["x" if shade == 50 else "" for shade in shades])
-        for row in range(0, len(sheet), 64)
-        for column in range(0, 256, 64)
-    ]
-    found = [(int(tile[-1, -1, 0]), bool(np.ptp(tile))) for tile in tiles]
+    frames = [np.full((128, 128, 3), shade, np.uint8) for shade in shades]
+    labels = ["x" if shade == 50 else "" for shade in shades]
+
+    found = []
+    for sheet in contact_sheets(np.stack(frames), labels):
+        for row, column in itertools.product(range(0, len(sheet), 64), range(0, 256, 64)):
+            tile = sheet[row : row + 64, column : column + 64]
+            found.append((int(tile[-1, -1, 0]), bool(np.ptp(tile))))
+
     assert found == [(shade, shade == 50) for shade in (*shades, 0, 0)]
 
 
@@ -146,6 +153,7 @@ def test_a_field_without_words_is_unparsable(value):
 
 def test_prompts_are_versioned_and_can_be_replaced(tmp_path):
     assert len({load_prompts(name).fingerprint for name in PROMPTS}) == len(PROMPTS)
+
     file = tmp_path / "mine.toml"
     file.write_text('again = "no: $why"\nsystem = "x $missing"\n')
     mine = load_prompts("qwen", str(file))
@@ -155,6 +163,7 @@ def test_prompts_are_versioned_and_can_be_replaced(tmp_path):
         mine.fill("goal", instruction="x")
     with pytest.raises(InvalidValueError, match=r"'system' .*missing.*\$why"):
         mine.fill("system", why="so")
+
     file.write_text("= 3")
     with pytest.raises(InvalidValueError, match="not TOML"):
         load_prompts("qwen", str(file))
@@ -164,16 +173,16 @@ wishes = st.sampled_from(["all", "none"]) | st.integers(1, 12)
 
 
 @given(wishes, wishes, st.integers(0, 40))
-def test_each_sees_the_pictures_of_the_video_that_it_asked_for(
-    one: DemonstrationFrames, other: DemonstrationFrames, steps
-):
+def test_each_sees_the_pictures_of_the_video_that_it_asked_for(one, other, steps):
     drawn = merge_demonstration_frames(one, other)
     assert drawn == merge_demonstration_frames(other, one)
+
     every = {"all": 1}.get(drawn, drawn)
     shown = {"joint_positions": np.arange(steps)}
     if drawn != "none":
         shown["front_rgb"] = np.arange(steps)[::every]
     excerpt = DemonstrationSubset(shown, drawn, one)
+
     assert dict(excerpt).keys() == shown.keys()
     assert len(excerpt["joint_positions"]) == steps
     if one != "none":
@@ -189,6 +198,7 @@ def test_each_sees_the_pictures_of_the_video_that_it_asked_for(
 def test_each_sees_the_moments_that_it_asked_for(one, other, chunks):
     every = merge_observe_every(one, other)
     assert every == merge_observe_every(other, one)
+
     step = looked = 0
     seen = []
     for chunk in chunks:

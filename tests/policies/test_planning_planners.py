@@ -49,10 +49,13 @@ class Follower:
     observe_every = 3  # no planner has this period, and CHUNK is no multiple of it
 
     def __init__(self, rows=CHUNK):
-        self.rows, self.told, self.seen = rows, [], []
+        self.rows = rows
+        self.told = []
+        self.seen = []
 
     def reset(self, instruction, demonstration):
-        self.shown, self.told = dict(demonstration), []
+        self.shown = dict(demonstration)
+        self.told = []
 
     def follow(self, subgoal):
         self.told.append(subgoal)
@@ -166,6 +169,7 @@ def test_a_useless_reply_leaves_the_last_subgoal(kind):
         planner = make_planner(kind, server, **({"first_pause": 0} if kind == "gemini" else {}))
         policy = drive(planner, 64)
         assert policy.policy.told == [SUBGOAL] * 4  # none at first
+
         usage = planner.usage()
         assert (usage["unparsed"], usage["unreadable"]) == (2 if kind == "gemini" else 4, 1)
         assert usage["calls"] == len(server.requests) == 1 + 2 * usage["unparsed"]
@@ -176,6 +180,7 @@ def test_one_that_waits_asks_again_after_a_useless_reply_but_not_for_ever():
         planner = make_planner("qwen", server, asked="when-done")
         planner.reset("Do it.", NO_VIDEO)
         assert planner.plan(moment(0), 0) == SUBGOAL
+
         planner.hear("Now.", 1)
         for step in range(CHUNK, 20 * CHUNK, CHUNK):
             planner.plan(moment(step), step)
@@ -187,7 +192,9 @@ def test_qwen_shows_what_was_done_and_a_picture_of_now():
     with fake_vlm(answers) as server:
         drive(make_planner("qwen", server, video="mp4"), 48, demonstration=video(60))
         assert [pictures(body) for body in server.requests] == [[0], [16], [32], [48]]
+
     told = [body["messages"][1]["content"][3]["text"] for body in server.requests]
+
     assert "nothing has been done" in told[0]
     # The same words at another place are not another subgoal.
     assert told[1] == told[2] == f"Subgoals so far, in order: 1. {GO}"
@@ -202,10 +209,12 @@ def test_gemini_converses_in_clips():
         first, second, third = server.requests
     assert server.paths[0].endswith("models/fake:generateContent")
     assert third["contents"][:3] == second["contents"]
+
     frames, rate = clip(first)
     assert (len(frames), rate) == (21, 15)  # the demonstration and the first frame
     assert policy.demonstration_frames == 2
     assert [part.get("videoMetadata") for part in first["contents"][0]["parts"]].count({"fps": 5})
+
     shades = clip(second)[0][:, 0, 0, 0].astype(int)
     assert np.abs(shades - np.arange(2, 97, 2)).max() < 4
     assert len(clip(third)[0]) == 24
@@ -236,7 +245,9 @@ def test_planners_forget_the_last_episode(kind):
         before = len(server.requests)
         again = {name: frames[7:] for name, frames in video(10).items()}
         drive(planner, 0, instruction="Second.", demonstration=again)
+
         (body,) = server.requests[before:]
+
         assert pictures(body) == ([7, 0] if kind == "gemini" else [7, 9, 0])
         assert not re.search("First|red cube at", json.dumps(body))
         assert planner.usage()["calls"] == 1
@@ -247,7 +258,7 @@ class Refusing(Follower):
 
     endings = property(
         lambda self: [
-            SubgoalEnd(one, "refused", "no", "cube", n) for n, one in enumerate(self.told)
+            SubgoalEnd(thing, "refused", "no", "cube", n) for n, thing in enumerate(self.told)
         ]
     )
 
@@ -280,6 +291,7 @@ def test_a_planner_is_asked_five_times_for_what_is_refused_in_each_episode(when)
 def test_a_planner_of_goals_repeats_what_failed_from_the_pick_and_only_three_times(ends, stages):
     planner = make_policy("planner:listener", 3).planner
     assert planner._decider.seed == 3  # by which it guesses
+
     planner._index = planner._retries = 0
     planner._decider.stages = [
         SimpleNamespace(primitive=Primitive(kind, "cube"))
@@ -289,6 +301,7 @@ def test_a_planner_of_goals_repeats_what_failed_from_the_pick_and_only_three_tim
     for how in ends.split():
         planner.learn(SubgoalEnd("", how))
         found.append(planner._index)
+
     assert found == stages
 
 
@@ -305,19 +318,25 @@ def test_memer_shows_recent_frames_and_remembers_what_it_chose():
     def choose(*positions):
         return json.dumps({"current_subtask": GO, "keyframe_positions": positions})
 
+    before = [choose(1), choose(2)]
     answers = [choose(1), choose(8, 2), choose(1), choose(), choose(8)]
-    with fake_vlm([choose(1), choose(2), *answers]) as server:
+    with fake_vlm([*before, *answers]) as server:
         planner = make_planner("memer", server)
         drive(planner, 16)
         policy = drive(planner, 64).policy
-        shown = [pictures(body) for body in server.requests[2:]]
-    recent = [[0], *(list(range(end - 14, end + 1, 2)) for end in (16, 32, 48, 64))]
+        shown = [pictures(body) for body in server.requests[len(before) :]]
+
     # 0; 0, 4, 16 make 4 and 16, where 16 and 18 make 18; then 64 besides.
-    memory = [[], [0], [4, 16], [4, 18], [4, 18]]
-    assert shown == [kept + new for kept, new in zip(memory, recent, strict=True)]
+    assert shown == [
+        [0],
+        [0, *range(2, 17, 2)],
+        [4, 16, *range(18, 33, 2)],
+        [4, 18, *range(34, 49, 2)],
+        [4, 18, *range(50, 65, 2)],
+    ]
     assert list(planner.frames) == [4, 18, 64]
     # The policy sees the moments of its own period.
-    seen = [one["front_rgb"][0, 0, 0] for view in policy.seen for one in view["history"]]
+    seen = [moment["front_rgb"][0, 0, 0] for view in policy.seen for moment in view["history"]]
     assert seen == list(range(3, 65, 3))
 
 
@@ -326,6 +345,7 @@ def test_memer_refuses_positions_that_there_are_not(positions):
     with fake_vlm([json.dumps({"current_subtask": GO, "keyframe_positions": positions})]) as server:
         planner = make_planner("memer", server)
         drive(planner, 16)
+
         assert planner.usage()["unparsed"] == 2
         assert planner.frames == {}
 
@@ -367,6 +387,7 @@ def test_together_they_are_a_policy_and_costs_add_up():
         }
         assert policy.metadata["policy"] == {"checkpoint": "seven"}
         assert policy.metadata["planner"]["model"]["model"] == "fake"
+
         policy.close()
 
 
@@ -397,7 +418,8 @@ def test_a_query_after_an_utterance_quotes_everything_that_was_said(kind):
 class Silent:
     """The scripted hands without their reports."""
 
-    cameras, demonstration_frames = (), "none"
+    cameras = ()
+    demonstration_frames = "none"
 
     def __init__(self):
         self._hands = ScriptedHands()
@@ -409,5 +431,6 @@ class Silent:
 def test_a_planner_that_knows_the_order_sees_what_silent_hands_have_done():
     policy = HierarchicalPolicy(make_by_kind("listener", {}, "test"), Silent())
     assert not policy.reports
+
     env = roboirg.make("StopCube", setting="explicit", cameras=(), demonstration_frames="none")
     assert play(env, policy)["status"] == "success"

@@ -48,9 +48,11 @@ def test_a_system_is_a_policy_offline(name):
         assert policy.metadata["planner"]["kind"] == PLANNERS[name]
         assert policy.grounded == (name == "GroundSG-oracle")
         assert policy.policy.options.subgoals == "grounded"
+
     low = policy.policy if name in PLANNERS else policy
     assert low.options.history == (name in {"TTT-Expert", "FrameS-Modul"})
     assert low.options.execute == 16
+
     policy.close()
 
 
@@ -63,6 +65,7 @@ def test_a_spec_overrides_entries():
     assert policy.policy.options.execute == 8
     assert "gpu:9001" in find_system("GroundSG-QwenVL", {"server": "gpu:9001"}).policy
     assert policy.policy.options.version == "symbolic-grounded-subgoal-79999"
+
     options = policy.planner.options
     assert (options.video_frames, options.model.timeout_s, options.model.model) == (2, 7.5, "mine")
     assert options.model.base_url == "http://other:8000/v1"
@@ -71,7 +74,9 @@ def test_a_spec_overrides_entries():
 
 @pytest.mark.parametrize("spec", [*(f"system:{name}" for name in PAPER), LISTENER])
 def test_what_a_policy_needs_is_known_from_its_name(spec):
-    known, policy = read_policy(spec), make_policy(spec, 5)
+    known = read_policy(spec)
+    policy = make_policy(spec, 5)
+
     assert known.needs == PolicyNeeds.of(policy)
     assert known.is_privileged == hasattr(policy, "attach")
     assert known.version == policy.version != "unknown"
@@ -145,8 +150,10 @@ def test_own_systems_are_files(tmp_path):
         load_system(str(file))
     with pytest.raises(InvalidValueError, match="not a URL"):
         load_system(str(file), {"server": "x:1"})
+
     file.write_text('name = "mine"\npolicy = "random"\n')
     assert load_system(str(file), seed=4).seed == 4
+
     file.write_text("name = ")
     with pytest.raises(InvalidValueError, match="cannot be read as TOML"):
         load_system(str(file))
@@ -177,6 +184,7 @@ def test_nothing_is_asked_of_libraries_before_the_first_question():
     done = subprocess.run(
         [sys.executable, "-c", program], check=False, capture_output=True, text=True
     )
+
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("[vlm]'") == 2
 
@@ -185,7 +193,8 @@ class NoMemory(MmeVlaServer):
     """The baseline and the symbolic models do not look at what was buffered."""
 
     def infer(self, message):
-        self.frames, self.newest = 1, message["observation/image"]
+        self.frames = 1
+        self.newest = message["observation/image"]
         return super().infer(message)
 
 
@@ -220,11 +229,15 @@ def test_every_system_plays_a_whole_episode(name, answer, calls, subgoal):
         policy = load_system(name, overrides)
         needs = PolicyNeeds.of(policy).env_options
         env = roboirg.make("PickXtimes", setting="direct", max_steps=40, **needs)
-        assert play(env, policy)["status"] == "timeout"
+
+        info = play(env, policy)
         policy.close()
+
+    assert info["status"] == "timeout"
     messages = [unpack(data) for data in server.messages]
-    followed = [str(one.get("grounded_subgoal")) for one in messages if "prompt" in one]
-    assert len(followed) == 3
-    assert all(re.fullmatch(subgoal, one) for one in followed)
+    prompts = [message for message in messages if "prompt" in message]
+    assert len(prompts) == 3
+    for message in prompts:
+        assert re.fullmatch(subgoal, str(message.get("grounded_subgoal")))
     assert any("add_buffer" in message for message in messages) == remembers
     assert len(vlm.requests) == calls

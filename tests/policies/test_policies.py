@@ -43,6 +43,7 @@ def test_random_actions_are_valid_and_depend_on_seed_and_instruction_alone():
         return np.concatenate([policy.act(observation) for _ in range(20)])
 
     actions = walk(1)
+
     assert ((actions >= JOINT_ANGLE.low) & (actions <= JOINT_ANGLE.high)).all()
     assert np.array_equal(check_chunk(actions), actions)
     assert np.array_equal(walk(1), actions)
@@ -66,7 +67,9 @@ def test_what_the_expert_missed_is_tried_again_and_only_three_times(
     primitives = SimpleNamespace(execute=lambda primitive: [primitive.kind])
     counts = iter(completed)
     monkeypatch.setattr(scripted, "completed_stages", lambda *_: next(counts))
+
     chunks = scripted._execute(MagicMock(), stages, primitives)
+
     assert " ".join(chunk for _, chunk in chunks) == executed
 
 
@@ -165,6 +168,7 @@ def guesses_in(setting, count):
 @pytest.mark.sim
 def test_guesses_are_uniform_over_the_goals_that_fit():
     assert set(guesses_in("explicit", 20)) == {get_episode("VideoUnmask", "test", 0).goal}
+
     guesses = guesses_in("direct", 300)
     counts = {guess: guesses.count(guess) for guess in guesses}
     assert len(counts) == 3

@@ -20,7 +20,9 @@ class Demanding:
     observe_every = 4
     history_cameras = ("wrist",)
     depth = calibration = grounded = lowers_prompt = True
-    prompt_tokens, prompt_added, tokenizer = 64, 3, "words.model"
+    prompt_tokens = 64
+    prompt_added = 3
+    tokenizer = "words.model"
     trained_tasks = "PickXtimes", "BinFill"
 
     def reset(self, instruction, demonstration): ...
@@ -39,11 +41,12 @@ class Guide:
 
 def test_every_need_is_read_and_survives_a_message():
     needs = PolicyNeeds.of(Demanding())
-    assert all(getattr(needs, one.name) != one.default for one in fields(needs))
+    assert all(getattr(needs, field.name) != field.default for field in fields(needs))
     assert needs.cameras == ("wrist", "front")
     assert PolicyNeeds(**json.loads(json.dumps(asdict(needs)))) == needs
     with pytest.raises(FrozenInstanceError):
         needs.depth = False
+
     copy = Demanding()
     PolicyNeeds().declare_on(copy)
     assert PolicyNeeds.of(copy) == PolicyNeeds()
@@ -82,9 +85,13 @@ def test_properties_count_for_objects_only():
 
 def test_a_planner_needs_what_it_declares_and_its_model_is_its_own():
     assert PolicyNeeds.of_planner(object()) == PolicyNeeds(cameras=(), demonstration_frames="none")
+
     guide = Guide()
-    guide.tokenizer, guide.prompt_tokens, guide.actions = object(), 7, "teleport"
+    guide.tokenizer = object()
+    guide.prompt_tokens = 7
+    guide.actions = "teleport"
     both = PolicyNeeds.of(Demanding()).merge(PolicyNeeds.of_planner(guide))
+
     assert both == PolicyNeeds.of(HierarchicalPolicy(guide, Demanding()))
     assert both.cameras == both.history_cameras == ("front", "wrist")
     assert (both.demonstration_frames, both.observe_every, both.depth) == (2, 4, True)
@@ -95,6 +102,7 @@ def test_a_planner_needs_what_it_declares_and_its_model_is_its_own():
 def test_a_tokenizer_that_is_no_path_matters_where_prompts_are_counted():
     thinking = Demanding()
     thinking.tokenizer = object()
+
     with pytest.raises(InvalidValueError, match="tokenizer is <object"):
         PolicyNeeds.of(thinking)
     with pytest.raises(InvalidValueError, match="needs actions='ee_pose'"):
@@ -104,5 +112,6 @@ def test_a_tokenizer_that_is_no_path_matters_where_prompts_are_counted():
 def test_the_environment_has_an_option_for_each_of_its_needs():
     options = PolicyNeeds.of(Demanding()).env_options
     made = asdict(EnvSettings.of(options))
+
     assert {**made, **made["environment"]}.items() >= options.items()
-    assert set(options) < {one.name for one in fields(PolicyNeeds)}
+    assert set(options) < {field.name for field in fields(PolicyNeeds)}

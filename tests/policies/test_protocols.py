@@ -43,7 +43,8 @@ def test_the_recipe_serves_and_plays_over_loopback():
     with served("random", "tiny") as url:
         assert url.startswith("tiny://127.0.0.1:")
         assert {result.verdict for result in check_policy(url)} <= {"pass", "note"}
-        client, here = make_policy(url, 0), make_policy("random", 0)
+        client = make_policy(url, 0)
+        here = make_policy("random", 0)
         for policy in (client, here):
             policy.reset(INSTRUCTION, {})
         for _ in range(3):
@@ -90,6 +91,7 @@ main()
         [sys.executable, "-c", program], capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
+
     listed, help_text = done.stdout.split("\n", 1)
     assert listed.split() == list(protocols_by_scheme())
     for scheme in protocols_by_scheme():

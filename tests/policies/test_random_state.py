@@ -25,6 +25,7 @@ def test_the_order_of_turns_changes_no_episode_s_numbers(turns):
     states = [RandomState(seed) for seed in range(3)]
     random_turns = RandomTurns()
     found = [[], [], []]
+
     for turn in turns:
         if turn is NOBODY:  # a call for several episodes
             random_turns.end()
@@ -32,5 +33,6 @@ def test_the_order_of_turns_changes_no_episode_s_numbers(turns):
         else:
             random_turns.begin(states[turn])
             found[turn].append(draw())
+
     for seed, numbers in enumerate(found):
         assert numbers == drawn_alone(seed, len(numbers))

@@ -56,8 +56,8 @@ def before_inference(protocol):
 
 @pytest.mark.parametrize(
     ("protocol", "reply", "words"),
-    [("openpi", *one) for one in MALFORMED]
-    + [(protocol, *one) for protocol in ("mme-vla", "challenge") for one in MALFORMED[::4]],
+    [("openpi", *fault) for fault in MALFORMED]
+    + [(protocol, *fault) for protocol in ("mme-vla", "challenge") for fault in MALFORMED[::4]],
 )
 def test_a_malformed_reply_is_reported_and_the_next_episode_works(protocol, reply, words):
     faults = [None] * before_inference(protocol) + [reply]
@@ -91,11 +91,13 @@ def test_a_server_that_answers_late_is_not_waited_for(protocol):
         with pytest.raises(PolicyTimeoutError, match="within 2 s"):
             episode(policy)
         assert time.monotonic() - start < 300  # and not for ever
+
         time.sleep(3)
         # The late answer must not become the next one's.
         following = make_policy(f"{protocol}://{server.place}", 0)
         first = episode(following)[0]
         following.close()
+
         assert np.array_equal(first, _played_in_time(policy)[0])
 
 
@@ -176,11 +178,13 @@ def test_a_server_that_starts_late_or_again_is_found():
     episode(policy)
     timer.join()
     server.__exit__()
+
     with pytest.raises(PolicyConnectionError):
         policy.act(moment(3, history=(moment(3),)))
     with MmeVlaServer(port=port) as again:
         assert episode(policy)[0][0, :2].tolist() == [3, 2]
         assert again.connections == 1
+
     policy.close()
 
 
@@ -202,6 +206,8 @@ def test_connections_are_closed_and_none_is_left_over():
             policy.close()
             policy.close()
         deadline = time.monotonic() + 300
+
         while server.open and time.monotonic() < deadline:
             time.sleep(0.01)
+
         assert (server.connections, server.open) == (3, 0)

@@ -17,7 +17,8 @@ from roboirg.policies.contract.base import SubgoalFollower
 
 CAPTURES = Path(__file__).with_name("captures")
 PAGE = (Path(__file__).parents[2] / "docs" / "servers.md").read_text()
-NOW, LATEST = moment(3, history=()), moment(5, history=(moment(4), moment(5)))
+NOW = moment(3, history=())
+LATEST = moment(5, history=(moment(4), moment(5)))
 
 
 def captured(protocol):
@@ -28,14 +29,21 @@ def captured(protocol):
 
 @pytest.mark.parametrize("protocol", ["openpi", "mme-vla", "challenge", "challenge-sensors"])
 def test_the_page_has_type_and_shape_of_every_key_that_is_sent(protocol):
-    for key, value in (pair for data in captured(protocol) for pair in unpack(data).items()):
-        (one, head) = (value[0], "list of ") if isinstance(value, list) else (value, "")
-        kind = getattr(one, "dtype", type(one).__name__)
-        # The page has T frames, and pictures of 256 pixels.
-        shape = re.sub(r"^\(\d, (?=1, |8\))", "(T, ", str(np.shape(one) or "")).replace(
-            "8, 8, ", "256, 256, "
-        )
-        assert re.search(rf"`{key}`.* \| {head}{kind} ?{re.escape(shape)}[: ]", PAGE)
+    for data in captured(protocol):
+        for key, value in unpack(data).items():
+            assert re.search(rf"`{key}`.* \| {re.escape(described(value))}[: ]", PAGE)
+
+
+def described(value):
+    """Return type and shape of a value of a message, as the page has them."""
+    if isinstance(value, list):
+        return f"list of {described(value[0])}"
+    kind = str(getattr(value, "dtype", type(value).__name__))
+    if not np.shape(value):
+        return kind
+    # The page has T frames, and pictures of 256 pixels.
+    shape = re.sub(r"^\(\d, (?=1, |8\))", "(T, ", str(np.shape(value)))
+    return f"{kind} {shape.replace('8, 8, ', '256, 256, ')}"
 
 
 def test_openpi_sends_these_bytes():
@@ -54,6 +62,7 @@ def test_mme_vla_sends_these_bytes():
         assert server.messages == captured("mme-vla")
     # Frames in memory, start of the turn, brightness of the newest frame, inferences, row.
     brightness = [NOW["front_rgb"].mean(), LATEST["front_rgb"].mean()]
+
     assert first[:, :5].tolist() == [[4, 3, brightness[0], 1, row] for row in range(2)]
     assert second[:, :5].tolist() == [[6, 3, brightness[1], 2, row] for row in range(2)]
 
@@ -106,6 +115,7 @@ def test_a_subgoal_goes_where_the_checkpoint_expects_it(option, sent):
         client_of(server, "mme-vla", f"?subgoals={option}") as policy,
     ):
         assert isinstance(policy, SubgoalFollower)
+
         for _ in range(2):
             policy.reset(INSTRUCTION, video(0))
             policy.act(moment(0, history=()))
@@ -122,6 +132,7 @@ def test_a_video_arrives_in_parts_with_the_acting_frame(length, parts):
     with MmeVlaServer() as server, client_of(server, "mme-vla") as policy:
         policy.reset(INSTRUCTION, video(length))
         rows = policy.act(moment(length, history=()))
+
         assert (server.parts, server.frames, server.start) == (parts, length + 1, length)
         assert rows[0, :2].tolist() == [length + 1, length]
 
@@ -130,7 +141,9 @@ def test_a_history_longer_than_a_part_is_sent_in_parts():
     with MmeVlaServer() as server, client_of(server, "mme-vla", "?part=4&execute=9") as policy:
         policy.reset(INSTRUCTION, video(0))
         policy.act(moment(0, history=()))
+
         policy.act(moment(9, history=[moment(number) for number in range(1, 10)]))
+
         assert server.parts == [1, 4, 4, 1]
 
 
@@ -140,6 +153,7 @@ def test_keys_and_cameras_of_an_openpi_checkpoint_can_be_named():
         client_of(server, "openpi", "?front=base&wrist=&state=q&prompt=say&execute=3") as policy,
     ):
         assert policy.cameras == ("front",)
+
         policy.reset(INSTRUCTION, {})
         assert policy.act(moment(0)).shape == (3, 8)
         assert list(unpack(server.messages[0])) == ["base", "q", "say"]
@@ -151,6 +165,7 @@ def test_a_server_may_be_at_a_path():
         policy = make_policy(f"openpi://{place}/", 0)
         policy.reset(INSTRUCTION, {})
         assert (server.path, policy.metadata["server"]) == ("/v1/realtime/robot/openpi", place)
+
         policy.close()
 
 

@@ -38,7 +38,8 @@ from roboirg.policies.vlm.vlm_query import VLMQuery
 from roboirg.util.media import Clip, Picture
 
 PRICES = {"input_price": 100_000.0, "output_price": 0.0}
-BUSY, LOST = ModelBusyError("busy"), PolicyConnectionError("lost")
+BUSY = ModelBusyError("busy")
+LOST = PolicyConnectionError("lost")
 COST = TOKENS[0] * PRICES["input_price"] / 1_000_000
 """US dollars of each reply."""
 
@@ -52,11 +53,11 @@ def play(server, settings: ReplySettings | None, episode: str, *words: str, shad
     """Ask the questions of an episode, as a policy does; returns replies and what they cost."""
     vlm = VLMQuery(model_options(server, **options), Template("$why"))
     with use_replies(settings, episode):
-        replies = [vlm.ask(query(one, shade), str) for one in words]
+        replies = [vlm.ask(query(word, shade), str) for word in words]
     return replies, Counter(vlm.usage())
 
 
-def test_an_episode_that_is_played_again_asks_nothing_again(tmp_path: Path) -> None:
+def test_an_episode_that_is_played_again_asks_nothing_again(tmp_path):
     settings = ReplySettings(tmp_path)
     with fake_vlm(["one", "two", "never"]) as server:
         first, counts = play(server, settings, "a", "first", "second")
@@ -75,7 +76,7 @@ def test_an_episode_that_is_played_again_asks_nothing_again(tmp_path: Path) -> N
         assert len(server.requests) == 6
 
 
-def test_what_is_sent_decides_and_differences_are_counted(tmp_path: Path) -> None:
+def test_what_is_sent_decides_and_differences_are_counted(tmp_path):
     """Pictures may differ in a bit on another machine; another temperature is another question."""
     settings = ReplySettings(tmp_path)
     with fake_vlm(["one", "two", "three"]) as server:
@@ -88,27 +89,30 @@ def test_what_is_sent_decides_and_differences_are_counted(tmp_path: Path) -> Non
         assert (replies, len(server.requests)) == (["one"], 3)
 
 
-def test_all_that_is_sent_is_in_the_digest() -> None:
-    one = query("words")
+def test_all_that_is_sent_is_in_the_digest():
+    asked = query("words")
     frames = np.zeros((2, 4, 4, 3), np.uint8)
     clips = Clip(frames, Fraction(30)), Clip(frames + 1, Fraction(30)), Clip(frames, Fraction(15))
     queries = [
-        one,
-        one._replace(system="another"),
-        one._replace(schema={"type": "object"}),
-        one._replace(turns=(ChatTurn("model", ("words",)),)),
-        one._replace(turns=one.turns * 2),
-        *(one._replace(turns=(ChatTurn("user", (clip,)),)) for clip in clips),
+        asked,
+        asked._replace(system="another"),
+        asked._replace(schema={"type": "object"}),
+        asked._replace(turns=(ChatTurn("model", ("words",)),)),
+        asked._replace(turns=asked.turns * 2),
+        *(asked._replace(turns=(ChatTurn("user", (clip,)),)) for clip in clips),
     ]
+
     options = ModelOptions(model="m")
+
     assert len({reply_store.digest(each, options) for each in queries}) == len(queries)
 
 
-def test_a_run_ends_when_it_has_spent_what_it_may_and_can_go_on_with_more(tmp_path: Path) -> None:
+def test_a_run_ends_when_it_has_spent_what_it_may_and_can_go_on_with_more(tmp_path):
     with fake_vlm(lambda body: words_of(body)[-1]) as server:
         with pytest.raises(BudgetError, match=r"have cost 20\.00 of at most 20\.00 US dollars"):
             play(server, ReplySettings(tmp_path, 2 * COST), "a", *"0123", **PRICES)
         assert len(server.requests) == 2
+
         replies, counts = play(server, ReplySettings(tmp_path, 9 * COST), "a", *"0123", **PRICES)
         assert (replies, counts["stored"]) == (list("0123"), 2)
         assert len(server.requests) == 4
@@ -129,9 +133,7 @@ NO_CHOICES = Garbage(json.dumps({"choices": [], "usage": {"prompt_tokens": 7}}).
 @pytest.mark.parametrize(
     "reply", [without_tokens("one"), with_tokens(10**9), with_tokens(-(10**5))]
 )
-def test_costs_that_are_unknown_end_a_run_with_a_limit_and_no_reply_is_lost(
-    tmp_path: Path, reply: Garbage
-) -> None:
+def test_costs_that_are_unknown_end_a_run_with_a_limit_and_no_reply_is_lost(tmp_path, reply):
     limited = ReplySettings(tmp_path, 9 * COST)
     with fake_vlm([reply, "two"]) as server:
         with pytest.raises(BudgetError, match=r"what 1 reply cost is unknown, .* of model 'fake'"):
@@ -139,11 +141,12 @@ def test_costs_that_are_unknown_end_a_run_with_a_limit_and_no_reply_is_lost(
         replies, counts = play(server, ReplySettings(tmp_path), "a", "first", "second", **PRICES)
         assert (replies, counts["stored"]) == (["one", "two"], 1)
         assert len(server.requests) == 2
+
     assert math.isnan(counts["input_tokens"])
     assert math.isnan(counts["cost_usd"])
 
 
-def test_a_reply_that_cannot_be_read_may_have_been_paid(tmp_path: Path) -> None:
+def test_a_reply_that_cannot_be_read_may_have_been_paid(tmp_path):
     limited = ReplySettings(tmp_path, 1e-6)
     with fake_vlm([NO_CHOICES]) as server:
         vlm = VLMQuery(model_options(server, **PRICES), Template(""))
@@ -155,7 +158,7 @@ def test_a_reply_that_cannot_be_read_may_have_been_paid(tmp_path: Path) -> None:
         assert len(server.requests) == 1
 
 
-def test_half_a_surrogate_pair_in_a_reply_is_stored_and_paid_once(tmp_path: Path) -> None:
+def test_half_a_surrogate_pair_in_a_reply_is_stored_and_paid_once(tmp_path):
     with fake_vlm(["\ud800 fine"]) as server:
         for stored in (0, 1):
             replies, counts = play(server, ReplySettings(tmp_path), "a", "words", **PRICES)
@@ -163,7 +166,7 @@ def test_half_a_surrogate_pair_in_a_reply_is_stored_and_paid_once(tmp_path: Path
             assert (counts["cost_usd"], counts["stored"]) == (COST, stored)
 
 
-def test_a_limit_of_costs_needs_prices(tmp_path: Path) -> None:
+def test_a_limit_of_costs_needs_prices(tmp_path):
     with (
         fake_vlm(["one"]) as server,
         pytest.raises(BudgetError, match="needs the prices of model 'fake'"),
@@ -176,7 +179,7 @@ def test_a_limit_of_costs_needs_prices(tmp_path: Path) -> None:
     ("provider", "code"),
     [("openai", 429), ("google", 503), ("openai", 408), ("google", 502), ("openai", 504)],
 )
-def test_a_busy_service_is_waited_for(tmp_path: Path, provider: str, code: int) -> None:
+def test_a_busy_service_is_waited_for(tmp_path, provider, code):
     """As long as it asks for, and other processes of the run wait, too."""
     busy = Status(code, headers={"Retry-After": "0.05"})
     started = time.time()
@@ -185,8 +188,10 @@ def test_a_busy_service_is_waited_for(tmp_path: Path, provider: str, code: int) 
         replies, counts = play(server, settings, "a", "words", provider=provider, patience_s=60)
         assert (replies, len(server.requests)) == (["at last"], 4)
         assert counts["waited_s"] >= 0.15
+
     with sqlite3.connect(tmp_path / REPLIES_FILE) as database:
         ((next_at,),) = database.execute("SELECT next_at FROM services")
+
     assert next_at >= started + 0.15
 
 
@@ -197,20 +202,19 @@ def test_a_busy_service_is_waited_for(tmp_path: Path, provider: str, code: int) 
         ([BUSY, ModelBusyError("busy", 99.5)], [1.0]),  # patience would end
     ],
 )
-def test_pauses_grow_until_it_cannot_be_reached_or_patience_ends(
-    monkeypatch: pytest.MonkeyPatch, said: list[Exception], waits: list[float]
-) -> None:
+def test_pauses_grow_until_it_cannot_be_reached_or_patience_ends(monkeypatch, said, waits):
     waited: list[float] = []
     clock = SimpleNamespace(monotonic=lambda: sum(waited), sleep=waited.append)
     monkeypatch.setattr(vlm_query, "time", clock)
     options = ModelOptions(model="m", retries=2, patience_s=100.0)
     model = SimpleNamespace(answer=Mock(side_effect=said))
+
     with pytest.raises(PolicyConnectionError, match=str(said[-1])):
         VLMQuery(options, Template(""), lambda _: model).ask(query("words"), str)
     assert waited == waits
 
 
-def test_what_is_no_chat_completion_is_not_asked_again_nor_stored(tmp_path: Path) -> None:
+def test_what_is_no_chat_completion_is_not_asked_again_nor_stored(tmp_path):
     with fake_vlm([Garbage(b"{}"), "one"]) as server:
         with pytest.raises(PolicyReplyError):
             play(server, ReplySettings(tmp_path), "a", "words")
@@ -228,7 +232,7 @@ def test_what_is_no_chat_completion_is_not_asked_again_nor_stored(tmp_path: Path
         ({}, None),
     ],
 )
-def test_waiting_times_of_services(headers: dict[str, str], seconds: float | None) -> None:
+def test_the_waiting_time_of_a_service_is_read_in_seconds(headers, seconds):
     assert retry_after_s(headers) == seconds
 
 
@@ -305,34 +309,34 @@ class Child:
 
 
 @pytest.mark.parametrize("kills", [4, pytest.param(24, marks=pytest.mark.slow)])
-def test_no_answered_call_is_made_again_after_a_kill(tmp_path: Path, kills: int) -> None:
+def test_no_answered_call_is_made_again_after_a_kill(tmp_path, kills):
     """Each episode is killed twice after a random number of replies, and then finished."""
     rng = random.Random(0)
+    answered: dict[str, int] = {}
+    """How often a call had been made when its answer was seen first."""
     with fake_vlm(name_of) as server:
         child = Child(server, tmp_path)
-        requests = lambda: Counter(map(name_of, server.requests))  # noqa: E731
-        answered: dict[str, int] = {}
-        for episode in range(kills // 2):
+        for episode in [f"e{number}" for number in range(kills // 2)]:
             for _ in range(2):
-                child.write(f"e{episode}")
+                child.write(episode)
                 replies = child.replies()
                 for name in itertools.islice(replies, rng.randrange(1, CALLS)):
-                    answered.setdefault(name, requests()[name])
+                    requests = Counter(map(name_of, server.requests))
+                    answered.setdefault(name, requests[name])
                 child.write("kill")
                 list(replies)  # what it said before it died
-            child.write(f"e{episode}")
+            child.write(episode)
             child.write("wait")
-            assert list(child.replies()) == [f"e{episode} {number}" for number in range(CALLS)]
+            assert list(child.replies()) == [f"{episode} {number}" for number in range(CALLS)]
         assert child.end() == 0
-        found = requests()
-        assert {name: found[name] for name in answered} == answered
+
+        requests = Counter(map(name_of, server.requests))
+        assert {name: requests[name] for name in answered} == answered
         # What was under way when a process was killed may have been asked again, once for a kill.
-        assert sum(found.values()) <= CALLS * (kills // 2) + kills
+        assert requests.total() <= CALLS * (kills // 2) + kills
 
 
-def test_who_asks_at_the_same_moment_waits_for_all_before(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_asks_at_the_same_moment_waits_for_all_before(tmp_path, monkeypatch):
     waits: list[float] = []
     clock = SimpleNamespace(time=lambda: 5.0, sleep=waits.append)
     monkeypatch.setattr(reply_store, "time", clock)
@@ -344,6 +348,8 @@ def test_who_asks_at_the_same_moment_waits_for_all_before(
     for seconds in (9.0, 4.0):
         stores[0].pause("other", seconds)
     stores[1].wait_for_turn("other", None)
+
     for store in stores:
         store.close()
+
     assert waits == [1.0, 2.0, 9.0]

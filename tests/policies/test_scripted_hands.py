@@ -105,6 +105,7 @@ def test_other_words_are_no_subgoal(words):
 def test_what_fits_nothing_or_several_things_is_refused_for_nothing(task, refused):
     env, hands = world_of(task)
     before = env.session.world.elapsed
+
     for words, why in refused.items():
         hands.follow(words)
         assert hands.endings[-1].how == "refused"
@@ -118,11 +119,9 @@ def test_a_point_outweighs_words_and_the_record_has_both():
     from roboirg.simulation.expert.things import origin_pixel
 
     env, hands = world_of("PickXtimes", 2)
-    red, other = (
-        next(one for one in env.session.world.bodies.values() if one.item.kind == "cube" and
-             (one.item.color == "red") is is_red)
-        for is_red in (True, False)
-    )  # fmt: skip
+    cubes = [body for body in env.session.world.bodies.values() if body.item.kind == "cube"]
+    red = next(cube for cube in cubes if cube.item.color == "red")
+    other = next(cube for cube in cubes if cube.item.color != "red")
     row, column = origin_pixel(other)
     # What has missed is done again, also where the same is meant in other words.
     hands.follow(f"pick up the cube at <{row}, {column}>")
@@ -133,7 +132,7 @@ def test_a_point_outweighs_words_and_the_record_has_both():
     # What is held is *it*; the motion just done is not repeated.
     steps = env.session.world.elapsed
     hands.follow(end.subgoal)
-    assert [one.how for one in hands.endings] == ["missed", "done", "done"]
+    assert [ending.how for ending in hands.endings] == ["missed", "done", "done"]
     assert env.session.world.elapsed == steps
     hands.follow(f"pick up the cube at <{row}, {column}>")  # it is no longer there
     assert hands.endings[-1].how == "refused"
@@ -145,8 +144,9 @@ def test_a_point_outweighs_words_and_the_record_has_both():
 def test_the_oracle_with_scripted_hands_succeeds(task):
     planner = make_planner("oracle", {}, "the test")
     info, policy = play_with(planner, task, episode=3)
+
     assert info["status"] == "success", (info["cause"], policy.endings)
-    assert {one.how for one in policy.endings} <= {"done", "missed"}
+    assert {ending.how for ending in policy.endings} <= {"done", "missed"}
 
 
 @pytest.mark.sim
@@ -247,10 +247,13 @@ def test_the_stateless_planner_asks_when_a_subgoal_has_ended(monkeypatch):
 def test_choices_are_robommes_in_every_episode(task, choices):
     for index in range(20):
         found = choices_of(get_episode(task, "test", index))
-        motions = [one.primitives[0].kind + "+" * (one.kind is not None) for one in found]
+        motions = []
+        for choice in found:
+            motion = choice.primitives[0].kind
+            motions.append(motion if choice.kind is None else f"{motion}+")
         if task != "StopCube" or len(found) == 3:  # some episodes leave no time to wait
             assert " ".join(motions) == choices
-        assert [one.label for one in found] == list("abcd"[: len(found)])
+        assert [choice.label for choice in found] == list("abcd"[: len(found)])
 
 
 @pytest.mark.sim
@@ -259,7 +262,7 @@ def test_a_program_acts_by_choices():
 
     env = roboirg.make("PickXtimes", episode=2, actions="choice", cameras=())
     _, info = env.reset()
-    assert [one["label"] for one in info["available_multi_choices"]] == ["a", "b", "c"]
+    assert [choice["label"] for choice in info["available_multi_choices"]] == ["a", "b", "c"]
     for wrong in ([3, 0, 0], [0, -1, -1], [0.5, 1, 1]):
         with pytest.raises(InvalidActionError, match=r"Choice"):
             env.step(wrong)

@@ -17,7 +17,8 @@ from roboirg.policies.remote.endpoints import Endpoint
 from roboirg.policies.remote.server_lock import lock_server
 
 SPAWN = multiprocessing.get_context("spawn")
-ONE, TWO = Endpoint("h", 8001), Endpoint("h", 8001, "/two")
+ONE = Endpoint("h", 8001)
+TWO = Endpoint("h", 8001, "/two")
 
 
 def hold(folder, endpoint, ready, seconds):
@@ -44,7 +45,9 @@ def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path
     monkeypatch.setattr(waiting, "_listeners", [told.append])
     before = queued_seconds()
     lock_server([TWO], wait=5, folder=tmp_path).file.close()
+
     assert (told, queued_seconds()) == ([], before)
+
     start = time.monotonic()
     with (
         waiting.waiting("its turn in a test"),
@@ -52,17 +55,21 @@ def test_another_process_waits_takes_another_server_or_inherits(holder, tmp_path
     ):
         lock_server([ONE], wait=0.2, folder=tmp_path)
     assert 0.2 <= time.monotonic() - start < 300
+
     (outer, wait, again, end) = told
     assert (wait.what, wait.is_queue, again, end) == ("a free server: h:8001", True, outer, None)
     assert queued_seconds() - before >= 0.2
+
     monkeypatch.setattr(os, "getpid", lambda: 1)  # it begins with the second, then the first
     lock = lock_server([TWO, ONE], wait=0, folder=tmp_path)
     assert lock.endpoint == TWO
     with pytest.raises(PolicyTimeoutError, match="used h:8001/two, h:8001 for"):
         lock_server([TWO, ONE], wait=0, folder=tmp_path, shared=True)
+
     os.kill(holder.pid, signal.SIGKILL)
     again = lock_server([TWO, ONE], wait=300, folder=tmp_path)
     assert again.endpoint == ONE
+
     lock.file.close()
     again.file.close()
 
@@ -71,6 +78,7 @@ def test_those_who_share_do_not_exclude_each_other(tmp_path):
     locks = [lock_server([ONE], wait=0, folder=tmp_path, shared=True) for _ in range(3)]
     with pytest.raises(PolicyConnectionError):
         lock_server([ONE], wait=0, folder=tmp_path)
+
     for lock in locks:
         lock.file.close()
     lock_server([ONE], wait=0, folder=tmp_path).file.close()
@@ -80,6 +88,7 @@ def test_names_of_this_computer_are_one_server(tmp_path):
     lock = lock_server([Endpoint("localhost", 1)], wait=0, folder=tmp_path)
     with pytest.raises(PolicyConnectionError):
         lock_server([Endpoint("127.0.0.1", 1)], wait=0, folder=tmp_path)
+
     lock_server([Endpoint("localhost", 1, "/a/b")], wait=0, folder=tmp_path).file.close()
     lock.file.close()
 
@@ -90,6 +99,7 @@ def test_a_thread_does_not_wait_for_itself():
         first.reset(INSTRUCTION, video(0))
         with pytest.raises(PolicyConnectionError, match=r"Another policy .*; close\(\) it"):
             second.reset(INSTRUCTION, video(0))
+
         first.close()
         second.reset(INSTRUCTION, video(0))
         del second  # forgotten, not closed
@@ -115,7 +125,9 @@ def test_processes_and_policies_do_not_mix_state():
         players = [SPAWN.Process(target=play, args=(url, length)) for length in (3, 8)]
         for player in players:
             player.start()
+
         for player in players:
             player.join()
+
         assert [player.exitcode for player in players] == [0, 0]
         assert server.connections == 6

@@ -31,12 +31,16 @@ class Recorder:
     metadata: ClassVar[dict] = {"network": "none"}
 
     def __init__(self, seed=0):
-        self.seed, self.calls, self.subgoals, self.closed = seed, [], [], False
+        self.seed = seed
+        self.calls = []
+        self.subgoals = []
+        self.closed = False
         self.heard = []
         self.episodes.append(self)
 
     def reset(self, instruction, demonstration):
-        self.instruction, self.demonstration = instruction, demonstration
+        self.instruction = instruction
+        self.demonstration = demonstration
 
     def follow(self, subgoal):
         self.subgoals.append(subgoal)
@@ -71,8 +75,9 @@ def _forget():
     Recorder.episodes.clear()
 
 
-def same(one, other, fields):
-    assert {field for field in fields if not np.array_equal(one[field], other[field])} == set()
+def check_same(given, kept, fields):
+    for field in fields:
+        assert np.array_equal(given[field], kept[field]), field
 
 
 SEEN = {
@@ -91,35 +96,55 @@ def play(url, length, *moments, **more):
     return chunks, client.metadata
 
 
-@pytest.mark.parametrize("protocol", SERVED)
-def test_a_served_policy_gets_what_the_client_was_given(protocol):
-    first, later = moment(3, history=()), moment(5, history=(moment(4), moment(5)))
+FIRST = moment(3, history=())
+LATER = moment(5, history=(moment(4), moment(5)))
+
+
+def served_episodes(protocol):
+    """Play two episodes through a server, of videos of three and two moments."""
     expected = {
         "policy": HERE, "network": "none", "protocol": protocol,
         "python": platform.python_version(),
     }  # fmt: skip
     with served(HERE, protocol, seed=7) as url:
         for length in (3, 2):
-            chunks, metadata = play(url, length, first, later)
+            chunks, metadata = play(url, length, FIRST, LATER)
             assert chunks == [[[1] * 8] * 4, [[2] * 8] * 4]
             assert expected.items() <= metadata.items()
-    _opened, one, two = Recorder.episodes
-    for policy in (one, two):
+    _opened, *episodes = Recorder.episodes
+    return episodes
+
+
+@pytest.mark.parametrize("protocol", SERVED)
+def test_a_served_policy_gets_what_the_client_was_given(protocol):
+    first, second = served_episodes(protocol)
+
+    for policy in (first, second):
         assert (policy.seed, policy.closed) == (7, True)
         assert policy.instruction == (INSTRUCTION.lower() if protocol == "mme-vla" else INSTRUCTION)
-        for given, observation in zip((first, later), policy.calls, strict=True):
-            same(given, observation, SEEN[protocol])
+        for given, observation in zip((FIRST, LATER), policy.calls, strict=True):
+            check_same(given, observation, SEEN[protocol])
             assert observation["gripper"].shape == (2,)
             assert observation["gripper"][0] == given["gripper"][0]
-    if protocol == "openpi":
-        assert len(one.demonstration["joint_positions"]) == 0
-        return
-    assert len(two.demonstration["joint_positions"]) == 2
-    shown = set(SEEN[protocol]) - ({"wrist_rgb"} if protocol == "mme-vla" else set())
-    same(video(3), one.demonstration, shown)
-    assert one.calls[0]["history"][:-1] == ()
-    for given, kept in zip(later["history"], one.calls[1]["history"], strict=True):
-        same(given, kept, shown)
+
+
+@pytest.mark.parametrize("protocol", [name for name in SERVED if name != "openpi"])
+def test_a_served_policy_gets_the_video_and_what_was_seen_in_between(protocol):
+    first, second = served_episodes(protocol)
+    shown = set(SEEN[protocol])
+    if protocol == "mme-vla":
+        shown.remove("wrist_rgb")
+
+    check_same(video(3), first.demonstration, shown)
+    assert len(second.demonstration["joint_positions"]) == 2
+    assert first.calls[0]["history"][:-1] == ()
+    for given, kept in zip(LATER["history"], first.calls[1]["history"], strict=True):
+        check_same(given, kept, shown)
+
+
+def test_a_policy_that_is_served_by_openpi_gets_no_video():
+    first, _ = served_episodes("openpi")
+    assert len(first.demonstration["joint_positions"]) == 0
 
 
 @pytest.mark.parametrize("protocol", SERVED)
@@ -133,8 +158,10 @@ def test_a_served_policy_hears_what_the_prompt_says_next(protocol):
     with served(HERE, protocol) as url:
         for length in (3, 2):  # the second episode has steps of its own
             play(url, length, *moments)
+
     *_, policy = Recorder.episodes
-    assert [one["instruction"] for one in policy.calls] == said
+
+    assert [call["instruction"] for call in policy.calls] == said
     if protocol == "openpi":  # has no reset: a new prompt is a new episode
         assert (policy.instruction, policy.heard) == ("take it.", [])
     else:
@@ -144,15 +171,18 @@ def test_a_served_policy_hears_what_the_prompt_says_next(protocol):
 
 def test_a_served_policy_gets_depth_and_matrices_if_the_client_sends_them():
     moments = [moment(number, sensors=True) for number in range(6)]
-    shown = [field for field in moments[0] if field != "instruction"]
-    now, later = {**moments[3], "history": ()}, {**moments[5], "history": (moments[4], moments[5])}
+    first = {**moments[3], "history": ()}
+    later = {**moments[5], "history": (moments[4], moments[5])}
+
     with served(f"{__name__}:Seeing", "challenge") as url:
-        play(f"{url}?depth=yes&calibration=yes", 3, now, later, sensors=True)
+        play(f"{url}?depth=yes&calibration=yes", 3, first, later, sensors=True)
+
     _opened, policy = Recorder.episodes
-    same(video(3, sensors=True), policy.demonstration, shown)
-    same(now, policy.calls[0], shown)
+    shown = [field for field in moments[0] if field != "instruction"]
+    check_same(video(3, sensors=True), policy.demonstration, shown)
+    check_same(first, policy.calls[0], shown)
     for given, kept in zip(later["history"], policy.calls[1]["history"], strict=True):
-        same(given, kept, shown)
+        check_same(given, kept, shown)
     assert policy.calls[1]["front_depth"].dtype == np.int16
 
 
@@ -173,32 +203,33 @@ def ask(raw, message):
 
 @pytest.mark.parametrize("kind", ["grounded", "simple"])
 def test_mme_vla_has_one_memory_for_all_connections(kind):
-    frames = np.stack([moment(n)["front_rgb"][None] for n in range(3)])
+    frames = np.stack([moment(number)["front_rgb"][None] for number in range(3)])
+    states = np.zeros((3, 8), np.float32)
+    shown = {"add_buffer": True, "images": frames, "state": states, "exec_start_idx": 2}
+    request = {
+        "observation/image": frames[2, 0],
+        "observation/wrist_image": frames[2, 0],
+        "observation/state": np.zeros(8),
+        "prompt": "go",
+        f"{kind}_subgoal": "pick up the cube at <1, 2>",
+    }
     with served(HERE, "mme-vla") as url:
         place = url.replace("mme-vla", "ws")
-        with connect(place) as one, connect(place) as other:
-            assert unpack(one.recv())["policy"] == HERE
-            other.recv()
+        with connect(place) as first, connect(place) as second:
+            assert unpack(first.recv())["policy"] == HERE
+            second.recv()
             assert len(Recorder.episodes) == 1  # idle connections make no policy
-            reply = ask(one, {"reset": True})
+
+            reply = ask(first, {"reset": True})
             assert reply["reset_finished"] is True
             assert isinstance(reply["reset_time_ms"], float)
-            states = np.zeros((3, 8), np.float32)
-            reply = ask(
-                one, {"add_buffer": True, "images": frames, "state": states, "exec_start_idx": 2}
-            )
+            reply = ask(first, shown)
             assert reply["add_buffer_finished"] is True
             assert isinstance(reply["add_buffer_time_ms"], float)
-            request = {
-                "observation/image": frames[2, 0],
-                "observation/wrist_image": frames[2, 0],
-                "observation/state": np.zeros(8),
-                "prompt": "go",
-                f"{kind}_subgoal": "pick up the cube at <1, 2>",
-            }
-            reply = ask(other, request)
+            reply = ask(second, request)
             assert reply["actions"].shape == (4, 8)
             assert set(reply) == {"actions", "infer_time_ms"}
+
     _opened, policy = Recorder.episodes
     assert np.array_equal(policy.demonstration["front_rgb"], frames[:2, 0])
     assert policy.subgoals == ["pick up the cube at <1, 2>"]
@@ -234,23 +265,27 @@ def test_what_a_policy_raises_is_the_clients_error(protocol):
         client.reset("fail", video(1))
         with pytest.raises(PolicyReplyError, match="RuntimeError: the weights melted"):
             client.act({**moment(1, history=()), "instruction": "fail"})
+
         client.close()
         assert play(url, 1, moment(1, history=()))
 
 
 @pytest.mark.parametrize("protocol", SERVED)
-def test_health_and_keys(protocol, monkeypatch):
+def test_a_server_reports_its_health_and_refuses_other_keys(protocol, monkeypatch):
     with served(HERE, protocol, key="sesame") as url:
         health = HTTPConnection(url.split("://")[1], timeout=300)
         health.request("GET", "/healthz")
         assert health.getresponse().read() == b"OK\n"
+
         monkeypatch.delenv("KEY", raising=False)
         with pytest.raises(InvalidValueError, match=r"KEY .* holds no key"):
             make_policy(f"{url}?api_key_env=KEY", 0).reset(INSTRUCTION, video(0))
+
         monkeypatch.setenv("KEY", "sesam")
         for query in ("", "?api_key_env=KEY"):
             with pytest.raises(OSError, match="HTTP status 401"):
                 make_policy(url + query, 0).reset(INSTRUCTION, video(0))
+
         monkeypatch.setenv("KEY", "sesame")
         client = make_policy(f"{url}?api_key_env=KEY", 0)
         client.reset(INSTRUCTION, video(0))
@@ -290,7 +325,9 @@ def test_what_cannot_be_served_is_told(options, error, words):
 def test_the_command_serves_until_it_is_stopped():
     with serving("mme-vla") as server:
         assert server.url.startswith("mme-vla://127.0.0.1:")
+
         chunks, _ = play(server.url, 2, moment(2, history=()))
         assert np.shape(chunks) == (1, 16, 8)
+
         server.process.send_signal(signal.SIGTERM)
         assert server.process.wait(300) == 143

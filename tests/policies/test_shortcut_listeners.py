@@ -27,6 +27,7 @@ def test_every_rule_is_a_policy_of_its_name():
 def test_what_the_words_leave_open_is_drawn_by_seed():
     env = SimpleNamespace(episode=get_episode("PickXtimes", "test", 2))  # has all three colors
     goals = [make_policy("surface", seed).decide(env, SPATIAL) for seed in range(60)]
+
     assert {goal["color"] for goal in goals} == {"red", "green", "blue"}
     assert {goal["repeats"] for goal in goals} == {1}
     assert goals == [make_policy("surface", seed).decide(env, SPATIAL) for seed in range(60)]

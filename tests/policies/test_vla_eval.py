@@ -37,7 +37,8 @@ def test_an_episode_is_what_the_harness_would_send(snapshot):
         wait_for_messages(server, 5)
     assert client.metadata["model_server"] == "Test"
     assert server_version(client.metadata) == "Test, vla-eval 0.8.0"
-    assert [one.tolist() for one in rows] == [[[1.0] * 8], [[2.0] * 8]]
+    assert [row.tolist() for row in rows] == [[[1.0] * 8], [[2.0] * 8]]
+
     sent = json.dumps(server.payloads, indent=1, default=described)
     assert re.sub(r"roboirg [\d.]+", "roboirg", sent) == snapshot
 
@@ -51,7 +52,8 @@ def test_a_task_without_a_video_has_no_history_and_subgoals_are_passed_on():
         client.reset(INSTRUCTION, video(0))
         client.act(moment(0))
     shown = [payload for kind, payload in server.payloads if kind == "observation"]
-    assert [one.get("subgoal") for one in shown] == ["pick it up at <1, 2>"] * 2 + [None]
+
+    assert [message.get("subgoal") for message in shown] == ["pick it up at <1, 2>"] * 2 + [None]
     assert shown[1]["task_description"] == "said later"
     assert "video_history" not in shown[0]
     assert "episode_restart" not in shown[0]
@@ -80,7 +82,8 @@ def test_what_is_shown_is_what_the_server_or_the_url_wishes(query, wishes):
             assert client.demonstration_frames == ("none" if query else "all")
             client.reset(INSTRUCTION, video(2))
             client.act(moment(0))
-    ((_, shown),) = [one for one in server.payloads if one[0] == "observation"]
+    ((_, shown),) = [payload for payload in server.payloads if payload[0] == "observation"]
+
     assert list(shown) == ["images", "task_description"]
     assert list(shown["images"]) == ["agentview"]
 
@@ -90,6 +93,7 @@ def test_another_action_space_or_protocol_is_refused():
         server.hello = {**server.hello, "observation_params": {"action_space": "ee_pose"}}
         with pytest.raises(InvalidValueError, match="'ee_pose', but the policy's URL says actions"):
             client.reset(INSTRUCTION, video(0))
+
         with client_of(server, "vla-eval", "?actions=ee_pose") as agreed:
             agreed.reset(INSTRUCTION, video(0))
         server.hello = {**server.hello, "protocol_version": 2}
@@ -117,6 +121,7 @@ def test_a_malformed_reply_ends_the_episode_only(fault, words):
         client.reset(INSTRUCTION, video(0))
         with pytest.raises(PolicyReplyError, match=words):
             client.act(moment(0))
+
         client.reset(INSTRUCTION, video(0))
         assert len(client.act(moment(0))) == 1
 

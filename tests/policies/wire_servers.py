@@ -33,7 +33,9 @@ def decode(value, spell=str.encode):
     return value
 
 
-encode_texts, decode_texts = (functools.partial(one, spell=str) for one in (encode, decode))
+encode_texts, decode_texts = (
+    functools.partial(function, spell=str) for function in (encode, decode)
+)
 """As vla-eval spells it."""
 
 
@@ -56,7 +58,9 @@ class WireServer:
     def __init__(self, port=0, faults=()):
         self.metadata = {}
         self.port, self.faults = port, list(faults)
-        self.messages, self.connections, self.open = [], 0, 0
+        self.messages = []
+        self.connections = 0
+        self.open = 0
         self._ready = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._main()), daemon=True)
 
@@ -143,10 +147,15 @@ class MmeVlaServer(WireServer):
         super().__init__(*args, **kwargs)
         self.delay = delay
         self.forget()
-        self.parts, self.prompts, self.subgoals = [], [], []
+        self.parts = []
+        self.prompts = []
+        self.subgoals = []
 
     def forget(self):
-        self.frames, self.start, self.newest, self.inferences = 0, 0, None, 0
+        self.frames = 0
+        self.start = 0
+        self.newest = None
+        self.inferences = 0
 
     def answer(self, message):
         time.sleep(self.delay)
@@ -158,7 +167,8 @@ class MmeVlaServer(WireServer):
         return self.infer(message)
 
     def remember(self, message):
-        images, state = message["images"], message["state"]
+        images = message["images"]
+        state = message["state"]
         assert images.dtype == np.uint8, images.dtype
         assert images.ndim == 5, images.shape
         assert images.shape[1] == 1, images.shape
@@ -192,7 +202,8 @@ class ChallengeServer(WireServer):
     def __init__(self, *args, **kwargs):
         super().__init__(*args, **kwargs)
         self.metadata = {"name": "submission", "version": "phase-1"}
-        self.seen, self.resets = 0, 0
+        self.seen = 0
+        self.resets = 0
 
     def answer(self, message):
         if message.get("reset"):
@@ -220,7 +231,8 @@ class VlaEvalServer(WireServer):
 
     def __init__(self, *args, **kwargs):
         super().__init__(*args, **kwargs)
-        self.payloads, self.step = [], 0
+        self.payloads = []
+        self.step = 0
 
     def answer(self, message):
         self.step += 1
@@ -235,7 +247,8 @@ class VlaEvalServer(WireServer):
 
     async def _respond(self, websocket, message):
         assert set(message) == {"type", "payload", "seq", "timestamp"}
-        kind, number = message["type"], message["seq"]
+        kind = message["type"]
+        number = message["seq"]
         self.payloads.append((kind, message["payload"]))
         if kind == "hello":
             await websocket.send(envelope("hello", self.hello, number))

@@ -135,5 +135,7 @@ def test_a_step_with_unknown_words_before_it_is_no_remark():
         "Using what the video showed, first lift the container over the blue cube and put it back. "
         "After that, lift the container over the red cube."
     )
+
     found = interpret(text, episode.scene, episode.task)
+
     assert (found.goals, found.not_understood != ()) == ((), True)

@@ -25,6 +25,7 @@ def test_it_reads_none_of_the_tasks_words():
     trees = [ast.parse(path.read_text()) for path in Path(reader.__file__).parent.glob("*.py")]
     nodes = itertools.chain.from_iterable(map(ast.walk, trees))
     attributes = {node.attr for node in nodes if isinstance(node, ast.Attribute)}
+
     assert not attributes & {"words", "meaning"}
 
 
@@ -48,6 +49,7 @@ WORDS = (
 def test_any_text_gives_one_goal_or_a_complaint(task, text):
     scene = EPISODES[task].scene
     found = interpret(text, scene, task)
+
     assert set(found.goals) <= set(get_task(task).goals(scene))
     assert bool(found.not_understood) == (len(found.goals) != 1)
 
@@ -100,7 +102,9 @@ def test_a_word_more_is_harmless_or_named(task, word, data):
     episode = EPISODES[task]
     words = instruct(episode).text.removesuffix(".").split()
     words.insert(data.draw(st.integers(0, len(words))), word)
+
     found = interpret(f"{' '.join(words)}.", episode.scene, task)
+
     if word in FILLERS:
         assert found == ((episode.goal,), (), ())
     else:
@@ -117,7 +121,9 @@ def test_a_word_that_would_change_the_goal_is_never_read_in_silence(task, word, 
     episode = EPISODES[task]
     words = instruct(episode).text.removesuffix(".").split()
     words.insert(data.draw(st.integers(1, len(words))), word)
+
     found = interpret(" ".join(words), episode.scene, task)
+
     assert found.goals in ((), (episode.goal,)) or found.not_understood
 
 
@@ -132,6 +138,7 @@ def test_the_page_quotes_true_complaints(text, complaint):
 
 def test_the_page_teaches_a_new_verb():
     assert len(ROWS) >= 8
+
     page = PAGE.with_name("teach-words.md").read_text()
     taught = re.search(r'"(Hoist .*)", \("red", 2\)', page)
     assert interpret(taught[1], PICK, "PickXtimes").unknown_words == ("hoist",)

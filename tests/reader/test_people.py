@@ -29,8 +29,8 @@ def said(goal):
     if "counts" in slots:
         pairs = zip(slots["colors"], slots["counts"], strict=True)
         return " ".join(f"{color} {count}" for color, count in pairs)
-    values = (one if isinstance(one, tuple) else (one,) for one in slots.values())
-    return " ".join(str(part) for one in values for part in one)
+    values = (slot if isinstance(slot, tuple) else (slot,) for slot in slots.values())
+    return " ".join(str(part) for slot in values for part in slot)
 
 
 @pytest.mark.parametrize("name", UNDERSTOOD)
@@ -44,5 +44,6 @@ def test_no_sentence_of_people_is_misread_and_most_are_understood(name):
         else:
             assert found.not_understood, text
             verdicts["refused"] += 1
+
     assert verdicts.total() == {"sentences": 300, "held_out": 100}[name]
     assert verdicts["understood"] >= UNDERSTOOD[name], verdicts

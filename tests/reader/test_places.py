@@ -51,6 +51,7 @@ def test_a_member_of_an_unclear_group_is_unclear():
         "container_0",
         "container_1",
     ]
+
     places[1] = (-0.05, 0.15)
     assert found_at(containers(places), "container", words) == ["container_1"]
 

@@ -1,7 +1,5 @@
 """Words that another package teaches the interpreter."""
 
-from __future__ import annotations
-
 import pytest
 
 from roboirg.core.errors import InvalidValueError
@@ -13,11 +11,12 @@ EPISODE = get_episode("PickXtimes", "test", 3)
 TEXT = "Hoist the {} cube and put it on the target twice, then press the button."
 
 
-def test_a_taught_word_is_read_as_the_known_one() -> None:
+def test_a_taught_word_is_read_as_the_known_one():
     color = EPISODE.goal.text("color")
     text = TEXT.format("vermilion")
     before = interpret(text, EPISODE.scene, "PickXtimes")
     assert (before.goals, before.unknown_words) == ((), ("hoist", "vermilion"))
+
     for _ in range(2):  # the same again changes nothing
         register_words({"hoist": "lift", "vermilion": color})
     known = interpret(TEXT.replace("Hoist", "Lift").format(color), EPISODE.scene, "PickXtimes")
@@ -34,6 +33,6 @@ def test_a_taught_word_is_read_as_the_known_one() -> None:
         ("hoist", "elevate", "'hoist' is to be read as 'elevate', a word that"),
     ],
 )
-def test_known_words_keep_their_meaning(word: str, meaning: str, sentence: str) -> None:
+def test_known_words_keep_their_meaning(word, meaning, sentence):
     with pytest.raises(InvalidValueError, match=sentence):
         register_words({word: meaning})

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import os
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,10 +37,11 @@ def logs(draw: st.DrawFn) -> ActionLog:
 
 @settings(max_examples=25)
 @given(log=logs())
-def test_what_is_written_is_read(log: ActionLog, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_what_is_written_is_read(log, tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     digest = write_actions(log, folder)
     assert write_actions(log, folder) == digest
+
     read = read_actions(folder, digest)
     assert (read.space, read.digest) == (log.space, digest)
     assert np.array_equal(read.rows, log.rows)
@@ -55,27 +55,28 @@ def a_log(rows: int = 4) -> ActionLog:
     return ActionLog("joint_angle", numbers, np.array([0], np.int32), np.zeros(3))
 
 
-def test_a_file_in_place_of_the_folder_is_one_sentence(tmp_path: Path) -> None:
+def test_a_file_in_place_of_the_folder_is_one_sentence(tmp_path):
     (tmp_path / "actions").touch()
     with pytest.raises(InvalidValueError, match=r"Cannot write .*\.npz: Not a directory\."):
         write_actions(a_log(), tmp_path)
 
 
-def test_a_changed_file_is_refused(tmp_path: Path) -> None:
+def test_a_changed_file_is_refused(tmp_path):
     digest = write_actions(a_log(), tmp_path)
     other = write_actions(a_log(5), tmp_path)
     action_path(tmp_path, digest).write_bytes(action_path(tmp_path, other).read_bytes())
+
     with pytest.raises(StoreError, match="does not have the content"):
         read_actions(tmp_path, digest)
 
 
 @pytest.mark.parametrize("digest", ["", "../../etc/passwd", "A" * 64, "0" * 63, "0" * 64 + "\n"])
-def test_what_is_no_digest_names_no_file(tmp_path: Path, digest: str) -> None:
+def test_what_is_no_digest_names_no_file(tmp_path, digest):
     with pytest.raises(StoreError, match="not a digest"):
         action_path(tmp_path, digest)
 
 
-def test_a_missing_file_is_named(tmp_path: Path) -> None:
+def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(StoreError, match=f"/actions/00/{'0' * 64}.* are missing"):
         read_actions(tmp_path, "0" * 64)
 
@@ -111,15 +112,16 @@ def npz(**changes: np.ndarray) -> bytes:
         npz(rows=np.zeros((400_000, 8))),
     ],
 )
-def test_what_is_no_log_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_what_is_no_log_is_refused(tmp_path, content):
     path = action_path(tmp_path, "0" * 64)
     path.parent.mkdir(parents=True)
     path.write_bytes(content)
+
     with pytest.raises(StoreError, match="is not an action log"):
         read_actions(tmp_path, "0" * 64)
 
 
-def test_what_is_pickled_in_a_file_does_not_run(tmp_path: Path) -> None:
+def test_what_is_pickled_in_a_file_does_not_run(tmp_path):
     class Evil:
         def __reduce__(self) -> tuple[object, ...]:
             return os.mkdir, (str(tmp_path / "evil"),)
@@ -127,6 +129,7 @@ def test_what_is_pickled_in_a_file_does_not_run(tmp_path: Path) -> None:
     path = action_path(tmp_path, "0" * 64)
     path.parent.mkdir(parents=True)
     path.write_bytes(npz(requests=np.array([Evil()], dtype=object)))
+
     with pytest.raises(StoreError, match="is not an action log"):
         read_actions(tmp_path, "0" * 64)
     assert not (tmp_path / "evil").exists()

@@ -71,9 +71,10 @@ def run(code: str, path: Path) -> subprocess.CompletedProcess[bytes]:
     )
 
 
-def test_all_ways_to_print_end_in_the_log_and_not_on_the_terminal(tmp_path: Path) -> None:
+def test_all_ways_to_print_end_in_the_log_and_not_on_the_terminal(tmp_path):
     done = run(PRINTS, tmp_path / "logs" / "a.txt")
     assert (done.returncode, done.stdout, done.stderr) == (0, b"before\nafter\n", b"")
+
     printed = (tmp_path / "logs" / "a.txt").read_bytes()
     for words in (b"by print", b"on stderr", b"by logging", b"by warnings", b"by descriptor",
                   b"by C", b"by a child", b"\xff not text"):  # fmt: skip
@@ -82,8 +83,9 @@ def test_all_ways_to_print_end_in_the_log_and_not_on_the_terminal(tmp_path: Path
     assert b"after" not in printed
 
 
-def test_a_flood_is_cut_in_the_middle(tmp_path: Path) -> None:
+def test_a_flood_is_cut_in_the_middle(tmp_path):
     assert run(FLOODS, tmp_path / "a.txt").returncode == 0
+
     text = (tmp_path / "a.txt").read_text()
     assert len(text) <= 10_000
     assert text.startswith("first words\nline 0\n")
@@ -91,18 +93,18 @@ def test_a_flood_is_cut_in_the_middle(tmp_path: Path) -> None:
     assert text.count("\n[roboirg: the middle of this log is left out]\n") == 1
 
 
-def test_what_a_killed_process_printed_is_there(tmp_path: Path) -> None:
+def test_what_a_killed_process_printed_is_there(tmp_path):
     assert run(DIES, tmp_path / "a.txt").returncode == -signal.SIGKILL
     assert (tmp_path / "a.txt").read_text() == "my last words\n"
 
 
-def test_closed_descriptors_do_not_matter(tmp_path: Path) -> None:
+def test_closed_descriptors_do_not_matter(tmp_path):
     done = run(CLOSES, tmp_path / "a.txt")
     assert (done.returncode, done.stdout) == (0, b"after\n")
     assert (tmp_path / "a.txt").read_text() == "hello\n"
 
 
-def test_the_size_is_bounded_while_the_episode_goes_on(tmp_path: Path) -> None:
+def test_the_size_is_bounded_while_the_episode_goes_on(tmp_path):
     with EpisodeLog(tmp_path / "a.txt", 1_000) as log:
         os.write(log.descriptor, b"x" * 1_000_000)
         deadline = time.monotonic() + LONG_WAIT_S
@@ -112,12 +114,14 @@ def test_the_size_is_bounded_while_the_episode_goes_on(tmp_path: Path) -> None:
             time.sleep(0.01)
         os.write(log.descriptor, b"the end")
     text = (tmp_path / "a.txt").read_text()
+
     assert text.endswith("the end")
     assert "[roboirg: the middle of this log is left out]" in text
 
 
-def test_an_episode_that_prints_nothing_has_no_log(tmp_path: Path) -> None:
+def test_an_episode_that_prints_nothing_has_no_log(tmp_path):
     assert logged_slugs(tmp_path) == frozenset()
+
     with logged_output(log_path(tmp_path, "silent")):
         pass
     with EpisodeLog(log_path(tmp_path, "loud")) as log:
@@ -129,7 +133,7 @@ def test_an_episode_that_prints_nothing_has_no_log(tmp_path: Path) -> None:
     assert logged_slugs(tmp_path) == frozenset()
 
 
-def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path):
     (tmp_path / "logs").write_text("a file")
     with pytest.raises(Exception, match=r"^Cannot write the log .*a\.txt: "):
         EpisodeLog(log_path(tmp_path, "a"))

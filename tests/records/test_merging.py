@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from pathlib import Path
 
 import pytest
@@ -22,65 +23,94 @@ def some(count: int = 4) -> list[Record]:
     return [FakePlay()(job) for job in small_plan(count).jobs()]
 
 
-def test_two_halves_make_the_whole(tmp_path: Path) -> None:
+def test_two_halves_make_the_whole(tmp_path):
     whole = tmp_path / "whole"
     fake_run(whole)
     records = read_records(whole)
     parts = [fill(tmp_path / "a", *records[:5]), fill(tmp_path / "b", *records[3:])]
     merged = merge_runs(parts, tmp_path / "out")
+
     assert (merged.added, merged.duplicates, merged.conflicts) == (8, 2, ())
     assert read_records(tmp_path / "out") == records
+
     again = merge_runs(parts, tmp_path / "out")
     assert (again.added, again.duplicates) == (0, 10)
+
     merge_runs([*parts, whole], tmp_path / "out")
     (plan,) = earlier_plans(tmp_path / "out")  # or nobody could count what is missing
     assert plan.read_bytes() == (whole / PLAN_FILE).read_bytes()
 
 
-def test_a_verdict_beats_an_error_and_the_first_of_two_alike_a_later_one(tmp_path: Path) -> None:
-    one, two, three, four, *_ = (replace(record, server_version="8") for record in some())
-    two = replace(two, verdict_code="old")
-    # Another policy has versions of its own, another split seeds of its own.
-    elsewhere = {"arm": "silent", "verdict_code": "older", "split": "val", "episode": 0, "seed": 5}
-    silent = replace(with_version(three, "old"), policy="other", server_version="9", **elsewhere)
-    lost = {"outcome": "error", "error": "connection", "server_version": None}
-    other = {"success": "failure", "failure": "success"}[two.outcome]
-    cause = None if other == "success" else "it fell"
-    disputed = replace(two, outcome=other, cause=cause)
-    broken = replace(four, outcome="error", error="connection", cause="connection: refused")
+LOST = {"outcome": "error", "error": "connection", "server_version": None}
+
+
+def test_a_verdict_beats_an_error(tmp_path):
+    won, unplayed, *_ = some()
+    connection = replace(unplayed, outcome="error", error="connection", cause="connection: refused")
     sources = [
-        (replace(one, **lost), two, broken),
-        (one, disputed, silent, replace(broken, cause="connection: lost")),
-        (replace(two, **lost),),
+        fill(tmp_path / "a", replace(won, **LOST), connection),
+        fill(tmp_path / "b", won, replace(connection, cause="connection: lost")),
+        fill(tmp_path / "c", replace(won, **LOST)),
     ]
-    folders = [fill(tmp_path / str(number), *run) for number, run in enumerate(sources)]
-    merged = merge_runs(folders, tmp_path / "out")
-    assert read_records(tmp_path / "out") == (one, two, broken, silent)
-    assert [(identity_key(conflict), conflict.outcome) for conflict in merged.conflicts] == [
-        (identity_key(two), other)
-    ]
-    assert (merged.added, merged.duplicates) == (4, 4)
-    assert [warning.partition(".")[0] for warning in merged.warnings] == [  # of the told ones
-        f"Mixed states of the code that decides verdicts: {one.verdict_code}, old"
+
+    merged = merge_runs(sources, tmp_path / "out")
+
+    assert read_records(tmp_path / "out") == (won, connection), "of two errors the first"
+    assert (merged.added, merged.duplicates, merged.conflicts) == (2, 3, ())
+
+
+def test_of_two_verdicts_the_first_is_kept_and_the_other_a_conflict(tmp_path):
+    record = some()[1]
+    fell = replace(record, outcome="failure", cause="it fell")
+    won = replace(record, outcome="success", cause=None)
+
+    merged = merge_runs([fill(tmp_path / "a", fell), fill(tmp_path / "b", won)], tmp_path / "out")
+
+    assert read_records(tmp_path / "out") == (fell,)
+    (conflict,) = merged.conflicts
+    assert (identity_key(conflict), conflict.outcome) == (identity_key(record), "success")
+
+
+def test_only_what_was_told_can_be_of_mixed_code(tmp_path):
+    """Another policy has versions of its own, another split seeds of its own."""
+    first, second, third, *_ = (replace(record, server_version="8") for record in some())
+    second = replace(second, verdict_code="old")
+    elsewhere = {"arm": "silent", "verdict_code": "older", "split": "val", "episode": 0, "seed": 5}
+    silent = replace(with_version(third, "old"), policy="other", server_version="9", **elsewhere)
+
+    merged = merge_runs(
+        [fill(tmp_path / "a", first, second), fill(tmp_path / "b", silent)], tmp_path / "out"
+    )
+
+    assert read_records(tmp_path / "out") == (first, second, silent)
+    assert [warning.partition(".")[0] for warning in merged.warnings] == [
+        f"Mixed states of the code that decides verdicts: {first.verdict_code}, old"
     ]
 
 
-def test_videos_actions_and_logs_are_copied_with_the_records_that_are_kept(tmp_path: Path) -> None:
-    one, two, *_ = some()
-    one = replace(one, video="videos/x.mp4", action_log="ab" * 32)
-    two = replace(two, video="videos/gone.mp4")
-    error = replace(one, outcome="error", error="connection")
-    sources = [fill(tmp_path / "a", error, two), fill(tmp_path / "b", one, two)]
-    logs = [str(log_path(Path(), record.slug)) for record in (one, two)]
-    films = ["videos/x.mp4", "videos/x.jpg", f"actions/ab/{'ab' * 32}.npz"]
-    for source in sources:
-        for name in (*logs, *films):
-            (source / name).parent.mkdir(parents=True, exist_ok=True)
-            (source / name).write_text(source.name)
+def test_videos_actions_and_logs_are_copied_with_the_records_that_are_kept(tmp_path):
+    first, second, *_ = some()
+    filmed = replace(first, video="videos/x.mp4", action_log="ab" * 32)
+    gone = replace(second, video="videos/gone.mp4")
+    error = replace(filmed, outcome="error", error="connection")
+    sources = [fill(tmp_path / "a", error, gone), fill(tmp_path / "b", filmed, gone)]
+    of_first = [
+        str(log_path(Path(), first.slug)),
+        "videos/x.mp4",
+        "videos/x.jpg",
+        f"actions/ab/{'ab' * 32}.npz",
+    ]
+    of_second = str(log_path(Path(), second.slug))
+    for source, name in itertools.product(sources, (*of_first, of_second)):
+        (source / name).parent.mkdir(parents=True, exist_ok=True)
+        (source / name).write_text(source.name)
     out = tmp_path / "out"
+
     merge_runs(sources, out)
+
     # The verdict of the second run is kept in place of the error, and the first of two verdicts.
-    assert [(out / name).read_text() for name in (*logs, *films)] == ["b", "a", "b", "b", "b"]
+    assert [(out / name).read_text() for name in of_first] == ["b", "b", "b", "b"]
+    assert (out / of_second).read_text() == "a"
     assert [record.video for record in read_records(out)] == ["videos/x.mp4", None]
 
 
@@ -101,23 +131,25 @@ def test_videos_actions_and_logs_are_copied_with_the_records_that_are_kept(tmp_p
         ("seed", 5, "PickXtimes test 0 whose seed is 5"),
     ],
 )
-def test_versions_are_not_mixed(tmp_path: Path, field: str, value: object, words: str) -> None:
+def test_versions_are_not_mixed(tmp_path, field, value, words):
     record = replace(some()[0], words="PickXtimes/test@1b")
     odd = replace(record, **{field: value})
-    one, other = fill(tmp_path / "a", record), fill(tmp_path / "b", odd)
+    one = fill(tmp_path / "a", record)
+    other = fill(tmp_path / "b", odd)
+
     for folders, out in (([one, other], tmp_path / "out"), ([other], one)):
         with pytest.raises(StoreError, match=f"{words}.* cannot be merged"):
             merge_runs(folders, out)
     assert not (tmp_path / "out").exists()
 
 
-def test_a_run_is_not_merged_into_itself(tmp_path: Path) -> None:
+def test_a_run_is_not_merged_into_itself(tmp_path):
     folder = fill(tmp_path / "a", *some())
     with pytest.raises(InvalidValueError, match="is one of the runs"):
         merge_runs([folder], tmp_path / "b/../a")
 
 
-def test_runs_with_two_wording_files_can_be_merged(tmp_path: Path) -> None:
+def test_runs_with_two_wording_files_can_be_merged(tmp_path):
     """Their words differ, as they should."""
     usual = some()[0]
     records = []
@@ -125,4 +157,5 @@ def test_runs_with_two_wording_files_can_be_merged(tmp_path: Path) -> None:
         options = dataclasses.replace(usual.options, wordings=f"mine@{name}")
         records.append(replace(usual, options=options, words=f"PickXtimes/test@{name}"))
     folders = [fill(tmp_path / record.words[-2:], record) for record in records]
+
     assert merge_runs(folders, tmp_path / "out").added == len(records)

@@ -27,54 +27,61 @@ def write(folder: Path, *lines: bytes) -> Path:
     return folder
 
 
-def test_a_damaged_line_loses_only_its_episode_and_is_reported(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_damaged_line_loses_only_its_episode_and_is_reported(tmp_path, caplog):
     fake_run(tmp_path)
     lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
     write(tmp_path, *lines[:2], lines[2][:40] + b"\x00\xff\n", *lines[3:])
     with RecordStore(tmp_path) as store:
         assert (len(store.stored), store.torn) == (7, b"")
+
     (warning,) = caplog.messages
     assert warning.startswith(f"{tmp_path / RECORDS_FILE} has 1 damaged line, the first is line 3;")
+
     summary = fake_run(tmp_path)
     assert summary.played == 1
-    records, index = read_records(tmp_path), StoredRun(tmp_path, read_summary)
+
+    records = read_records(tmp_path)
+    index = StoredRun(tmp_path, read_summary)
     assert len(records) == 8
     # Whole records are found behind the damage, too.
     assert tuple(index.records(index.newest)) == records
 
 
-def test_an_unfinished_line_is_reported_to_readers(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_an_unfinished_line_is_reported_to_readers(tmp_path, caplog):
     fake_run(tmp_path)
     lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
     write(tmp_path, *lines[:-1], lines[-1][:40])
     run = StoredRun(tmp_path, read_summary)
+
     assert len(run.newest) == 7
+
     (warning,) = caplog.messages
     assert "ends in an unfinished line" in warning
     with pytest.raises(StoreError, match="ends in an unfinished line"):
         run.file.refuse_damage()
+
     fake_run(tmp_path)
     StoredRun(tmp_path, read_summary).file.refuse_damage()
 
 
-def test_results_are_records_without_the_course(tmp_path: Path) -> None:
+def test_results_are_records_without_the_course(tmp_path):
     fake_run(tmp_path)
-    records, results = read_records(tmp_path), read_results(tmp_path)
+    records = read_records(tmp_path)
+
+    results = read_results(tmp_path)
+
     for record, result in zip(records, results, strict=True):
         named = {name: getattr(record, name) for name in Summary.__struct_fields__}
         assert msgspec.structs.asdict(result) == named
         assert (result.slug, result.options) == (record.slug, record.options)
 
 
-def test_the_index_knows_a_job_by_all_its_fields() -> None:
+def test_the_index_knows_a_job_by_all_its_fields():
     job = small_plan().jobs()[0]
     not_counted = {"ref", "wordings_file"}
     assert len(identity_key(job)) == len(set(Job.__struct_fields__) - not_counted)
     assert identity_key(job.with_options(stages=(1, 5))) != identity_key(job)
+
     others = {"demonstration_frames": 4, "actions": "ee_pose", "meshes": "light"}
     for name, value in others.items():
         other = replace(job, environment=EnvironmentOptions(**{name: value}))

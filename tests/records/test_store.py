@@ -6,9 +6,7 @@ import math
 import os
 import resource
 import tempfile
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 from unittest.mock import patch
 
 import pytest
@@ -58,33 +56,34 @@ def some_records() -> tuple[Record, ...]:
 
 @given(st.data())
 @settings(max_examples=40, deadline=None)
-def test_a_file_cut_anywhere_loses_only_the_line_that_was_cut(data: st.DataObject) -> None:
+def test_a_file_cut_anywhere_loses_only_the_line_that_was_cut(data):
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        whole = (fill(folder, *some_records()) / RECORDS_FILE).read_bytes()
-        ends = [i for i, byte in enumerate(whole) if byte == ord("\n")]
+        path = fill(folder, *some_records()) / RECORDS_FILE
+        whole = path.read_bytes()
+        ends = [place for place, byte in enumerate(whole) if byte == ord("\n")]
         cut = data.draw(st.integers(0, len(whole)) | st.sampled_from(ends))
-        (folder / RECORDS_FILE).write_bytes(whole[:cut])
+        path.write_bytes(whole[:cut])
         # A record is there as soon as its last brace is; its newline may be missing.
-        complete = [end for end in ends if end <= cut]
+        count = sum(end <= cut for end in ends)
+        complete = some_records()[:count]
+        last = some_records()[-1]
 
-        assert tuple(iterate_records(folder)) == some_records()[: len(complete)]
+        assert tuple(iterate_records(folder)) == complete
         with RecordStore(folder) as store:
-            kept_keys = [identity_key(record) for record in some_records()[: len(complete)]]
-            assert list(store.stored) == kept_keys
+            assert list(store.stored) == [identity_key(record) for record in complete]
             torn = store.torn
-            store.append(some_records()[-1])
+            store.append(last)
 
-        mended = (folder / RECORDS_FILE).read_bytes()
-        kept = whole[: complete[-1] + 1] if complete else b""
-        last = encode(some_records()[-1]) + b"\n"
-        assert mended == kept + last
+        kept = b"".join(encode(record) + b"\n" for record in complete)
+        assert whole.startswith(kept)
+        assert path.read_bytes() == kept + encode(last) + b"\n"
         assert torn == whole[len(kept) : cut]
         if torn:
             assert (folder / TORN_FILE).read_bytes() == torn + b"\n"
 
 
-def test_every_torn_line_is_kept(tmp_path: Path) -> None:
+def test_every_torn_line_is_kept(tmp_path):
     for torn in (b'{"policy": "a', b'{"policy": "b'):
         with (tmp_path / RECORDS_FILE).open("ab") as file:
             file.write(torn)
@@ -93,7 +92,7 @@ def test_every_torn_line_is_kept(tmp_path: Path) -> None:
     assert (tmp_path / RECORDS_FILE).read_bytes() == b""
 
 
-def test_a_second_writer_is_told_who_writes(tmp_path: Path) -> None:
+def test_a_second_writer_is_told_who_writes(tmp_path):
     (tmp_path / LOCK_FILE).write_text("12345678901234\n")  # of an earlier one, which was killed
     with (
         RecordStore(tmp_path),
@@ -111,7 +110,7 @@ def test_a_second_writer_is_told_who_writes(tmp_path: Path) -> None:
         lambda folder: lock_server([Endpoint("h", 1)], wait=0, folder=folder),
     ],
 )
-def test_a_file_system_without_locks_is_named(tmp_path: Path, take: Callable[[Path], Any]) -> None:
+def test_a_file_system_without_locks_is_named(tmp_path, take):
     with (
         patch("fcntl.flock", side_effect=OSError(errno.ENOLCK, "No locks available")),
         pytest.raises(RoboIRGError, match=r"Cannot lock .*lock \(No locks .* local disk\.$"),
@@ -119,13 +118,14 @@ def test_a_file_system_without_locks_is_named(tmp_path: Path, take: Callable[[Pa
         take(tmp_path)
 
 
-def test_another_schema_version_is_refused_and_nothing_changes(tmp_path: Path) -> None:
+def test_another_schema_version_is_refused_and_nothing_changes(tmp_path):
     whole = (fill(tmp_path, *some_records()) / RECORDS_FILE).read_bytes()
     newer = whole.replace(b'"schema_version":1', b'"schema_version":7', 1)
     (tmp_path / RECORDS_FILE).write_bytes(newer)
     with pytest.raises(StoreError, match=r"line 1 has schema version 7, .* reads only version 1;"):
         RecordStore(tmp_path)
     assert (tmp_path / RECORDS_FILE).read_bytes() == newer
+
     (tmp_path / RECORDS_FILE).write_bytes(whole)
     RecordStore(tmp_path).close()  # the lock was given back
     assert (tmp_path / RECORDS_FILE).read_bytes() == whole
@@ -138,9 +138,7 @@ def test_another_schema_version_is_refused_and_nothing_changes(tmp_path: Path) -
         (b"[]", "line 1 has schema version None"),
     ],
 )
-def test_a_line_that_is_no_record_is_told_with_its_number(
-    tmp_path: Path, line: bytes, sentence: str
-) -> None:
+def test_a_line_that_is_no_record_is_told_with_its_number(tmp_path, line, sentence):
     (tmp_path / RECORDS_FILE).write_bytes(line + b"\n")
     for read in (read_records, read_results, read_index):
         with pytest.raises(StoreError, match=sentence):
@@ -153,39 +151,40 @@ def test_a_line_that_is_no_record_is_told_with_its_number(
      {"usage": {"cost_usd": math.inf}}, {"environment": EnvironmentOptions(max_steps=10**22)}],
     ids=str,
 )  # fmt: skip
-def test_what_could_not_be_read_again_is_not_written(
-    tmp_path: Path, fields: dict[str, Any]
-) -> None:
+def test_what_could_not_be_read_again_is_not_written(tmp_path, fields):
     record = replace(some_records()[0], **fields)
     with RecordStore(tmp_path) as store, pytest.raises(StoreError, match=r"is not a record"):
         store.append(record)
     assert (tmp_path / RECORDS_FILE).read_bytes() == b""
 
 
-def test_the_newest_record_of_a_job_wins(tmp_path: Path) -> None:
+def test_the_newest_record_of_a_job_wins(tmp_path):
     first, *others = some_records()
     newer = replace(first, steps=1234)
+
     fill(tmp_path, first, *others, newer)
+
     assert read_records(tmp_path) == (newer, *others)  # in the place of the first
 
 
-def test_no_records_is_one_sentence(tmp_path: Path) -> None:
+def test_no_records_is_one_sentence(tmp_path):
     with pytest.raises(StoreError, match="There are no records in"):
         read_records(tmp_path / "nowhere")
 
 
-def test_atomic_writing_replaces_and_leaves_no_part(tmp_path: Path) -> None:
+def test_atomic_writing_replaces_and_leaves_no_part(tmp_path):
     for text in ("one", "two"):
         write_atomically(tmp_path / "x.txt", text)
     assert [path.name for path in tmp_path.iterdir()] == ["x.txt"]
     assert (tmp_path / "x.txt").read_text() == "two"
 
 
-def test_a_full_disk_is_one_sentence_and_costs_no_record(tmp_path: Path) -> None:
+def test_a_full_disk_is_one_sentence_and_costs_no_record(tmp_path):
     first = fill(tmp_path / "whole", *some_records()[:3]) / RECORDS_FILE
     # The kernel takes a part of the fourth record and refuses the rest, as a full disk does.
     limit = first.stat().st_size + 100
-    folder, before = tmp_path / "run", resource.getrlimit(resource.RLIMIT_FSIZE)
+    folder = tmp_path / "run"
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
     play = lambda job: replace(FakePlay()(job), started_at="")  # noqa: E731
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
     try:
@@ -193,42 +192,48 @@ def test_a_full_disk_is_one_sentence_and_costs_no_record(tmp_path: Path) -> None
             run_plan(small_plan(), folder, play, InProcess())
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
     with RecordStore(folder) as store:
         assert (len(store.stored), store.torn) == (3, b"")
 
 
 @pytest.mark.parametrize("name", [LOCK_FILE, RECORDS_FILE, "models.sqlite", "videos/a.jpg"])
-def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path: Path, name: str) -> None:
+def test_a_run_writes_nothing_through_a_link_in_its_folder(tmp_path, name):
     victim = tmp_path / "victim"
     victim.write_text("mine")
     link = tmp_path / "run" / name
     link.parent.mkdir(parents=True)
     link.symlink_to(victim)
+
     for begin in (RecordStore, lambda run: check_run(small_plan(), run)):
         with pytest.raises(RoboIRGError, match=f"{link} is a symbolic link, and a run writes"):
             begin(tmp_path / "run")
     assert victim.read_text() == "mine"
 
 
-def test_a_folder_of_videos_on_another_disk_is_refused_at_the_start(tmp_path: Path) -> None:
+def test_a_folder_of_videos_on_another_disk_is_refused_at_the_start(tmp_path):
     (tmp_path / "disk").mkdir()
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "videos").symlink_to(tmp_path / "disk")
+
     with pytest.raises(RoboIRGError, match="make the folder of the run itself the link"):
         fake_run(tmp_path / "run")
     assert not (tmp_path / "run" / RECORDS_FILE).exists()
 
 
-def test_a_folder_of_a_run_may_be_a_link(tmp_path: Path) -> None:
+def test_a_folder_of_a_run_may_be_a_link(tmp_path):
     (tmp_path / "disk").mkdir()
     (tmp_path / "run").symlink_to(tmp_path / "disk")
+
     fill(tmp_path / "run", *some_records())
+
     assert read_records(tmp_path / "disk") == some_records()
 
 
-def test_a_lock_that_is_a_link_is_refused(tmp_path: Path) -> None:
+def test_a_lock_that_is_a_link_is_refused(tmp_path):
     (tmp_path / "victim").write_text("mine")
     (tmp_path / "lock").symlink_to(tmp_path / "victim")
     refused = pytest.raises(RoboIRGError, match=f"Cannot write {tmp_path / 'lock'}")
+
     with refused, locked(tmp_path / "lock", "taken"):
         pass

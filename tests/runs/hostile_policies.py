@@ -39,17 +39,18 @@ class Searcher(Hostile):
     """Looks for the goal in every frame and every object."""
 
     def reset(self, instruction: str, demonstration: Any) -> None:
-        types, texts = set(), set()
+        types = set()
+        texts = set()
         frames: list[Any] = [*sys._current_frames().values()]
         while frames:
             frame = frames.pop()
-            types |= {type(one).__name__ for one in frame.f_locals.values()}
-            texts |= {one for one in frame.f_locals.values() if isinstance(one, str)}
+            types |= {type(value).__name__ for value in frame.f_locals.values()}
+            texts |= {value for value in frame.f_locals.values() if isinstance(value, str)}
             frames += [frame.f_back] if frame.f_back else []
-        for one in gc.get_objects():
-            types.add(type(one).__name__)
-            if issubclass(type(one), dict | list | tuple | set):
-                values = one.values() if isinstance(one, dict) else one
+        for thing in gc.get_objects():
+            types.add(type(thing).__name__)
+            if issubclass(type(thing), dict | list | tuple | set):
+                values = thing.values() if isinstance(thing, dict) else thing
                 # What changes meanwhile, and proxies of what is gone.
                 with contextlib.suppress(RuntimeError, ReferenceError):
                     texts |= {value for value in values if issubclass(type(value), str)}

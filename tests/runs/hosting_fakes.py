@@ -33,7 +33,9 @@ class PaperWorld:
     def __init__(self, job: Job, seconds: float = 0.0) -> None:
         self.instruction = instruct_job(job)
         self.secret = WHISPER.format(job.episode)
-        self.seconds, self.steps, self.total = seconds, 0, 0.0
+        self.seconds = seconds
+        self.steps = 0
+        self.total = 0.0
         self.executed_actions = 0
 
     def reset(self) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -121,7 +123,8 @@ class Dice:
     version = "1"
 
     def __init__(self, seed: int = 0) -> None:
-        self.seed, self.metadata = seed, {"seed": seed}
+        self.seed = seed
+        self.metadata = {"seed": seed}
         self.calls = 0
 
     def reset(self, instruction: str, demonstration: Any) -> None:

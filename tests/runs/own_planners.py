@@ -13,7 +13,9 @@ class Pointer:
     version = "mine-1"
 
     def reset(self, instruction, demonstration):
-        self.said, self.ends, self.pictures = instruction, [], 0
+        self.said = instruction
+        self.ends = []
+        self.pictures = 0
 
     def learn(self, end):
         self.ends.append(end)
@@ -24,11 +26,11 @@ class Pointer:
 
     @property
     def metadata(self):
-        kinds = {type(one).__name__ for one in gc.get_objects()}
+        kinds = {type(thing).__name__ for thing in gc.get_objects()}
         return {"world": np.bool_(kinds & {"World", "RoboIRGEnv", "Goal"})}
 
     def usage(self):
-        named = sum(one.thing is not None for one in self.ends)
+        named = sum(end.thing is not None for end in self.ends)
         return {
             "process": os.getpid(),
             "pictures": self.pictures,

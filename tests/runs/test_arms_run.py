@@ -34,32 +34,36 @@ def play(plan: Plan, folder: Path) -> Path:
     return folder
 
 
-def test_what_has_no_other_goal_is_left_out_and_counted() -> None:
+def test_what_has_no_other_goal_is_left_out_and_counted():
     plan = plan_of()
     jobs = plan.jobs()
     assert len({identity_key(job) for job in jobs}) == len(jobs)
     assert len({job.slug for job in jobs}) == len(jobs)
+
     repick = [job.arm for job in jobs if job.task == "VideoRepick" and job.episode == 0]
     assert "other-goal" not in repick
     assert set(repick) == set(plan.arms) - {"other-goal"}
     # None in VideoRepick, nor in the scenes of PickXtimes that have one cube.
     assert plan.left_out(jobs) == {"other-goal": 5}
     assert plan_of("told").left_out(plan_of("told").jobs()) == {}
+
     explicit = plan_of("told,paraphrase:2", settings="explicit")
     assert explicit.left_out(explicit.jobs()) == {"paraphrase-2": 6}
 
 
-def test_arms_of_the_command_line_and_of_plan_files(tmp_path: Path) -> None:
+def test_arms_of_the_command_line_and_of_plan_files(tmp_path):
     path = tmp_path / "arms.yaml"
     path.write_text("policies: oracle\ntasks: StopCube\narms: [told, paraphrase:2, again]\n")
     fields = read_plan_file(str(path))
     made = make_plan(fields.pop("policies"), **fields)
+
     assert made.arms == ("told", "paraphrase-1", "paraphrase-2", "again")
     assert make_plan(["oracle"], tasks="StopCube").arms == ("told",)
     with pytest.raises(UnknownNameError, match="'silend'; known"):
         plan_of("told,silend")
     with pytest.raises(InvalidValueError, match="arm"):
         plan_of(",")
+
     printed = call(
         "run", "--policy", "oracle", "--tasks", "VideoRepick", "--arms", "told,other-goal",
         "--episodes", "2", "--settings", "direct", "--out", tmp_path / "x", "--dry-run",
@@ -68,7 +72,7 @@ def test_arms_of_the_command_line_and_of_plan_files(tmp_path: Path) -> None:
 
 
 @pytest.mark.sim
-def test_runs_with_arms_are_verified_and_forged_goals_are_found(tmp_path: Path) -> None:
+def test_runs_with_arms_are_verified_and_forged_goals_are_found(tmp_path):
     from roboirg.apps.leaderboard.run_verification import verify_run
     from roboirg.runs.play.rollout import EpisodeRunner
 
@@ -78,7 +82,8 @@ def test_runs_with_arms_are_verified_and_forged_goals_are_found(tmp_path: Path) 
     )  # fmt: skip
     write_plan(plan, tmp_path)
     run_plan(plan, tmp_path, EpisodeRunner(tmp_path, plan=plan.fingerprint), InProcess())
-    records = {(one.policy, one.arm): one for one in read_records(tmp_path)}
+
+    records = {(record.policy, record.arm): record for record in read_records(tmp_path)}
     for (policy, arm), record in records.items():
         goals = record.goals
         assert (record.outcome == "success") == (goals.stated in goals.reached), (policy, arm)
@@ -87,11 +92,13 @@ def test_runs_with_arms_are_verified_and_forged_goals_are_found(tmp_path: Path) 
     assert records["habit", "other-goal"].attribution.failure == "other_goal"
     assert records["listener", "other-goal"].outcome == "success"
     assert records["listener", "silent"].instruction[0].text == "Please do your task."
-    lines = (tmp_path / RECORDS_FILE).read_text().splitlines()
-    forged = [json.loads(line) for line in lines]
-    for one in forged:
-        if one["arm"] == "other-goal" and one["policy"] == "habit":
-            one["goals"]["original"] = "failure"
-    (tmp_path / RECORDS_FILE).write_text("".join(json.dumps(one) + "\n" for one in forged))
+
+    lines = []
+    for line in (tmp_path / RECORDS_FILE).read_text().splitlines():
+        row = json.loads(line)
+        if row["arm"] == "other-goal" and row["policy"] == "habit":
+            row["goals"]["original"] = "failure"
+        lines.append(json.dumps(row) + "\n")
+    (tmp_path / RECORDS_FILE).write_text("".join(lines))
     (check,) = verify_run(tmp_path).checks  # the others hold
     assert "goals: the record says" in check.findings[0]

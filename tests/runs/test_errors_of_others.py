@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections.abc import Callable
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,7 +21,8 @@ from roboirg.runs.hosting.policy_opening import open_policy
 from roboirg.runs.run.executor import InProcess
 from roboirg.runs.run.runner import run_plan
 
-IT, BOTH = "throwing:It", "planner:throwing:Planner?hands=throwing:It"
+IT = "throwing:It"
+BOTH = "planner:throwing:Planner?hands=throwing:It"
 RAISED = "(throwing.py, line 12)"
 HOOKS = ("import", "class body", "__init__", "needs", "version", "reset", "act", "hear",
          "metadata", "subgoal")  # fmt: skip
@@ -60,8 +60,10 @@ def told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
     [*((hook, IT, "shared") for hook in HOOKS), *((hook, BOTH, "shared") for hook in PLANNED),
      ("act", IT, "own"), ("planner's plan", BOTH, "own")],
 )  # fmt: skip
-def test_what_a_user_wrote_has_its_place(told: Any, hook: str, spec: str, process: str) -> None:
-    found, kind = told(hook, spec, process), "SystemExit" if hook == "class body" else "ValueError"
+def test_what_a_user_wrote_has_its_place(told, hook, spec, process):
+    found = told(hook, spec, process)
+    kind = "SystemExit" if hook == "class body" else "ValueError"
+
     assert found.cause.endswith(f": {kind}: from {hook} {RAISED}")
     assert "Traceback" in found.details
 
@@ -73,14 +75,14 @@ def test_what_a_user_wrote_has_its_place(told: Any, hook: str, spec: str, proces
         lambda: exec(compile("1/0", "<made by a library>", "exec"), {}),  # noqa: S102
     ],
 )
-def test_code_without_a_file_has_the_place_that_runs_it(run: Callable[[], Any]) -> None:
+def test_code_without_a_file_has_the_place_that_runs_it(run):
     with pytest.raises((SyntaxError, ZeroDivisionError)) as raised:
         run()
     assert one_line(raised.value).rpartition(", line ")[0].endswith(Path(__file__).name)
 
 
 @pytest.mark.parametrize("hook", ["usage", "close"])
-def test_what_comes_after_the_verdict_stays_in_the_record(told: Any, hook: str) -> None:
+def test_what_comes_after_the_verdict_stays_in_the_record(told, hook):
     record = told(hook)
     assert (record.outcome, record.cause) == ("success", None)
     assert f"from {hook}" in record.details
@@ -88,23 +90,23 @@ def test_what_comes_after_the_verdict_stays_in_the_record(told: Any, hook: str) 
 
 @pytest.mark.parametrize("hook", KEYS)
 @pytest.mark.parametrize("process", ["shared", "own"])
-def test_a_missing_key_comes_with_those_that_are_there(told: Any, hook: str, process: str) -> None:
+def test_a_missing_key_comes_with_those_that_are_there(told, hook, process):
     assert told(f"a key in {hook}", process=process).cause == (
         f"policy: KeyError: 'front'; the {KEYS[hook]}, joint_positions (throwing.py, line 15)"
     )
 
 
-def test_a_command_of_another_package_is_one_sentence(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_command_of_another_package_is_one_sentence(monkeypatch, capsys):
     monkeypatch.setenv("HOOK", "command")
     monkeypatch.delitem(sys.modules, "throwing", raising=False)
     monkeypatch.setattr(sys, "argv", ["roboirg", "theirs"])
     monkeypatch.setattr(cli.app, "registered_commands", list(cli.app.registered_commands))
     for name, value in (("theirs", "throwing:command"), ("none", "throwing:__doc__")):
         cli._add_outside(EntryPoint(name, value, cli.COMMANDS))
+
     with pytest.raises(SystemExit):
         cli.main()
+
     refused, raised = capsys.readouterr().err.splitlines()
     assert refused.startswith("roboirg: no command none: throwing:__doc__: TypeError: ")
     assert raised == (

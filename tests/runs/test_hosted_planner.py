@@ -30,21 +30,24 @@ def play(spec: str) -> Record:
 
 
 @pytest.mark.sim
-def test_it_sees_pictures_and_words_only() -> None:
+def test_it_sees_pictures_and_words_only():
     spec = "planner:own_planners:Pointer"
     assert read_policy(spec).is_hosted
+
     result = play(spec)
     assert result.outcome == "failure", result.cause
-    assert [(one.text, one.ended) for one in result.subgoals] == [
+    assert [(subgoal.text, subgoal.ended) for subgoal in result.subgoals] == [
         ("remain static for 5 steps", "done"),
         ("pick up the container", "refused"),
     ]
+
     spent = result.usage
     assert spent["process"] != os.getpid()
     # Each end is told once, the last one never.
     assert (spent["refused"], spent["named"], spent["ends"]) == (5, 0, 1 + 4)
     assert spent["pictures"] == 1 + 5  # one where it named the first, and five refusals
     assert result.policy_metadata["planner"] == {"world": False}
+
     # The whole is marked as it acts by the simulator's state, and described alike beforehand.
     known = open_policy(read_policy(spec))
     assert known.version == result.policy_version == "mine-1 + scripted hands"
@@ -52,16 +55,17 @@ def test_it_sees_pictures_and_words_only() -> None:
 
 
 @pytest.mark.sim
-def test_what_it_breaks_ends_its_own_episode() -> None:
+def test_what_it_breaks_ends_its_own_episode():
     result = play("planner:own_planners:Quitter")
     assert (result.outcome, result.error) == ("error", "policy")
 
 
 @pytest.mark.sim
-def test_one_that_is_declared_runs_next_to_the_world() -> None:
+def test_one_that_is_declared_runs_next_to_the_world():
     spec = "privileged:planner:own_planners:Insider"
     assert not read_policy(spec).is_hosted
     assert play(spec).usage["process"] == os.getpid()
+
     # So does any in a run whose policies share the worker's process.
     shared = EpisodeRunner(Path()).play_once(job_of("planner:own_planners:Pointer"))[0]
     assert (shared.usage["process"], len(shared.subgoals)) == (os.getpid(), 2)
@@ -79,6 +83,6 @@ def test_one_that_is_declared_runs_next_to_the_world() -> None:
         ("planner:own_planners:Pointer?keep=2", "no option of planner:own_planners:Pointer"),
     ],
 )
-def test_wrong_ones_are_one_sentence(spec: str, words: str) -> None:
+def test_wrong_ones_are_one_sentence(spec, words):
     with pytest.raises(InvalidValueError, match=re.escape(words)):
         open_policy(read_policy(spec))

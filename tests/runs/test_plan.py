@@ -1,12 +1,8 @@
-from __future__ import annotations
-
 import io
 import math
 import tempfile
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -39,7 +35,7 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.csv_text import csv_lines
 
 
-def test_a_number_is_the_first_episodes_and_a_list_is_a_list() -> None:
+def test_a_number_is_the_first_episodes_and_a_list_is_a_list():
     assert parse_episodes("4", "test", ()) == (0, 1, 2, 3)
     assert parse_episodes("0,3,5-9", "test", ()) == (0, 3, 5, 6, 7, 8, 9)
     assert parse_episodes("7,", "test", ()) == (7,)
@@ -54,19 +50,21 @@ def test_a_number_is_the_first_episodes_and_a_list_is_a_list() -> None:
         "0-999999999", "9" * 5000, "0," + "9" * 5000, "a" * 5000,
     ],
 )  # fmt: skip
-def test_what_is_no_list_is_one_sentence(text: str) -> None:
+def test_what_is_no_list_is_one_sentence(text):
     with pytest.raises(InvalidValueError) as caught:
         parse_episodes(text, "test", ())
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 200
 
 
-def test_difficulties_select_the_episodes_that_have_them_in_every_task() -> None:
+def test_difficulties_select_the_episodes_that_have_them_in_every_task():
     tasks = tuple(all_tasks())
     hard = parse_episodes("hard", "test", tasks)
     assert hard == tuple(range(3, 50, 4))
+
     both = parse_episodes("hard, medium", "test", tasks)
     assert both == tuple(sorted({*hard, *range(2, 50, 4)}))
+
     # The difficulties of two tasks of this split have another order in part.
     uneven = parse_episodes("hard", "val", tasks)
     assert len(uneven) < len(parse_episodes("hard", "val", ("BinFill",)))
@@ -85,42 +83,42 @@ def test_difficulties_select_the_episodes_that_have_them_in_every_task() -> None
         (parse_numbers, ("policy seed", "0-999999999"), "1,000,000,000 numbers; at most 10,000"),
     ],
 )
-def test_sentences_about_numbers_say_what_would_be_right(
-    parse: Callable[..., object], given: tuple[object, ...], words: str
-) -> None:
+def test_sentences_about_numbers_say_what_would_be_right(parse, given, words):
     with pytest.raises(InvalidValueError, match=words):
         parse(*given)
 
 
 @pytest.mark.parametrize("text", ["all", "ALL", "all,explicit", "direct, All"])
-def test_all_means_all_wherever_it_stands(text: str) -> None:
+def test_all_means_all_wherever_it_stands(text):
     assert make_plan(["random"], settings=text, episodes="1").settings == ("all",)
     words = text.replace("explicit", "BinFill").replace("direct", "StopCube")
     assert make_plan(["random"], tasks=words, episodes="1").tasks == tuple(all_tasks())
 
 
-def test_tasks_beside_the_benchmark_are_asked_for_by_name_or_suite() -> None:
+def test_tasks_beside_the_benchmark_are_asked_for_by_name_or_suite():
     real = ("PutInBox", "PickByCount")
     assert make_plan(["random"], tasks="PickByCount,Real", episodes="1").tasks == real[::-1]
+
     every = make_plan(["random"], tasks="real, all", episodes="1").tasks
     assert every == (*all_tasks(), *real)
     with pytest.raises(UnknownNameError, match=r"no task 'reall'.*Did you mean 'real'"):
         make_plan(["random"], tasks="all,reall")
 
 
-def test_all_settings_are_those_that_each_episode_can_be_told_in() -> None:
+def test_all_settings_are_those_that_each_episode_can_be_told_in():
     jobs = make_plan(["random"], episodes="6").jobs()
     for task in all_tasks():
         for episode in range(6):
             played = [job.setting for job in jobs if (job.task, job.episode) == (task, episode)]
             possible = expressible(get_episode(task, "test", episode))
-            told, *implicit = [one for one in possible if one in plain_settings()]
+            told, *implicit = [setting for setting in possible if setting in plain_settings()]
             assert played == [*implicit, told]  # explicit comes last
 
 
-def test_the_same_words_are_one_job() -> None:
+def test_the_same_words_are_one_job():
     plan = make_plan(["random"], forms="implicit,resolved", stages="1,5", frame="camera")
     jobs = plan.jobs()
+
     assert len(set(jobs)) == len(jobs)
     assert {job.form for job in jobs if job.setting == "explicit"} == {"implicit"}
     for job in jobs:
@@ -128,46 +126,51 @@ def test_the_same_words_are_one_job() -> None:
         assert (job.options.frame == "camera") == (job.setting == "spatial")
 
 
-def test_turns_are_other_jobs_where_there_is_more_than_one_utterance() -> None:
+def test_turns_are_other_jobs_where_there_is_more_than_one_utterance():
     prompt, turns = (
         make_plan(["random"], delivery=delivery).jobs() for delivery in ("prompt", "turns")
     )
     assert len(prompt) == len(turns)
-    for one, other in zip(prompt, turns, strict=True):
-        same_job = one.setting == "explicit"
-        assert (one == other) == same_job
-        assert (identity_key(one) == identity_key(other)) == same_job
-        assert (one.slug == other.slug) == same_job
+    for job, other in zip(prompt, turns, strict=True):
+        same_job = job.setting == "explicit"
+        assert (job == other) == same_job
+        assert (identity_key(job) == identity_key(other)) == same_job
+        assert (job.slug == other.slug) == same_job
         assert other.options.delivery == ("prompt" if same_job else "turns")
 
 
-def test_every_setting_is_the_harder_ones_too() -> None:
+def test_every_setting_is_the_harder_ones_too():
     assert make_plan(["random"], settings="all,direct-rival").settings == ("all", "direct-rival")
     for text in ("every", "direct, Every", "all,every"):
         plan = make_plan(["random"], tasks="StopCube,BinFill", settings=text, episodes="0-3")
         assert plan.settings == ("every",)
     for job in plan.jobs():
         assert job.setting in expressible(get_episode(job.task, "test", job.episode))
+
     told = {job.setting for job in plan.jobs()}
     assert told > set(plain_settings()) - {"spatial"}
     assert "direct-rival" in told
 
 
-def test_settings_in_turns_are_played_in_both_ways() -> None:
+def test_settings_in_turns_are_played_in_both_ways():
     options = {"tasks": "StopCube", "episodes": "2", "settings": "explicit,direct,reasoning"}
     usual = make_plan(["random"], **options).jobs()
     both = make_plan(["random"], in_turns="direct", **options).jobs()
+
     added = [job for job in both if job not in usual]
+
     assert [(job.setting, job.options.delivery) for job in added] == [("direct", "turns")] * 2
     assert len(both) == len(usual) + 2
     with pytest.raises(UnknownNameError, match="no setting in turns 'explicit'"):
         make_plan(["random"], in_turns="explicit", **options)
 
 
-def test_episodes_without_a_rival_are_left_out() -> None:
+def test_episodes_without_a_rival_are_left_out():
     options = {"tasks": "BinFill", "settings": "explicit,direct-rival", "episodes": "0-7"}
     jobs = make_plan(["random"], **options).checked().jobs()
+
     told = [job.episode for job in jobs if job.setting == "direct-rival"]
+
     assert 0 < len(told) < 8
     assert [job.episode for job in jobs if job.setting == "explicit"] == list(range(8))
     with pytest.raises(InvalidValueError, match="nothing to play: grounded cannot"):
@@ -176,7 +179,7 @@ def test_episodes_without_a_rival_are_left_out() -> None:
         make_plan(["random"], tasks="StopCube", settings="spatial").checked()
 
 
-def test_jobs_are_ordered_and_named_uniquely() -> None:
+def test_jobs_are_ordered_and_named_uniquely():
     """As given, but what leaves the goal implicit comes first in each scene."""
     jobs = make_plan(
         ["random", "oracle"], tasks="VideoUnmask,BinFill", episodes="3,0", policy_seeds="2,0",
@@ -191,6 +194,7 @@ def test_jobs_are_ordered_and_named_uniquely() -> None:
         )
         for job in jobs
     ]
+
     assert order == sorted(order)
     assert len({job.slug for job in jobs}) == len(jobs)
 
@@ -231,7 +235,7 @@ def test_jobs_are_ordered_and_named_uniquely() -> None:
          r"max_steps is 9, but stands in environment, too"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_played_is_told_up_front(options: dict[str, Any], sentence: str) -> None:
+def test_what_cannot_be_played_is_told_up_front(options, sentence):
     with pytest.raises(InvalidValueError, match=sentence):
         make_plan(["random"], **options)
 
@@ -242,15 +246,16 @@ def test_what_cannot_be_played_is_told_up_front(options: dict[str, Any], sentenc
      "devices", "policy_env", "retry_on"],
 )  # fmt: skip
 @pytest.mark.parametrize("given", [{"1-5": 3}, {1: 3}, {}], ids=str)
-def test_a_mapping_is_no_list(name: str, given: dict[Any, int]) -> None:
+def test_a_mapping_is_no_list(name, given):
     """Its keys would be taken, and its values lost."""
     with pytest.raises(InvalidValueError, match=r"\{.*\} is not a valid .*; write a list"):
         make_plan(["random"], **{name: given})
 
 
-def test_numbers_of_numpy_are_numbers() -> None:
+def test_numbers_of_numpy_are_numbers():
     options = {"tasks": "PickXtimes", "settings": "explicit"}
     plan = make_plan("random", episodes=np.int64(2), max_steps=np.int32(60), **options)
+
     assert (plan.episodes, plan.environment.max_steps) == ((0, 1), 60)
     assert make_plan("random", episodes=np.arange(1, 3), **options).episodes == (1, 2)
 
@@ -271,7 +276,7 @@ NUMBERS = st.integers(-(10**25), 10**25) | st.integers(-2, 200) | st.floats() | 
 )  # fmt: skip
 @example({"max_steps": 10**9, "policy_seeds": 10**18 - 1, "max_cost": 1e308})
 @settings(deadline=None)
-def test_whatever_numbers_a_plan_takes_are_stored_and_read_again(numbers: dict[str, Any]) -> None:
+def test_whatever_numbers_a_plan_takes_are_stored_and_read_again(numbers):
     usual = {"tasks": "PickXtimes", "settings": "explicit", "episodes": 1}
     try:
         plan = make_plan("random", **usual, **numbers)
@@ -285,17 +290,18 @@ def test_whatever_numbers_a_plan_takes_are_stored_and_read_again(numbers: dict[s
         assert list(read_records(fill(folder, *stored))) == stored
 
 
-def test_addresses_keep_their_commas() -> None:
+def test_addresses_keep_their_commas():
     specs = ["random,oracle", "mme-vla://a:8001,b:8001?history=no", "random"]
     assert parse_policies(specs) == ("random", "oracle", "mme-vla://a:8001,b:8001?history=no")
     with pytest.raises(InvalidValueError, match="No policy was given"):
         parse_policies([])
 
 
-def test_a_policy_may_have_a_name_of_its_own() -> None:
+def test_a_policy_may_have_a_name_of_its_own():
     address = "mme-vla://localhost:8001?history=no"
     plan = make_plan([f"pi0.5={address}", "oracle"], tasks="StopCube", episodes="1")
-    assert [(one.name, one.spec) for one in plan.policies] == [
+
+    assert [(policy.name, policy.spec) for policy in plan.policies] == [
         ("pi0.5", address), ("oracle", "oracle"),
     ]  # fmt: skip
     assert plan.jobs()[0].policy == "pi0.5"
@@ -305,7 +311,7 @@ def test_a_policy_may_have_a_name_of_its_own() -> None:
         make_plan(["mine=listner"])
 
 
-def test_names_follow_one_rule_in_plans_and_records() -> None:
+def test_names_follow_one_rule_in_plans_and_records():
     for policy in ("-x=oracle", "=cmd|' /C calc'!A0"):
         with pytest.raises(InvalidValueError, match="name"):
             make_plan(policy, tasks="PickXtimes", episodes="1")
@@ -316,27 +322,27 @@ def test_names_follow_one_rule_in_plans_and_records() -> None:
     ["", " ", "NA", "<NA>", "n/a", "#N/A N/A", "null", "nan", "None", "007", "7.0", "1,000", ".5",
      "1e5", "2.5E-3", "inf", "True", "1.#IND"],
 )  # fmt: skip
-def test_what_tables_would_be_read_back_without_is_no_name(name: str, tmp_path: Path) -> None:
+def test_what_tables_would_be_read_back_without_is_no_name(name, tmp_path):
     with pytest.raises(InvalidValueError, match=f"Policy '{name}' has no valid name for records"):
         make_plan([replace(read_policy("random"), name=name)], tasks="PickXtimes", episodes="1")
+
     record = make_record(Plan(policies="random", tasks="PickXtimes", episodes=1).jobs()[0])
     stranger = msgspec.structs.replace(record, policy=name)
     with pytest.raises(StoreError, match="a missing value"):
         fill(tmp_path, stranger)
 
 
-def test_names_with_a_letter_are_read_back_as_they_are() -> None:
+def test_names_with_a_letter_are_read_back_as_they_are():
     names = ("e1", "7b", "na1", "pi0.5", "nan-net", "3d", "1e5x")
     plan = make_plan([f"{name}=random" for name in names], tasks="PickXtimes", episodes="1")
     assert tuple(policy.name for policy in plan.policies) == names
+
     table = csv_lines([["name"], *([name] for name in names)])
     assert (*pd.read_csv(io.StringIO(table))["name"],) == names
 
 
 @pytest.mark.parametrize("content", ["{", "words", "[]"])
-def test_a_plan_that_cannot_be_read_is_reported(
-    content: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_plan_that_cannot_be_read_is_reported(content, tmp_path, caplog):
     (tmp_path / PLAN_FILE).write_text(content)
     assert (read_plan(tmp_path), read_plan(tmp_path / "nowhere")) == (None, None)
     assert caplog.messages == [
@@ -344,11 +350,12 @@ def test_a_plan_that_cannot_be_read_is_reported(
     ]
 
 
-def test_a_name_next_to_all_is_added_and_tasks_may_lack_it() -> None:
+def test_a_name_next_to_all_is_added_and_tasks_may_lack_it():
     plan = make_plan(
         ["random"], tasks="StopCube,VideoUnmask", settings="grounded,All", episodes="2"
     )
     assert plan.setting_names == (*plain_settings(), "grounded")
+
     played = {(job.task, job.options.setting) for job in plan.jobs()}
     assert ("VideoUnmask", "grounded") in played
     assert ("StopCube", "direct") in played

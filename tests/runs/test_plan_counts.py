@@ -1,7 +1,5 @@
 """What a dry run counts: episodes, and the calls of models that they take at least."""
 
-from __future__ import annotations
-
 from msgspec.structs import replace
 
 from roboirg.policies.by_name.finding import read_policy
@@ -13,7 +11,7 @@ from roboirg.tasks.splits.splits import get_episode
 MODEL = "model=x&base_url=http://localhost:1/v1"
 
 
-def test_cells_are_counted_by_policy_task_setting_and_form() -> None:
+def test_cells_are_counted_by_policy_task_setting_and_form():
     plan = make_plan(
         ["random"], tasks="PickXtimes,StopCube", forms="implicit,resolved", episodes="3"
     )
@@ -21,12 +19,13 @@ def test_cells_are_counted_by_policy_task_setting_and_form() -> None:
     assert sizes["random", "StopCube"]["direct"] == {"implicit": 3, "resolved": 3}
     assert sizes["random", "StopCube"]["explicit"] == {"implicit": 3}
     assert "spatial" not in sizes["random", "StopCube"]
+
     total = sum(count for cell in sizes.values() for forms in cell.values() for count in
                 forms.values())  # fmt: skip
     assert total == len(plan.jobs())
 
 
-def test_a_listener_asks_once_an_episode_and_a_planner_once_a_subgoal() -> None:
+def test_a_listener_asks_once_an_episode_and_a_planner_once_a_subgoal():
     tasks = "PickXtimes,VideoUnmask"
     plan = make_plan(["random"], tasks=tasks, settings="explicit", episodes="3")
     specs = {
@@ -40,10 +39,14 @@ def test_a_listener_asks_once_an_episode_and_a_planner_once_a_subgoal() -> None:
         "without": "system:pi0.5",
         "blind": "random",
     }
-    jobs = [replace(one, policy=name, ref=read_policy(spec)) for name, spec in specs.items()
-            for one in plan.jobs()]  # fmt: skip
+    jobs = [replace(job, policy=name, ref=read_policy(spec)) for name, spec in specs.items()
+            for job in plan.jobs()]  # fmt: skip
     episodes = [get_episode(task, "test", index) for task in tasks.split(",") for index in range(3)]
-    subgoals = sum(len(get_task(one.task).stages(one.scene, one.goal)) for one in episodes)
+
+    subgoals = sum(
+        len(get_task(episode.task).stages(episode.scene, episode.goal)) for episode in episodes
+    )
+
     assert subgoals > len(episodes)
     assert least_calls(jobs) == {
         ("plans", "explicit"): subgoals,

@@ -28,55 +28,61 @@ def write(folder: Path, text: str) -> str:
     return str(path)
 
 
-def test_robommes_plan_needs_its_words() -> None:
+def test_robommes_plan_needs_its_words():
     options = read_plan_file("robomme")
     with pytest.raises(InvalidValueError, match=r"import-robomme PATH --out .* --wordings"):
         make_plan(["random"], **options)
 
 
 @pytest.mark.parametrize("name", sorted({*named_plans()} - {"robomme", *PINNED}))
-def test_every_other_named_plan_can_be_played(name: str) -> None:
+def test_every_other_named_plan_can_be_played(name):
     assert make_plan(**{"policies": ["random"], **read_plan_file(name)}).jobs()
 
 
-def test_the_challenge_has_its_own_limit() -> None:
+def test_the_challenge_has_its_own_limit():
     plan = make_plan(["random"], **read_plan_file("challenge"))
     assert (plan.environment.max_steps, len(plan.episodes), plan.split) == (1500, 10, "test")
     assert {job.setting for job in plan.jobs()} == {"explicit"}
     assert len(plan.jobs()) == 10 * len(all_tasks())
 
 
-def test_the_papers_protocol_is_the_papers() -> None:
+def test_the_papers_protocol_is_the_papers():
     plan = make_plan(["random"], **read_plan_file("paper"))
     assert plan.tasks == tuple(all_tasks())
     assert (plan.settings, plan.forms) == (("all",), ("implicit", "resolved"))
     assert plan.policy_seeds == (7, 42, 0)
     assert plan.episodes == tuple(range(50))
     assert plan.environment.max_steps == 1300
+
     told = {(job.task, job.setting, job.form) for job in plan.jobs()}
     # 40 implicit variants and their resolved forms, and the explicit setting once.
     assert len(told) == 40 + 40 + 11
+
     context = make_plan(["random"], **read_plan_file("paper-context"))
     assert {job.options.stages for job in context.jobs()} == set(STAGE_SETS)
     assert len(context.jobs()) == 3 * 4 * 50 * 3
 
 
-def test_the_standard_protocol_has_every_setting_and_direct_in_turns() -> None:
-    options = read_plan_file("standard")
-    plan = make_plan(["random"], **options)
+def test_the_standard_protocol_plays_every_task_in_fifty_episodes():
+    plan = make_plan(["random"], **read_plan_file("standard"))
+
     assert plan.tasks == tuple(all_tasks())
     assert (plan.episodes, plan.policy_seeds) == (tuple(range(50)), (0,))
     assert (plan.split, plan.forms) == ("test", ("implicit",))
     assert plan.environment.max_steps == 1300
-    few = make_plan(["random"], **options | {"episodes": "4"}).jobs()
-    found = {(job.task, job.setting, job.options.delivery) for job in few}
-    assert {setting for _, setting, _ in found} == set(all_settings())
-    assert {(task, setting) for task, setting, way in found if way == "turns"} == {
-        (task, "direct") for task in all_tasks()
-    }
-    for job in few:
+
+
+def test_the_standard_protocol_has_every_setting_and_direct_in_turns():
+    options = read_plan_file("standard") | {"episodes": "4"}
+
+    jobs = make_plan(["random"], **options).jobs()
+
+    assert {job.setting for job in jobs} == set(all_settings())
+    in_turns = {(job.task, job.setting) for job in jobs if job.options.delivery == "turns"}
+    assert in_turns == {(task, "direct") for task in all_tasks()}
+    for job in jobs:
         reference = msgspec.structs.replace(job, options=InstructionOptions())
-        assert reference in few, "without explicit there is no gap"
+        assert reference in jobs, "without explicit there is no gap"
 
 
 @pytest.mark.parametrize(
@@ -99,9 +105,7 @@ def test_the_standard_protocol_has_every_setting_and_direct_in_turns() -> None:
         ("cluster: {labels: {spot: yes}}", {"cluster": {"labels": {"spot": "yes"}}}),
     ],
 )  # fmt: skip
-def test_values_are_those_that_would_be_typed(
-    tmp_path: Path, text: str, typed: dict[str, Any]
-) -> None:
+def test_values_are_those_that_would_be_typed(tmp_path, text, typed):
     few: dict[str, Any] = {"policies": "random", "tasks": "PickXtimes"}
     read = read_plan_file(write(tmp_path, text))
     assert make_plan(**few | read) == make_plan(**few | typed)
@@ -119,7 +123,7 @@ def test_values_are_those_that_would_be_typed(
         ("tasks: all\nsplit: val\ntasks:\n  - real", r"line 3 has the key 'tasks' again"),
     ],
 )
-def test_what_is_no_plan_is_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+def test_what_is_no_plan_is_one_sentence(tmp_path, text, sentence):
     with pytest.raises(InvalidValueError, match=sentence) as caught:
         read_plan_file(write(tmp_path, text))
     assert "\n" not in str(caught.value)
@@ -133,23 +137,23 @@ def test_what_is_no_plan_is_one_sentence(tmp_path: Path, text: str, sentence: st
         "tasks:", "tasks:\n  - ", "max_steps: !!int '010'", "training: {seed:}",
     ],
 )  # fmt: skip
-def test_what_yaml_takes_for_something_else_than_it_looks_is_refused(
-    tmp_path: Path, text: str
-) -> None:
+def test_what_yaml_takes_for_something_else_than_it_looks_is_refused(tmp_path, text):
     with pytest.raises(InvalidValueError, match=r"line \d ") as caught:
         read_plan_file(write(tmp_path, text), "training")
     assert "\n" not in str(caught.value)
 
 
-def test_what_is_typed_replaces_the_option_in_a_section_of_the_file(tmp_path: Path) -> None:
+def test_what_is_typed_replaces_the_option_in_a_section_of_the_file(tmp_path):
     path = write(tmp_path, "environment: {max_steps: 100, meshes: light}\nepisodes: 1")
     typed = {"policies": ["random"], "max_steps": "200", "max_cost": "0.5"}
     plan = run_commands._plan(path, typed, ())
+
     options = plan.environment
+
     assert (options.max_steps, options.meshes, plan.models.max_cost) == (200, "light", 0.5)
 
 
-def test_an_unknown_plan_is_told_with_the_nearest() -> None:
+def test_an_unknown_plan_is_told_with_the_nearest():
     with pytest.raises(UnknownNameError, match="Did you mean 'paper-context'"):
         read_plan_file("paper-contxt")
     with pytest.raises(InvalidValueError, match="cannot be read"):
@@ -168,7 +172,7 @@ def test_an_unknown_plan_is_told_with_the_nearest() -> None:
         {"wordings": "train", "split": "random", "episodes": "5,99999", "max_steps": 60},
     ],
 )
-def test_a_plan_and_its_files_are_the_same_plan(tmp_path: Path, options: dict[str, Any]) -> None:
+def test_a_plan_and_its_files_are_the_same_plan(tmp_path, options):
     """Both as YAML and as the plan.json that a run writes."""
     plan = make_plan(["random", "mine=oracle"], **{"tasks": "PickXtimes", **options})
     write_plan(plan, tmp_path)
@@ -180,9 +184,10 @@ def test_a_plan_and_its_files_are_the_same_plan(tmp_path: Path, options: dict[st
         assert again.fingerprint == plan.fingerprint
 
 
-def test_workers_are_placed_only_where_their_labels_are() -> None:
+def test_workers_are_placed_only_where_their_labels_are():
     needs = WorkerNeeds(cpus=1.5, gpus=0.25, memory_gb=2.0, labels={"rack": "b"})
     usual = {"CPU": 9.0, "GPU": 1.0, "memory": 7e9}  # for 6, 4 and 3
+
     for rack, changes, slots in (
         ("a", {}, 0),
         ("b", {}, 3),

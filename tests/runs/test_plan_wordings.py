@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 from msgspec.structs import replace
@@ -47,44 +46,46 @@ def a_plan(path: Path, **options: object) -> Plan:
     return make_plan(["random"], **(chosen | {"wordings": str(path)} | options))
 
 
-def test_jobs_name_the_wordings_and_their_file(wording_file: Path) -> None:
+def test_jobs_name_the_wordings_and_their_file(wording_file):
     plan = a_plan(wording_file)
     jobs = plan.jobs()
     assert len(jobs) == 2 * 3
+
     (identity,) = {job.options.wordings for job in jobs}
     assert identity.startswith("test@")
     assert {job.wordings_file for job in jobs} == {str(wording_file)}
+
     own = make_plan(["random"], tasks="PickXtimes", settings="explicit", episodes="2")
     assert {(job.options.wordings, job.wordings_file) for job in own.jobs()} == {(None, None)}
+
     # The same episodes in other words are other episodes; a file may be moved.
     moved = replace(jobs[0], wordings_file="elsewhere.toml")
     assert identity_key(moved) == identity_key(jobs[0]) != identity_key(own.jobs()[0])
 
 
-def test_a_stored_plan_does_not_need_the_file(wording_file: Path, tmp_path: Path) -> None:
+def test_a_stored_plan_does_not_need_the_file(wording_file, tmp_path):
     plan = a_plan(wording_file)
     write_plan(plan, tmp_path)
     wording_file.unlink()
+
     stored = read_plan(tmp_path)
+
     assert stored == plan
     assert stored.jobs() == plan.jobs()
 
 
-def test_a_relative_path_is_made_absolute(
-    wording_file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_relative_path_is_made_absolute(wording_file, monkeypatch):
     monkeypatch.chdir(wording_file.parent)
     found = a_plan(Path("test.toml")).wordings
     assert found.file == str(wording_file)
 
 
 @pytest.mark.usefixtures("forgetful")
-def test_a_job_opens_its_file_and_checks_it(
-    wording_file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_job_opens_its_file_and_checks_it(wording_file, monkeypatch):
     job = a_plan(wording_file).jobs()[0]
     monkeypatch.setattr(wording_store, "_OPEN", {})
     assert instruct_job(job).text.startswith("pick up the ")
+
     monkeypatch.setattr(wording_store, "_OPEN", {})
     wording_file.write_text(FILE.replace("pick up", "grab"))
     with pytest.raises(
@@ -103,9 +104,7 @@ def test_a_job_opens_its_file_and_checks_it(
         ("name = 'a'\ntasks = ['PickXtime']", {}, r"test.toml: There is no task 'PickXtime'"),
     ],
 )  # fmt: skip
-def test_what_the_wordings_lack_stops_a_plan(
-    wording_file: Path, content: str, options: dict[str, Any], words: str
-) -> None:
+def test_what_the_wordings_lack_stops_a_plan(wording_file, content, options, words):
     wording_file.write_text(content)
     with pytest.raises(InvalidValueError, match=words):
         a_plan(wording_file, **options)
@@ -114,27 +113,30 @@ def test_what_the_wordings_lack_stops_a_plan(
 
 
 @pytest.mark.usefixtures("forgetful")
-def test_a_job_in_our_own_words_opens_no_file(wording_file: Path) -> None:
+def test_a_job_in_our_own_words_opens_no_file(wording_file):
     job = a_plan(wording_file).jobs()[0].with_options(wordings=None)
     own = instruct_job(job)
     assert own.metadata["wordings"] is None
+
     missing = replace(job, wordings_file="missing.toml")
     assert instruct_job(missing) == own
 
 
 @pytest.mark.usefixtures("forgetful")
 def test_a_records_words_are_those_of_its_file_and_are_compared_where_it_is_there(
-    wording_file: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    wording_file, monkeypatch
+):
     """A report can be made without the file, and a resumed run finds other words of ours."""
     wording_file.write_text(SPOKEN)
     job = a_plan(wording_file).jobs()[0]
     record = begin_record(PreparedJob(job))
     assert record.words == words_of("PickXtimes", job.pool, wordings=job.options.wordings)
     assert record.words != words_of("PickXtimes", job.pool)
+
     other = replace(record, words=words_of("PickXtimes", job.pool))
     assert not other_versions(record)
     assert [mismatch.what for mismatch in other_versions(other)] == [WORDS]
+
     for text in (SPOKEN.replace("Do", "Move"), None):
         monkeypatch.setattr(wording_store, "_OPEN", {})
         if text is None:

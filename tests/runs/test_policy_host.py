@@ -91,7 +91,7 @@ def relayed(call: Call) -> Call:
         return receive_call(theirs)
 
 
-def test_arrays_of_every_kind_travel_through_the_supervisor() -> None:
+def test_arrays_of_every_kind_travel_through_the_supervisor():
     value = {
         "history": [{"a": np.arange(6, dtype=np.int16).reshape(2, 3)}, {"a": np.float32(2.5)}],
         "none": np.zeros((0, 256, 256, 3), np.uint8),
@@ -101,16 +101,17 @@ def test_arrays_of_every_kind_travel_through_the_supervisor() -> None:
     }
     found = relayed(relayed(Call("act", value=value))).value
     np.testing.assert_equal(found, value)
+
     found["turned"][0, 0] = 7.0  # a policy may write into what it gets
 
 
 @pytest.mark.parametrize("value", [object(), np.array([object()]), {"world": PaperRunner}])
-def test_nothing_but_plain_data_and_arrays_is_sent(value: object) -> None:
+def test_nothing_but_plain_data_and_arrays_is_sent(value):
     with pytest.raises(TypeError):
         send(socket.socket(), Call("act", value=value))
 
 
-def test_a_hosted_policy_gets_what_a_policy_gets(pool: HostPool, write_policy: Write) -> None:
+def test_a_hosted_policy_gets_what_a_policy_gets(pool, write_policy):
     spec = write_policy(
         "curious",
         """
@@ -140,6 +141,7 @@ class It:
     )
     policy = HostedPolicy(pool.connect(), read_policy(spec), 5)
     assert PolicyNeeds.of(policy) == PolicyNeeds(observe_every=4, depth=True, prompt_tokens=7)
+
     frames = np.random.default_rng(0).integers(0, 255, (30, 256, 256, 3), np.uint8)
     policy.reset("Pick it.", {"front_rgb": frames, "joint_positions": np.zeros((30, 7))})
     assert policy.metadata == {
@@ -149,21 +151,21 @@ class It:
         "sum": int(frames.sum(dtype=np.int64)),
         "shape": [30, 256, 256, 3],
     }
+
     picture = np.full((256, 256, 3), 9, np.uint8)
     observation: Any = {"front_rgb": picture, "history": ({"front_rgb": picture},)}
     assert np.array_equal(policy.act(observation), np.full((2, 8), 9.0))
     assert picture.all()  # the world's own is untouched
+
     policy.hear("The blue one.", 3)
     assert policy.metadata["heard"] == ["The blue one.", 3]
     assert policy.usage() == {"calls": 2.0}
+
     policy.close()
     policy.close()
 
 
-def test_pictures_of_a_video_are_drawn_when_they_are_read_and_then_sent_at_once(
-    pool: HostPool,
-    write_policy: Write,
-) -> None:
+def test_pictures_of_a_video_are_drawn_when_they_are_read_and_then_sent_at_once(pool, write_policy):
     spec = write_policy(
         "choosy",
         """
@@ -186,6 +188,7 @@ class It:
             return super().__getitem__(field)
 
     drawn = []
+
     for _ in range(2):
         video = Video(front_rgb=np.zeros((2, 4, 4, 3), np.uint8), joint_positions=np.zeros((2, 7)))
         video["wrist_rgb"] = video["wrist_depth"] = np.zeros((2, 4, 4, 3), np.uint8)
@@ -196,6 +199,7 @@ class It:
         policy.act({})  # type: ignore[typeddict-item]
         policy.close()
         assert sorted(video.drawn) == sorted(video)
+
     assert drawn[0] == ["joint_positions", "front_rgb"]
     # The second episode knows what the first one read.
     assert sorted(drawn[1]) == sorted(video)
@@ -212,30 +216,30 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[Job, dict[str, Any]]
 
 
 @pytest.mark.parametrize(("workers", "batch"), slow_but([(3, 3)], [(3, 3), (0, 16), (5, 16)]))
-def test_records_do_not_depend_on_workers_or_batches(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, alone: Any, workers: int, batch: int
-) -> None:
+def test_records_do_not_depend_on_workers_or_batches(tmp_path, monkeypatch, alone, workers, batch):
     monkeypatch.setenv("ROBOIRG_TEST_SIZES", str(tmp_path / "sizes"))
     plan = changed(paper_plan("Dice", batch=batch), policies=PLAYERS)
-    executor = LocalProcesses(workers) if workers else InProcess()
-    found = play(plan, tmp_path / "run", executor)
+
+    found = play(plan, tmp_path / "run", LocalProcesses(workers) if workers else InProcess())
+
     assert found == alone
     assert {record["outcome"] for record in found.values()} == {"success", "failure", "error"}
     # What fails for one episode of a batch costs only that one.
-    causes = [record["cause"] for record in found.values() if record["outcome"] == "error"]
-    assert set(causes) == {"policy: ValueError: one of them is bad (hosting_fakes.py, line 185)"}
+    causes = {record["cause"] for record in found.values() if record["outcome"] == "error"}
+    assert causes == {"policy: ValueError: one of them is bad (hosting_fakes.py, line 188)"}
+
     sizes = [int(line) for line in (tmp_path / "sizes").read_text().split()]
     assert sum(sizes) == 8 * hosting_fakes.LENGTH / 4
     assert max(sizes) <= min(batch, max(workers, 1))
     if workers > 2:  # of three, two wait while one is asked about
         assert max(sizes) > 1
+
     # One object, however many worlds there are.
-    records = read_records(tmp_path / "run")
-    made = {one.policy_metadata["made"] for one in records if "Batched" in one.policy}
-    assert made == {1}
+    batched = [record for record in read_records(tmp_path / "run") if "Batched" in record.policy]
+    assert {record.policy_metadata["made"] for record in batched} == {1}
 
 
-def test_a_privileged_policy_stays_beside_the_world(tmp_path: Path, write_policy: Write) -> None:
+def test_a_privileged_policy_stays_beside_the_world(tmp_path, write_policy):
     spec = write_policy(
         "insider",
         """
@@ -250,13 +254,15 @@ class It:
 """,
     )
     play(paper_plan(f"privileged:{spec}", 1).checked(), tmp_path / "run", InProcess())
+
     (record,) = read_records(tmp_path / "run")
+
     assert record.privileged
     assert record.policy == "privileged:insider:It"
     assert "token" in str(record.policy_metadata["secret"])
 
 
-def test_each_device_has_a_process(write_policy: Write) -> None:
+def test_each_device_has_a_process(write_policy):
     ref = read_policy(
         write_policy(
             "located",
@@ -272,6 +278,7 @@ class It(hostile_policies.Hostile):
         for world in worlds:
             world.reset("Pick it.", {})
         found = [(world.metadata["device"], world.metadata["process"]) for world in worlds]
+
     assert sorted(device for device, _ in found) == ["0", "0", "3", "3"]
     assert len(set(found)) == 2
 
@@ -279,23 +286,24 @@ class It(hostile_policies.Hostile):
 # What a policy is
 
 
-def test_which_policies_get_a_process(tmp_path: Path) -> None:
+def test_which_policies_get_a_process(tmp_path):
     (tmp_path / "mine.toml").write_text('name = "mine"\npolicy = "somewhere:Mine"\n')
     foreign = ["somewhere:Mine", f"system:{tmp_path}/mine.toml"]
     ours = ["oracle", "random", "openpi://localhost:1", "system:GroundSG-QwenVL"]
-    assert [read_policy(one).is_foreign for one in foreign] == [True, True]
-    assert [read_policy(one).is_hosted for one in foreign] == [True, True]
-    assert not any(read_policy(one).is_hosted for one in ours)
+
+    assert [read_policy(spec).is_foreign for spec in foreign] == [True, True]
+    assert [read_policy(spec).is_hosted for spec in foreign] == [True, True]
+    assert not any(read_policy(spec).is_hosted for spec in ours)
     assert read_policy("lerobot://some/checkpoint").is_hosted
     assert not read_policy("lerobot://some/checkpoint").is_foreign
 
 
-def test_an_import_that_never_ends_is_ended(write_policy: Write) -> None:
+def test_an_import_that_never_ends_is_ended(write_policy):
     with pytest.raises(InvalidValueError, match=r"not opened within 0[.]5 s"):
         open_policy(read_policy(write_policy("endless", "time.sleep(3600)")), 0.5)
 
 
-def test_a_policy_is_described_without_being_imported(write_policy: Write) -> None:
+def test_a_policy_is_described_without_being_imported(write_policy):
     spec = write_policy(
         "versioned",
         """
@@ -308,6 +316,7 @@ class It:
 """,
     )
     found = open_policy(read_policy(spec))
+
     assert found.version.startswith(r"\x1b[2J\u202e\n-?77")  # never controls a terminal
     assert len(found.version) < 220
     assert found.needs == PolicyNeeds(prompt_tokens=9, cameras=("front",))
@@ -328,8 +337,8 @@ class It:
     ],
 )
 def test_a_policy_that_cannot_be_loaded_is_reported_before_the_run(
-    text: str, error: type, words: str, write_policy: Write
-) -> None:
+    text, error, words, write_policy
+):
     with pytest.raises(error, match=words):
         paper_plan(write_policy("broken", text), 1).checked()
 
@@ -342,7 +351,7 @@ def child_of(pool: HostPool) -> PolicyChild:
     return child
 
 
-def test_only_the_episode_to_blame_learns_of_a_crash(pool: HostPool, write_policy: Write) -> None:
+def test_only_the_episode_to_blame_learns_of_a_crash(pool, write_policy):
     spec = write_policy(
         "fragile",
         """
@@ -359,13 +368,16 @@ class It:
     good, bad, over, late = (HostedPolicy(pool.connect(), read_policy(spec), 0) for _ in range(4))
     good.reset("live", {})
     bad.reset("die", {})
+
     assert good.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
     with pytest.raises(EpisodeError) as guilty:
         bad.act({})  # type: ignore[typeddict-item]
     assert guilty.value.kind == "policy"
     assert str(guilty.value) == "the process ended with exit code 7 in the policy's act()"
+
     child = child_of(pool)
     child.check(0.1)
+
     # All who ask are told alike, even after a check.
     expected = Loss("policy", "the process ended with exit code 7", b"last words\n")
     assert child.loss() == child.loss() == expected
@@ -373,17 +385,17 @@ class It:
         good.act({})  # type: ignore[typeddict-item]
     with pytest.raises(EpisodeLostError):
         over.usage()  # what it has cost is lost
-    for one in (good, bad, over, late):
-        one.close()
+
+    for policy in (good, bad, over, late):
+        policy.close()
     again = HostedPolicy(pool.connect(), read_policy(spec), 0)  # in a new process
     again.reset("live", {})
     assert again.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
+
     again.close()
 
 
-def test_those_who_were_asked_together_are_played_again_alone(
-    host: Host,
-) -> None:
+def test_those_who_were_asked_together_are_played_again_alone(host):
     """Would catch that each of them is to blame for a process that ends in their call."""
     text = """
 from roboirg.runs.hosting import host_process
@@ -396,29 +408,31 @@ class It(hostile_policies.Hostile):
 """
     world = host("joint", text)
     world.reset("Pick it.", {})
+
     with pytest.raises(EpisodeLostError, match="exit code 5") as lost:
         world.act({})  # type: ignore[typeddict-item]
     assert lost.value.alone
 
 
-def test_a_host_goes_on_after_worlds_that_die_or_are_interrupted(
-    pool: HostPool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_host_goes_on_after_worlds_that_die_or_are_interrupted(pool, monkeypatch):
     """Would catch an interrupt that is forgotten, and a worker to whom nobody listens any more."""
 
     class Video(dict[str, Any]):
         def __getitem__(self, field: str) -> Any:
             raise KeyboardInterrupt
 
-    hosts, ref = pool.connect(), read_policy("hosting_fakes:Dice")
+    hosts = pool.connect()
+    ref = read_policy("hosting_fakes:Dice")
     with monkeypatch.context() as without:
         without.setattr(host_pool, "PolicyChild", lambda _environment: os.open("/nonexistent", 0))
         with pytest.raises(EpisodeLostError, match="could not be started"):
             HostedPolicy(hosts, ref, 0)
     world = HostedPolicy(hosts, ref, 0)
+
     with pytest.raises(KeyboardInterrupt):
         world.reset("Pick it.", Video(front_rgb=None))
     assert world.usage() == {}
+
     world.close()
     line = pool.connect()
     HostedPolicy(line, ref, 0)
@@ -428,9 +442,8 @@ def test_a_host_goes_on_after_worlds_that_die_or_are_interrupted(
 
 
 def test_time_in_the_queue_is_not_the_calls_and_what_hangs_between_calls_is_ended(
-    pool: HostPool,
-    write_policy: Write,
-) -> None:
+    pool, write_policy
+):
     """Would catch a limit that begins when a call is sent, and a wait without any limit."""
     spec = write_policy(
         "stopping",
@@ -450,15 +463,17 @@ class It:
         list(threads.map(lambda world: world.reset("wait", {}), worlds))  # the last for 6 s
     worlds[0].hear("stop", 0)
     time.sleep(1)
+
     with pytest.raises(EpisodeLostError, match="began no call within 4 s"):
         worlds[1].act({})  # type: ignore[typeddict-item]
+
     for world in worlds:
         world.close()
 
 
 def test_a_call_is_not_to_blame_for_a_process_that_another_world_has_ended(
-    pool: HostPool, tmp_path: Path, write_policy: Write
-) -> None:
+    pool, tmp_path, write_policy
+):
     """Would catch a call that begins when an earlier one returns just after its limit."""
     text = """
 class It(hostile_policies.Hostile):
@@ -468,7 +483,8 @@ class It(hostile_policies.Hostile):
 """
     ref = read_policy(write_policy("sleepy", text))
     hosts = pool.connect()
-    late, world = HostedPolicy(hosts, ref, 0), HostedPolicy(pool.connect(), ref, 0)
+    late = HostedPolicy(hosts, ref, 0)
+    world = HostedPolicy(pool.connect(), ref, 0)
     with ThreadPoolExecutor() as threads:
         call = threads.submit(world.reset, "Pick it.", {})
         while not (tmp_path / "begun").exists():
@@ -479,13 +495,11 @@ class It(hostile_policies.Hostile):
     late.close()
 
 
-def test_a_process_is_no_hanging_one_while_it_starts_or_its_world_draws(
-    pool: HostPool,
-    host: Host,
-) -> None:
+def test_a_process_is_no_hanging_one_while_it_starts_or_its_world_draws(pool, host):
     starting = PolicyChild(os.environ)
     starting.check(0.01)
     assert not starting.is_over
+
     starting.end()
     text = """
 class It(hostile_policies.Hostile):
@@ -500,14 +514,13 @@ class It(hostile_policies.Hostile):
             return super().__getitem__(field)
 
     world.reset("Pick it.", Video(front_rgb=np.ones((2, 4, 4, 3), np.uint8)))
+
     assert world.metadata == {"sum": 96}
+
     world.close()
 
 
-def test_answers_that_nobody_asked_for_hide_no_process_that_hangs(
-    pool: HostPool,
-    host: Host,
-) -> None:
+def test_answers_that_nobody_asked_for_hide_no_process_that_hangs(pool, host):
     text = """
 class It(hostile_policies.Hostile):
     def reset(self, instruction, demonstration):
@@ -517,15 +530,17 @@ class It(hostile_policies.Hostile):
     world.reset("Pick it.", {})
     *_, pid = descendants(os.getpid())
     os.kill(pid, signal.SIGSTOP)
+
     child_of(pool).check(0.1)
     assert child_of(pool).is_over
+
     world.close()
 
 
 @pytest.mark.parametrize("answer", ["nothing", "half a message", "to take in half a call"])
 def test_a_call_that_is_never_begun_ends_in_an_error_although_its_process_answers_checks(
-    pool: HostPool, write_policy: Write, monkeypatch: pytest.MonkeyPatch, answer: str
-) -> None:
+    pool, write_policy, monkeypatch, answer
+):
     text = """
 def answer_checks(supervisor, line, way):
     if way == "half a message":
@@ -550,13 +565,12 @@ class It(hostile_policies.Hostile):
     for name, seconds in (("DRAW_S", 1.0), ("MARGIN_S", 60.0)):
         monkeypatch.setattr(f"roboirg.runs.hosting.policy_child.{name}", seconds)
     picture: Any = {"front_rgb": np.zeros((2000, 2000, 3), np.uint8)}
+
     with pytest.raises(EpisodeError, match=r"did not begin the policy's act.., though"):
         world.act(picture)
 
 
-def test_messages_in_pieces_take_no_longer_than_a_call_may(
-    pool: HostPool, write_policy: Write
-) -> None:
+def test_messages_in_pieces_take_no_longer_than_a_call_may(pool, write_policy):
     text = """
 from roboirg.runs.hosting import host_process
 from roboirg.runs.hosting.messages import Outcome, send
@@ -576,10 +590,13 @@ class It(hostile_policies.Hostile):
         host_process.send = reply
 """
     ref = read_policy(write_policy("piecemeal", text))
-    early, world = HostedPolicy(pool.connect(), ref, 0), HostedPolicy(pool.connect(), ref, 0)
+    early = HostedPolicy(pool.connect(), ref, 0)
+    world = HostedPolicy(pool.connect(), ref, 0)
     early.reset("too early", {})
+
     with pytest.raises(EpisodeLostError, match="a message of 1,000 bytes"):
         early.reset("again", {})
+
     world._line._limit_s = 0.5
     with pytest.raises(EpisodeError, match=r"did not return within 0[.]5 s"):
         world.reset("slowly", {})
@@ -590,7 +607,8 @@ def host_pids(supervisor: int) -> list[int]:
     found = []
     for path in Path("/proc").glob("[0-9]*"):
         try:
-            status, line = (path / "stat").read_text(), (path / "cmdline").read_bytes()
+            status = (path / "stat").read_text()
+            line = (path / "cmdline").read_bytes()
         except OSError:
             continue
         if int(status.rpartition(")")[2].split()[1]) == supervisor and b"host_process" in line:
@@ -599,12 +617,14 @@ def host_pids(supervisor: int) -> list[int]:
 
 
 @pytest.mark.slow
-def test_killed_hosts_worlds_and_supervisors_lose_and_double_nothing(tmp_path: Path) -> None:
-    folder, undisturbed = tmp_path / "killed", tmp_path / "undisturbed"
+def test_killed_hosts_worlds_and_supervisors_lose_and_double_nothing(tmp_path):
+    folder = tmp_path / "killed"
+    undisturbed = tmp_path / "undisturbed"
     folder.mkdir()
     expected = play(hosting_fakes.KILLED_PLAN, undisturbed, InProcess())
     command = [sys.executable, hosting_fakes.__file__, str(folder)]
-    rng, struck = random.Random(0), 0
+    rng = random.Random(0)
+    struck = 0
     child = subprocess.Popen(command)
     for _ in range(KILLS):
         time.sleep(rng.uniform(0.1, 1.5))
@@ -623,18 +643,17 @@ def test_killed_hosts_worlds_and_supervisors_lose_and_double_nothing(tmp_path: P
         outcomes = {record.outcome for record in read_records(folder)}
         if done.returncode == 0 and "error" not in outcomes:
             break
+
     found = {record.identity: comparable(record) for record in read_records(folder)}
+
     assert found == expected
     assert struck
     assert not any(map(is_alive, worker_pids(folder)))
 
 
 def test_an_episode_that_is_lost_again_and_again_ends_in_an_error(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    write_policy: Write,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+    tmp_path, monkeypatch, write_policy, capfd
+):
     spec = write_policy(
         "deserter",
         """
@@ -652,7 +671,9 @@ class It:
     monkeypatch.setattr("roboirg.runs.play.rollout.MAX_LOSSES", 2)
     plan = paper_plan(spec, 1)
     runner: PaperRunner = paper_runner(plan, tmp_path, seconds=2.0)
+
     (record,) = InProcess().run(deque(plan.jobs()), runner)
+
     assert (record.outcome, record.error, record.attempt) == ("error", "policy", 2)
     assert "the process ended with exit code 5" in str(record.cause)
     assert "last words" in capfd.readouterr().err  # in a worker, of the episode's log

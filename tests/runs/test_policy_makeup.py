@@ -60,18 +60,20 @@ def refusal(action: Callable[[], object]) -> str:
 
 def meet(folder: Path, played: Two, before: PolicyRef, now: PolicyRef) -> dict:
     """Return what is said where results of two policies of one name meet."""
-    first, second = replace(played[0], ref=before), replace(played[1], ref=now)
+    first = replace(played[0], ref=before)
+    second = replace(played[1], ref=now)
     fill(folder / "a", first)
     fill(folder / "b", second)
     plan = small_plan(2).model_copy(update={"policies": (now,)})
-    refusals = {
-        "resumed": refusal(lambda: check_run(plan, folder / "a")),
-        "merged": refusal(lambda: merge_runs([folder / "b", folder / "a"], folder / "out")),
-        "stored": refusal(lambda: fill(folder / "a", second)),
+    ways = {
+        "resumed": lambda: check_run(plan, folder / "a"),
+        "merged": lambda: merge_runs([folder / "b", folder / "a"], folder / "out"),
+        "stored": lambda: fill(folder / "a", second),
     }
-    labels = [*make_frame([("a", [first]), ("b", [second])]).names.values()]
-    said = {name: text.replace(str(folder), ".") for name, text in refusals.items()}
-    return {**said, "labels": labels, "mixed": [*mixtures([first, second])]}
+    said: dict = {name: refusal(way).replace(str(folder), ".") for name, way in ways.items()}
+    said["labels"] = list(make_frame([("a", [first]), ("b", [second])]).names.values())
+    said["mixed"] = list(mixtures([first, second]))
+    return said
 
 
 OPENPI = "openpi://gpu:8000"
@@ -96,13 +98,13 @@ OTHERS = [
 
 @pytest.mark.parametrize(("before", "now"), [OTHERS[0], OTHERS[5], OTHERS[8]])
 def test_another_policy_of_the_same_name_is_refused_or_kept_apart(
-    before: str, now: str, played: Two, tmp_path: Path, snapshot
-) -> None:
+    before, now, played, tmp_path, snapshot
+):
     """In one sentence with both values; tables name the difference in their labels."""
     assert meet(tmp_path, played, named(before), named(now)) == snapshot
 
 
-def test_what_a_policy_is_tells_it_from_others(snapshot) -> None:
+def test_what_a_policy_is_tells_it_from_others(snapshot):
     found = [read_policy(before).versions.differences(read_policy(now).versions)
              for before, now in OTHERS]  # fmt: skip
     lines = [[f"{what}: {first} | {second}" for what, first, second in each] for each in found]
@@ -137,36 +139,39 @@ def checkpoints(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.mark.parametrize(("before", "now"), SAME)
-def test_a_policy_that_moved_or_is_typed_otherwise_is_the_same(
-    before: str, now: str, checkpoints: dict[str, Path]
-) -> None:
+def test_a_policy_that_moved_or_is_typed_otherwise_is_the_same(before, now, checkpoints):
     refs = [read_policy(spec.format(**checkpoints)) for spec in (before, now)]
     assert refs[0].makeup == refs[1].makeup != ()
 
 
-def test_a_policy_that_moved_goes_on_in_its_folder(played: Two, tmp_path: Path) -> None:
+def test_a_policy_that_moved_goes_on_in_its_folder(played, tmp_path):
     found = meet(tmp_path, played, *(named(spec) for spec in SAME[1]))
     assert found == {"resumed": "", "merged": "", "stored": "", "labels": ["random"], "mixed": []}
 
 
-def test_a_checkpoint_with_other_bytes_is_another(tmp_path: Path) -> None:
+def test_a_checkpoint_with_other_bytes_is_another(tmp_path):
     file = tmp_path / "model.safetensors"
     (tmp_path / "config.json").write_text("{}")
     found = set()
+
     for content in ("weights", "other"):
         file.write_text(content)
         found.add(read_policy(f"lerobot://{tmp_path}").makeup)
+
     assert len(found) == 2
 
 
-def test_a_machine_with_other_bytes_at_the_path_is_named(tmp_path: Path) -> None:
+def test_a_machine_with_other_bytes_at_the_path_is_named(tmp_path):
     file = tmp_path / "config.json"
     file.write_text("{}")
     versions = MachineVersions((read_policy(f"lerobot://{tmp_path}"),))
     agent = MachineAgent(tmp_path / "agent", None)
+
     assert agent.check(versions).fault is None
+
     file.write_text('{"n_action_steps": 1}')
     assert str(agent.check(versions).fault).startswith("the policy of lerobot://")
+
     agent.close()
 
 
@@ -209,7 +214,7 @@ def registry() -> Iterator[tuple[str, type[BaseModel]]]:
     yield "vlm-listener:openai?model=m", ListenerOptions
 
 
-def test_every_option_of_every_kind_is_compared_unless_it_is_declared_not_to_be() -> None:
+def test_every_option_of_every_kind_is_compared_unless_it_is_declared_not_to_be():
     for spec, kind in registry():
         before = read_policy(spec)
         target = spec.partition(":")[2].partition("?")[0].replace("openai", "listener")
@@ -224,13 +229,11 @@ def test_every_option_of_every_kind_is_compared_unless_it_is_declared_not_to_be(
             assert (before.makeup != now.makeup) == is_compared, (spec, name)
 
 
-def test_every_built_in_policy_is_one_of_its_own() -> None:
+def test_every_built_in_policy_is_one_of_its_own():
     assert len({read_policy(spec).makeup for spec in BUILTIN}) == len(BUILTIN)
 
 
-def test_of_a_kind_of_others_everything_that_is_typed_counts(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_of_a_kind_of_others_everything_that_is_typed_counts(tmp_path, monkeypatch):
     for module in (finding, policy_kinds):
         monkeypatch.setattr(module, "known_kinds", lambda: {"lab": False})
     for name in ("weights", "copy"):
@@ -239,18 +242,23 @@ def test_of_a_kind_of_others_everything_that_is_typed_counts(
         "lab:walk", "lab:run", "lab:walk?fast=yes", "lab:walk?fast=no", "lab:walk?hands=left",
         f"lab:{tmp_path}/weights?a=1&b=2", f"lab:{tmp_path}/copy?b=2&a=1",
     ]  # fmt: skip
+
     found = [read_policy(spec).makeup for spec in specs]
+
     assert len({*found[:-1]}) == len(found) - 1
     assert found[-1] == found[-2]
 
 
-def test_objects_of_two_classes_are_two_policies_even_if_they_declare_one_version() -> None:
+def test_objects_of_two_classes_are_two_policies_even_if_they_declare_one_version():
     class Mine(RandomPolicy):
         version = "7"
 
     class Other(Mine):
         pass
 
-    found = [policy_of(one, NAME).makeup for one in (Mine(), Other(), Privileged(Mine()), Mine())]
+    found = [
+        policy_of(policy, NAME).makeup for policy in (Mine(), Other(), Privileged(Mine()), Mine())
+    ]
+
     assert found[0] == found[3]
     assert len(set(found)) == 3

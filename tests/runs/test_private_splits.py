@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import tempfile
 import zipfile
@@ -45,40 +46,45 @@ def names_of(episodes: int, task: str, split: str) -> list[int]:
     return [get_episode(task, split, index).seed for index in range(episodes)]
 
 
-def test_a_salt_has_a_split_of_its_own() -> None:
+def test_a_salt_has_a_split_of_its_own():
     first = use_salt(SALT)
     assert is_private(first)
     seeds = {task: names_of(4, task, first) for task in find_tasks([ALL])}
     second = use_salt(OTHER)
-    others = {task: names_of(4, task, second) for task in find_tasks([ALL])}
-    found = [seed for each in (seeds, others) for one in each.values() for seed in one]
+    other_seeds = {task: names_of(4, task, second) for task in find_tasks([ALL])}
+
+    found = [*itertools.chain(*seeds.values(), *other_seeds.values())]
     assert len(set(found)) == len(found)
     # No public seed is as large: 10,000,000 + 100 for each of a million episodes.
     assert min(found) > 1 << 40
     assert max(found) < 1 << 53  # a page's script can hold it
+
     use_salt(SALT)
     assert names_of(4, "PickXtimes", first) == seeds["PickXtimes"]
     assert split_size(first) == split_size("random")
 
 
-def test_the_name_and_episodes_of_a_salt_never_change() -> None:
+def test_the_name_and_episodes_of_a_salt_never_change():
     assert use_salt("pinned-salt-0123") == "random@9be1761e24b2"
     seeds = names_of(2, "PickXtimes", "random@9be1761e24b2")
     assert seeds == [343211101013922, 319322239144157]
 
 
-def test_difficulties_repeat_and_scenes_are_those_of_their_seeds() -> None:
+def test_difficulties_repeat_and_scenes_are_those_of_their_seeds():
     split = use_salt(SALT)
     episodes = [get_episode("BinFill", split, index) for index in range(8)]
-    assert [one.difficulty for one in episodes] == [*CYCLE, *CYCLE]
-    for one in episodes:
-        made = make_episode("BinFill", one.seed, one.difficulty)
-        assert (made.scene, made.goal) == (one.scene, one.goal)
+
+    assert [episode.difficulty for episode in episodes] == [*CYCLE, *CYCLE]
+    for episode in episodes:
+        made = make_episode("BinFill", episode.seed, episode.difficulty)
+        assert (made.scene, made.goal) == (episode.scene, episode.goal)
 
 
-def test_seeds_without_a_scene_are_passed_over() -> None:
-    split, task = use_salt(SALT), "VideoPlaceOrder"
+def test_seeds_without_a_scene_are_passed_over():
+    split = use_salt(SALT)
+    task = "VideoPlaceOrder"
     rejected = 0
+
     for index in range(30):
         episode = get_episode(task, split, index)
         tried = 0
@@ -88,10 +94,11 @@ def test_seeds_without_a_scene_are_passed_over() -> None:
                 make_episode(task, seed, episode.difficulty)
             tried += 1
         rejected += tried
+
     assert rejected > 0
 
 
-def test_without_its_salt_a_split_is_refused() -> None:
+def test_without_its_salt_a_split_is_refused():
     split = use_salt(SALT)
     for other in ("", OTHER):
         os.environ[SALT_VARIABLE] = other
@@ -101,18 +108,19 @@ def test_without_its_salt_a_split_is_refused() -> None:
             make_plan(["oracle"], split=split, episodes="1")
 
 
-def test_what_a_salt_must_be() -> None:
+def test_what_a_salt_must_be():
     with pytest.raises(InvalidValueError, match="at least 12") as found:
         use_salt("short")
     assert "short" not in str(found.value)
     assert known_salt() is None
     assert drawn_split("random") == "random"
+
     split = use_salt(SALT)
     assert drawn_split("random") == split
     assert drawn_split("test") == "test"
 
 
-def test_a_policy_in_the_worlds_process_is_refused() -> None:
+def test_a_policy_in_the_worlds_process_is_refused():
     split = use_salt(SALT)
     with pytest.raises(InvalidValueError, match="own"):
         make_plan(["oracle"], split=split, episodes="1", policy_process="shared")
@@ -130,17 +138,22 @@ def contents(folder: Path) -> bytes:
     return b"\n".join(found)
 
 
-def test_results_are_read_without_the_salt(tmp_path: Path) -> None:
-    split, run = use_salt(SALT), tmp_path / "run"
+def test_results_are_read_without_the_salt(tmp_path):
+    split = use_salt(SALT)
+    run = tmp_path / "run"
     run.mkdir()
     plan = make_plan(["oracle"], tasks="PickXtimes", split=split, episodes="3")
     fake_run(run, plan)
+
     assert "are private" not in write_report(Source(run)).read_text()
+
     os.environ[SALT_VARIABLE] = ""
     assert plan.drawable_jobs() == ()
+
     merge_runs([run], tmp_path / "merged")
     pack_run(run, tmp_path / "run.roboirg.zip")
     assert f"The episodes of {split} are private" in write_report(Source(run)).read_text()
+
     call("tables", run)
     for command in (("leaderboard", "verify", run), ("show", "PickXtimes", 0, "--split", split)):
         with pytest.raises(MissingSaltError):
@@ -148,27 +161,27 @@ def test_results_are_read_without_the_salt(tmp_path: Path) -> None:
     assert SALT.encode() not in contents(tmp_path)
 
 
-def test_the_salt_is_in_no_line_of_a_command(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_salt_is_in_no_line_of_a_command(tmp_path, monkeypatch):
     monkeypatch.setenv(SALT_VARIABLE, SALT)
     options = ["--policy", "random", "--split", "random", "--episodes", "1", "--dry-run"]
+
     assert SALT not in call("run", "--out", tmp_path / "run", *options)
     assert SALT.encode() not in contents(tmp_path)
 
 
 @pytest.mark.slow
-def test_workers_of_a_cluster_get_the_salt_of_the_command(tmp_path: Path) -> None:
+def test_workers_of_a_cluster_get_the_salt_of_the_command(tmp_path):
     ray = pytest.importorskip("ray")
     with tempfile.TemporaryDirectory(prefix="ray-") as logs:  # short: sockets are in it
         ray.init(num_cpus=1, log_to_driver=False, include_dashboard=False, _temp_dir=logs)
         try:
-            split, run = use_salt(SALT), tmp_path / "run"  # the cluster was started without it
+            split = use_salt(SALT)
+            run = tmp_path / "run"  # the cluster was started without it
             plan = make_plan(["oracle"], tasks="PickXtimes", split=split, episodes="1")
             run_plan(plan, run, FakePlay(), RayCluster(1))
         finally:
             ray.shutdown()
-        assert {one.split for one in read_records(run)} == {split}
+        assert {record.split for record in read_records(run)} == {split}
         written = contents(Path(logs))
         assert b"raylet" in written
         assert SALT.encode() not in written

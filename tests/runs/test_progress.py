@@ -5,7 +5,6 @@ import itertools
 import re
 from types import SimpleNamespace
 
-import pytest
 from msgspec.structs import replace
 from rich.console import Console
 from run_fakes import FakePlay, small_plan
@@ -26,23 +25,25 @@ def report(records: list[Record], *, terminal: bool) -> str:
     return console.file.getvalue()  # type: ignore[attr-defined]
 
 
-def test_a_terminal_sees_pace_time_left_and_score_in_80_columns() -> None:
+def test_a_terminal_sees_pace_time_left_and_score_in_80_columns():
     text = report(RECORDS, terminal=True)
     last = text[text.rindex("episodes") :]
     assert "6/6" in last
     assert "0:00 left" in last
     assert "/min" in last
+
     won = {
-        setting: sum(one.outcome == "success" for one in RECORDS if one.setting == setting)
+        setting: sum(record.outcome == "success" for record in RECORDS if record.setting == setting)
         for setting in ("direct", "explicit")
     }
     assert f"direct {won['direct']}/2 · explicit {won['explicit']}/2" in last
 
 
-def test_elsewhere_every_episode_is_one_plain_line(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_elsewhere_every_episode_is_one_plain_line(monkeypatch):
     """The time left goes by the pace of this run, a minute an episode, not by what was stored."""
     minutes = itertools.count(0, 60)
     monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=minutes.__next__))
+
     lines = report(
         [
             RECORDS[0],
@@ -51,6 +52,7 @@ def test_elsewhere_every_episode_is_one_plain_line(monkeypatch: pytest.MonkeyPat
         ],
         terminal=False,
     ).splitlines()
+
     assert lines[0] == "2 of 6 episodes already stored."
     assert [*lines[1].split()[:6], *lines[2].split()[4:8]] == [
         "[3/6]", "random", "PickXtimes", "test/0", "direct:", "failure:",
@@ -60,12 +62,12 @@ def test_elsewhere_every_episode_is_one_plain_line(monkeypatch: pytest.MonkeyPat
     assert "\x1b" not in "".join(lines)
 
 
-def test_a_warning_is_printed_at_once_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_warning_is_printed_at_once_on_stderr(capsys):
     ConsoleReporter(Console(file=io.StringIO())).warn("Mind the gap.")
     assert capsys.readouterr().err == "Mind the gap.\n"
 
 
-def test_errors_are_in_the_score_but_in_no_rate() -> None:
+def test_errors_are_in_the_score_but_in_no_rate():
     """What is played again is not done twice."""
     text = report([RECORDS[0], replace(RECORDS[0], outcome="error", attempt=2)], terminal=True)
     assert re.search(r"3/6.*direct 0/1 · errors 1", text[text.rindex("episodes") :], re.DOTALL)

@@ -57,8 +57,8 @@ def cluster() -> Iterator[Any]:
 
 
 def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
-    cluster: Any, tmp_path: Path, here: list[dict[str, object]]
-) -> None:
+    cluster, tmp_path, here
+):
     doomed = cluster.add_node(num_cpus=1)
     cluster.add_node(num_cpus=1)
     ray.init(address=cluster.address, log_to_driver=False)
@@ -96,12 +96,11 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
         run_plan(PLAN, tmp_path / "b", FakePlayer(tmp_path, fatal=0), RayCluster(1))
 
 
-def test_the_workers_of_a_machine_share_its_policy_hosts(
-    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_workers_of_a_machine_share_its_policy_hosts(cluster, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(Path(hosting_fakes.__file__).parent)
     plan = paper_plan("Resident", 12)
-    local, far = tmp_path / "local", tmp_path / "far"
+    local = tmp_path / "local"
+    far = tmp_path / "far"
     for folder in (local, far):
         folder.mkdir()
     run_plan(plan, local, paper_runner(plan, local), LocalProcesses(2))
@@ -114,8 +113,8 @@ def test_the_workers_of_a_machine_share_its_policy_hosts(
         RayCluster(),
     )
 
-    assert [one | {"usage": None} for one in all_comparable(far)] == [
-        one | {"usage": None} for one in all_comparable(local)
+    assert [record | {"usage": None} for record in all_comparable(far)] == [
+        record | {"usage": None} for record in all_comparable(local)
     ]
     assert len(worker_pids(far)) == 3
     hosts = {int(record.usage["process"]) for record in read_records(far)}
@@ -127,20 +126,21 @@ def test_the_workers_of_a_machine_share_its_policy_hosts(
     pytest.fail("a policy's process is left")
 
 
-def test_a_cluster_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
+def test_a_cluster_that_is_not_there_is_one_sentence(tmp_path):
     with pytest.raises(RoboIRGError, match=r"cluster '127\.0\.0\.1:1' cannot be joined") as caught:
         run_plan(PLAN, tmp_path, FakePlayer(tmp_path), RayCluster(address="127.0.0.1:1"))
     assert "\n" not in str(caught.value)
 
 
-def test_no_workers_is_one_sentence() -> None:
+def test_no_workers_is_one_sentence():
     with pytest.raises(InvalidValueError, match="workers is 0"):
         RayCluster(0)
 
 
-def test_only_who_has_the_key_reaches_the_hosts_of_a_machine(tmp_path: Path) -> None:
+def test_only_who_has_the_key_reaches_the_hosts_of_a_machine(tmp_path):
     hosts = MachineAgent(tmp_path / "agent", HostSettings())
     address = hosts.check(MachineVersions(())).hosts
+
     try:
         with address._replace(key=b"x" * 32).connect() as stranger:
             assert stranger.recv(1) == b""
@@ -151,4 +151,5 @@ def test_only_who_has_the_key_reaches_the_hosts_of_a_machine(tmp_path: Path) -> 
             HostedPolicy(line, read_policy("hosting_fakes:Dice"), 0).close()
     finally:
         hosts.close()
+
     assert not Path(address.path).exists()

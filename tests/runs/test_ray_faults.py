@@ -76,26 +76,30 @@ FAULTS = (
 )
 
 
-def test_a_bad_machine_is_left_out_and_named_once(cluster: Any, tmp_path: Path) -> None:
+def test_a_bad_machine_is_left_out_and_named_once(cluster, tmp_path):
     cluster.add_node(num_cpus=1, env_vars={BAD_MACHINE: "1"})
     for number, (play, policy, fault) in enumerate(FAULTS):
-        warnings, folder = mock.Mock(spec=Reporter), tmp_path / str(number)
+        folder = tmp_path / str(number)
         gate = tmp_path / f"left-out-{number}"
-        warnings.warn.side_effect = lambda text, gate=gate: "left out" in text and gate.touch()
+        reporter = mock.Mock(spec=Reporter)
+        reporter.warn.side_effect = lambda text, gate=gate: "left out" in text and gate.touch()
         plan = changed(small_plan(8, (policy,)), tries=3)
-        executor = RayCluster(address=cluster.address)
         player = play(folder, gate=gate, closed=7)  # Ray may start the bad machine's worker late
-        summary = run_plan(plan, folder, player, executor, reporter=warnings)
+
+        executor = RayCluster(address=cluster.address)
+        summary = run_plan(plan, folder, player, executor, reporter=reporter)
+
         assert (summary.errors, summary.missing) == ((), 0)
         assert line_count(folder) == len(plan.jobs())  # nothing that it played was stored
-        (named,) = [text for ((text,), _) in warnings.warn.call_args_list if "left out" in text]
+        warnings = [call.args[0] for call in reporter.warn.call_args_list]
+        (named,) = [text for text in warnings if "left out" in text]
         assert fault.rstrip(".") in named
 
 
 @pytest.mark.parametrize("actor", ["RemoteWorker", "MachineAgent"])
 def test_what_is_frozen_is_noticed_and_its_episode_played_elsewhere(
-    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, actor: str
-) -> None:
+    cluster, tmp_path, monkeypatch, actor
+):
     monkeypatch.setattr(ray_pool, "BEAT_S", 1.0)
     monkeypatch.setattr(ray_pool, "SILENCE_S", 300.0)
     cluster.add_node(num_cpus=1)
@@ -120,22 +124,23 @@ def test_what_is_frozen_is_noticed_and_its_episode_played_elsewhere(
         time.sleep(0.1)
     (tmp_path / "gate").touch()
     run.join()
+
     assert frozen, "the run ended before anything was frozen"
     assert not Path(f"/proc/{frozen[0]}").exists()
+
     kept = list(read_records(tmp_path))
-    assert (len(kept), [one.error for one in kept if one.error]) == (len(PLAN.jobs()), [])
+    assert (len(kept), [record.error for record in kept if record.error]) == (len(PLAN.jobs()), [])
     assert "has not answered" in (tmp_path / RECORDS_FILE).read_text()
 
 
-def test_a_machine_that_joins_is_used_and_a_head_without_cpus_is_not(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_machine_that_joins_is_used_and_a_head_without_cpus_is_not(tmp_path, monkeypatch):
     from ray.cluster_utils import Cluster
 
     nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
     warnings = mock.Mock(spec=Reporter)
     monkeypatch.setattr(ray_pool, "WAIT_S", 2.0)
-    play, executor = FakePlayer(tmp_path), RayCluster(address=nodes.address)
+    play = FakePlayer(tmp_path)
+    executor = RayCluster(address=nodes.address)
     run = threading.Thread(
         target=run_plan, args=(PLAN, tmp_path, play, executor), kwargs={"reporter": warnings}
     )
@@ -152,10 +157,9 @@ def test_a_machine_that_joins_is_used_and_a_head_without_cpus_is_not(
     assert line_count(tmp_path) == len(PLAN.jobs())
 
 
-def test_a_worker_gets_what_the_plan_asks_for(
-    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder, out = tmp_path / "policies", tmp_path / "run"
+def test_a_worker_gets_what_the_plan_asks_for(cluster, tmp_path, monkeypatch):
+    folder = tmp_path / "policies"
+    out = tmp_path / "run"
     folder.mkdir()
     (folder / "note.txt").write_text("copied")
     here = Path(ray_fakes.__file__).parent
@@ -170,7 +174,9 @@ def test_a_worker_gets_what_the_plan_asks_for(
     executor = RayCluster(address=cluster.address, needs=needs)
     summary = run_plan(PLAN, out, NotingPlace(out), executor)
     assert (summary.errors, summary.missing) == ((), 0)
-    assert {(out / str(one.video)).read_text() for one in read_records(out)} == {"secret copied b"}
+    assert {(out / str(record.video)).read_text() for record in read_records(out)} == {
+        "secret copied b"
+    }
 
     needs = WorkerNeeds(variables=("NOT_SET_HERE",))
     with pytest.raises(InvalidValueError, match="NOT_SET_HERE is not set here"):
@@ -179,9 +185,7 @@ def test_a_worker_gets_what_the_plan_asks_for(
         )
 
 
-def test_the_loss_of_the_head_is_one_sentence(
-    cluster: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_loss_of_the_head_is_one_sentence(cluster, tmp_path, monkeypatch):
     monkeypatch.setattr(ray_head, "HEAD_LOST_S", 5.0)
     gcs = cluster.head_node.all_processes["gcs_server"][0].process.pid
 
@@ -189,13 +193,15 @@ def test_the_loss_of_the_head_is_one_sentence(
         # A call under way for the machines would wait until Ray ends this process.
         monkeypatch.setattr(ray_pool, "LOOK_S", 3600.0)
         # The one that is under way has ended when two more episodes are stored.
-        deadline, known = time.monotonic() + 60, line_count(tmp_path)
+        deadline = time.monotonic() + 60
+        known = line_count(tmp_path)
         while line_count(tmp_path) < known + 2 and time.monotonic() < deadline:
             time.sleep(0.05)
         os.kill(gcs, signal.SIGKILL)
 
     after(tmp_path, 4, kill)
     play = FakePlayer(tmp_path, 0.5, gate=tmp_path / "gate", closed=4)
+
     with pytest.raises(RoboIRGError, match=r"head of the Ray cluster .* same command again"):
         run_plan(PLAN, tmp_path, play, RayCluster(address=cluster.address))
     assert 4 <= line_count(tmp_path) == len(list(read_records(tmp_path)))

@@ -46,13 +46,18 @@ JOB = Job(
 class PaperWorld:
     """Ends after `length` steps with `status`."""
 
-    render_device, due_stage, episode = "none", None, None
+    render_device = "none"
+    due_stage = None
+    episode = None
     session = SimpleNamespace(world=SimpleNamespace(facts=frozenset()))
 
     def __init__(self, length: int = 5, status: str = "success", cause: str | None = None) -> None:
-        self.length, self.status, self.cause = length, status, cause
+        self.length = length
+        self.status = status
+        self.cause = cause
         self.instruction = instruct_job(JOB)
-        self.steps, self.executed_actions = 0, 0
+        self.steps = 0
+        self.executed_actions = 0
         self.hook: Callable[[Any, bool], None] | None = None
         self.closed = False
         self.trouble: Exception | None = None
@@ -149,9 +154,12 @@ def stage(set_up: SetUp) -> Stage:
     return play
 
 
-def test_all_rows_are_played_until_the_end(stage: Stage) -> None:
-    policy, world = PaperPolicy(), PaperWorld(length=5)
+def test_all_rows_are_played_until_the_end(stage):
+    policy = PaperPolicy()
+    world = PaperWorld(length=5)
+
     course = stage(world, policy)
+
     assert (course.outcome, course.cause, course.steps) == ("success", None, 5)
     assert (course.calls, course.executed) == (2, 3)
     assert course.demonstration_steps == 3
@@ -161,12 +169,11 @@ def test_all_rows_are_played_until_the_end(stage: Stage) -> None:
     assert world.closed
 
 
-def test_a_record_holds_what_the_job_prescribes_instead_of_the_policy(
-    stage: Stage,
-) -> None:
+def test_a_record_holds_what_the_job_prescribes_instead_of_the_policy(stage):
     job = replace(JOB, environment=EnvironmentOptions(demonstration_frames=4))
     needs = stage(PaperWorld(), PaperPolicy(), job).needs
     assert (needs["demonstration_frames"], needs["cameras"]) == (4, [])
+
     job = replace(JOB, environment=EnvironmentOptions(actions="ee_pose"))
     assert stage(PaperWorld(), PaperPolicy(), job).cause == (
         "policy: the policy's action space is 'joint_angle', but the plan requires 'ee_pose'."
@@ -174,9 +181,7 @@ def test_a_record_holds_what_the_job_prescribes_instead_of_the_policy(
 
 
 @pytest.mark.parametrize(("spec", "attached"), [("oracle", ["PaperWorld"]), ("random", [])])
-def test_a_policy_that_is_declared_privileged_is_attached_before_reset(
-    stage: Stage, spec: str, attached: list[str]
-) -> None:
+def test_a_policy_that_is_declared_privileged_is_attached_before_reset(stage, spec, attached):
     policy = PaperInsider()
     stage(PaperWorld(), policy, replace(JOB, policy=spec, ref=read_policy(spec)))
     assert policy.heard == [*attached, instruct_job(JOB).text, 3]
@@ -189,13 +194,7 @@ def test_a_policy_that_is_declared_privileged_is_attached_before_reset(
         ("timeout", None, "failure", "not done after 1300 steps"),
     ],
 )
-def test_the_judge_decides(
-    stage: Stage,
-    status: str,
-    given: str | None,
-    outcome: str,
-    cause: str,
-) -> None:
+def test_the_judge_decides(stage, status, given, outcome, cause):
     course = stage(PaperWorld(3, status, given), PaperPolicy())
     assert (course.outcome, course.cause) == (outcome, cause)
 
@@ -213,11 +212,10 @@ def test_the_judge_decides(
         ("left", "invalid action: .*numbers"),
     ],
 )
-def test_a_fault_of_the_policy_is_an_error_not_a_failure(
-    stage: Stage, answer: Any, cause: str
-) -> None:
+def test_a_fault_of_the_policy_is_an_error_not_a_failure(stage, answer, cause):
     world = PaperWorld()
     course = stage(world, PaperPolicy(answer))
+
     assert course.outcome == "error"
     assert re.fullmatch(f"{cause}.*", str(course.cause))
     assert "Traceback" in str(course.details)
@@ -239,12 +237,12 @@ def test_a_fault_of_the_policy_is_an_error_not_a_failure(
     ],
     ids=str,
 )
-def test_metadata_become_json_or_one_sentence_that_names_the_key(
-    stage: Stage, value: object, stored: object
-) -> None:
+def test_metadata_become_json_or_one_sentence_that_names_the_key(stage, value, stored):
     policy = PaperPolicy()
     policy.metadata = {"deep": {"value": value}}  # type: ignore[attr-defined]
+
     record = stage(PaperWorld(), policy)
+
     if record.outcome == "success":
         assert record.policy_metadata == {"deep": {"value": stored}}
         assert read_record(encode(record), Path(), 1) == record
@@ -259,22 +257,24 @@ def test_metadata_become_json_or_one_sentence_that_names_the_key(
         (InvalidActionError("got nan"), "invalid action: got nan"),
     ],
 )
-def test_a_fault_of_the_world_is_an_error(stage: Stage, trouble: Exception, cause: str) -> None:
+def test_a_fault_of_the_world_is_an_error(stage, trouble, cause):
     world = PaperWorld()
     world.trouble = trouble
+
     course = stage(world, PaperPolicy())
+
     assert course.outcome == "error"
     assert str(course.cause).startswith(f"{cause} (test_rollout.py, line ")
     assert course.demonstration_steps == 3
 
 
 @pytest.mark.parametrize("error", [RenderDeviceError("no"), MissingDependencyError("no")])
-def test_what_ends_every_episode_ends_the_run(stage: Stage, error: Exception) -> None:
+def test_what_ends_every_episode_ends_the_run(stage, error):
     with pytest.raises(type(error)):
         stage(PaperWorld(), PaperPolicy(error))
 
 
-def test_ctrl_c_is_no_episode_error(stage: Stage) -> None:
+def test_ctrl_c_is_no_episode_error(stage):
     policy = PaperPolicy()
     policy.act = lambda _observation: (_ for _ in ()).throw(KeyboardInterrupt)  # type: ignore[method-assign]
     with pytest.raises(KeyboardInterrupt):
@@ -285,12 +285,11 @@ def test_ctrl_c_is_no_episode_error(stage: Stage) -> None:
     ("mode", "status", "kept"),
     [("all", "success", True), ("failures", "success", False), ("failures", "failure", True)],
 )
-def test_videos_are_kept_as_asked(
-    set_up: SetUp, tmp_path: Path, mode: Any, status: str, kept: bool
-) -> None:
+def test_videos_are_kept_as_asked(set_up, tmp_path, mode, status, kept):
     set_up(PaperWorld(5, status), PaperPolicy())
     record = EpisodeRunner(tmp_path, mode)(JOB)
     assert (record.video is not None) == kept
+
     files = sorted(path.suffix for path in tmp_path.rglob("*") if path.is_file())
     assert files == ([".jpg", ".mp4", ".npz"] if kept else [".npz"])
     assert record.video in (None, f"videos/{JOB.slug}.mp4")
@@ -308,9 +307,10 @@ class Broken:
 
 @pytest.mark.parametrize("after", [1, 3, 8])
 def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
-    set_up: SetUp, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, after: int
-) -> None:
-    real, count = VideoWriter._encode, 0
+    set_up, monkeypatch, tmp_path, after
+):
+    real = VideoWriter._encode
+    count = 0
 
     def add(writer: VideoWriter, frame: np.ndarray) -> None:
         nonlocal count
@@ -321,15 +321,18 @@ def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
 
     monkeypatch.setattr(VideoWriter, "_encode", add)
     set_up(PaperWorld(5), PaperPolicy())
+
     record = EpisodeRunner(tmp_path, "all")(JOB)
+
     assert (record.outcome, record.steps, record.video) == ("success", 5, None)
     assert "No space left on device" in str(record.video_error)
     assert {path.suffix for path in tmp_path.rglob("*") if path.is_file()} == {".npz"}
 
 
-def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
+def test_a_record_says_what_is_in_the_words_and_who_cheats():
     job = replace(JOB.with_options(setting="reasoning"), policy="oracle", ref=read_policy("oracle"))
     record = make_record(job, "success")
+
     assert record.metadata["pattern"]
     assert record.metadata["draws"]
     assert record.privileged
@@ -345,9 +348,7 @@ def test_a_record_says_what_is_in_the_words_and_who_cheats() -> None:
         ("direct", "robot", "wrong_object"),
     ],
 )
-def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(
-    setting: str, frame: str, failure: str
-) -> None:
+def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(setting, frame, failure):
     job = Job(
         policy="random",
         task="PickXtimes",
@@ -356,14 +357,18 @@ def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(
         options=InstructionOptions(setting, frame=frame),
     )
     events = (EventRecord(step=9, kind="picked", subject="cube_red"),)
+
     record = make_record(job, "failure", "picked up the red cube", steps=9, events=events)
+
     assert (record.attribution.failure, record.attribution.subject) == (failure, "cube_red")
 
 
 class Stubborn(PaperPolicy):
     """Names the same subgoal again, however its last try ended."""
 
-    reports, subgoal, turns = True, "go", itertools.count()
+    reports = True
+    subgoal = "go"
+    turns = itertools.count()
 
     @property
     def endings(self) -> list[SubgoalEnd]:
@@ -372,11 +377,11 @@ class Stubborn(PaperPolicy):
         return ends[: next(self.turns)]
 
 
-def test_a_subgoal_is_noted_again_where_its_last_try_came_to_nothing(
-    stage: Stage,
-) -> None:
+def test_a_subgoal_is_noted_again_where_its_last_try_came_to_nothing(stage):
     found = stage(PaperWorld(30), Stubborn()).subgoals
-    assert [(one.step, one.text, one.ended, one.why, one.thing) for one in found] == [
+    assert [
+        (subgoal.step, subgoal.text, subgoal.ended, subgoal.why, subgoal.thing) for subgoal in found
+    ] == [
         (0, "go", "time-out", "time-out!", None),
         (3, "go", "missed", "missed!", None),
         (6, "go", "blocked", "blocked!", None),
@@ -424,22 +429,28 @@ TURNS = JOB.with_options(setting="contextual", delivery="turns")
 
 
 @pytest.mark.parametrize("policy_class", [PaperPolicy, Hearing])
-def test_a_record_holds_what_was_heard_when(policy_class: type[PaperPolicy], stage: Stage) -> None:
-    world, policy = TellingWorld((0, 3, 6, 6), length=10), policy_class()
-    turns = world.instruction.turns
+def test_a_record_holds_what_was_heard_when(policy_class, stage):
+    world = TellingWorld((0, 3, 6, 6), length=10)
+    policy = policy_class()
+
     record = stage(world, policy, TURNS)
+
     assert record.outcome == "success"
-    assert [(one.text, one.step) for one in record.instruction] == list(
-        zip(turns, (0, 3, 6, 6, None), strict=True)
-    )
-    later = [turns[1], 3, turns[2], 6, turns[3], 6]
-    hears = policy_class is Hearing
-    assert policy.heard == [turns[0], 3, *(later if hears else ())]
-    assert record.policy_metadata == ({"heard": 8} if hears else {})
+    turns = world.instruction.turns
+    steps = [turn.step for turn in record.instruction]
+    assert [turn.text for turn in record.instruction] == list(turns)
+    assert steps == [0, 3, 6, 6, None]
+    if policy_class is Hearing:
+        assert policy.heard == [turns[0], 3, turns[1], 3, turns[2], 6, turns[3], 6]
+        assert record.policy_metadata == {"heard": 8}
+    else:
+        assert policy.heard == [turns[0], 3]
+        assert record.policy_metadata == {}
     assert read_record(encode(record), Path(), 1) == record
 
 
-def test_the_caption_grows_as_utterances_are_heard(set_up: SetUp, tmp_path: Path) -> None:
+def test_the_caption_grows_as_utterances_are_heard(set_up, tmp_path):
+    world = TellingWorld((0, 3, 6, 6, 9), length=11)
     captions: list[str] = []
 
     class Captions(VideoWriter):
@@ -448,8 +459,8 @@ def test_the_caption_grows_as_utterances_are_heard(set_up: SetUp, tmp_path: Path
             captions.append(self.caption)
             assert self.longest_caption == world.instruction.text
 
-    world = TellingWorld((0, 3, 6, 6, 9), length=11)
     set_up(world, PaperPolicy())
     EpisodeRunner(tmp_path).play_once(TURNS, Captions(tmp_path / "x.mp4"))
-    counts = [1, 1, *[1] * 3, *[2] * 3, *[4] * 3, *[5] * 2]  # video, first frame, chunks of 3
+
+    counts = [1, 1, 1, 1, 1, 2, 2, 2, 4, 4, 4, 5, 5]  # video, first frame, chunks of 3
     assert captions == [" ".join(world.instruction.turns[:count]) for count in counts]

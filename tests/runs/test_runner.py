@@ -33,7 +33,7 @@ from roboirg.core.errors import InvalidValueError, RenderDeviceError
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.policy_ref import unknown_policy
 from roboirg.policies.by_name.finding import read_policy
-from roboirg.records.record import ErrorKind, Job, Record
+from roboirg.records.record import Job, Record
 from roboirg.records.record_codec import StoreError
 from roboirg.records.run_files import earlier_plans
 from roboirg.records.store import (
@@ -78,9 +78,7 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> Comparable:
     return all_comparable(folder)
 
 
-def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(
-    tmp_path: Path, uninterrupted: Comparable
-) -> None:
+def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(tmp_path, uninterrupted):
     child = begin(tmp_path, workers=2)
     child.send_signal(signal.SIGKILL)
     child.wait()
@@ -100,45 +98,53 @@ def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_stopped_run_ends_its_workers_and_keeps_what_ended(
-    tmp_path: Path, number: signal.Signals, uninterrupted: Comparable
-) -> None:
+def test_a_stopped_run_ends_its_workers_and_keeps_what_ended(tmp_path, number, uninterrupted):
     child = begin(tmp_path)
     child.send_signal(number)
     assert child.wait(WAIT_S) != 0
     assert not any(map(is_alive, worker_pids(tmp_path)))
     assert 3 <= len(read_records(tmp_path)) < 16
+
     finish(tmp_path)
     assert all_comparable(tmp_path) == uninterrupted
 
 
-def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path: Path) -> None:
+def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path):
     plan = changed(small_plan(), settings="direct")
+
     summary = run_plan(plan, tmp_path, FakePlay(tmp_path, deadly=2), LocalProcesses(1))
+
+    assert (summary.total, summary.played, len(summary.errors), summary.missing) == (4, 4, 1, 0)
     (error,) = (record for record in read_records(tmp_path) if record.outcome == "error")
     assert (error.episode, error.error, error.attempt) == (2, "infrastructure", 2)
     assert error.cause == "infrastructure: the process died of signal 9 (Killed) in the environment"
-    assert (summary.total, summary.played, len(summary.errors), summary.missing) == (4, 4, 1, 0)
     assert len(starts(tmp_path, error.identity)) == 2
-    # Errors are played again unless asked not to.
+
+
+def test_errors_are_played_again_unless_asked_not_to(tmp_path):
+    plan = changed(small_plan(), settings="direct")
+    run_plan(plan, tmp_path, FakePlay(tmp_path, deadly=2), LocalProcesses(1))
+
     same = fake_run(tmp_path, plan, retry_errors=False)
     assert (same.played, len(same.errors)) == (0, 1)
-    mended = fake_run(tmp_path, plan)
-    assert (mended.played, max(one.attempt for one in read_records(tmp_path))) == (1, 3)
+
+    assert fake_run(tmp_path, plan).played == 1
+    assert max(record.attempt for record in read_records(tmp_path)) == 3
     assert fake_run(tmp_path, plan).played == 0
     assert not earlier_plans(tmp_path)  # it was the same one each time
 
 
-def test_missing_graphics_stop_the_run_and_lose_nothing(tmp_path: Path) -> None:
+def test_missing_graphics_stop_the_run_and_lose_nothing(tmp_path):
     with pytest.raises(RenderDeviceError, match="No Vulkan device can render; install one"):
         run_plan(small_plan(), tmp_path, FakePlay(fatal=2), LocalProcesses(1))
     assert {record.episode for record in read_records(tmp_path)} == {0, 1}
 
 
-def test_a_folder_may_get_more_and_fewer_jobs(tmp_path: Path) -> None:
+def test_a_folder_may_get_more_and_fewer_jobs(tmp_path):
     fake_run(tmp_path, small_plan(2))
     more = fake_run(tmp_path, small_plan(4))
     assert (more.played, more.total) == (4, 8)
+
     fewer = fake_run(tmp_path, small_plan(1))
     assert (fewer.played, fewer.total, fewer.missing) == (0, 2, 0)
     assert len(read_records(tmp_path)) == 8
@@ -166,26 +172,27 @@ def test_a_folder_may_get_more_and_fewer_jobs(tmp_path: Path) -> None:
         ("policy_version", "old", r"random whose policy version is old, but now it is built-in"),
     ],
 )
-def test_worlds_of_two_versions_are_not_mixed(
-    tmp_path: Path, name: str, value: object, sentence: str
-) -> None:
+def test_worlds_of_two_versions_are_not_mixed(tmp_path, name, value, sentence):
     played, fine = map(FakePlay(), small_plan(1).jobs())
     is_policy = name == "policy_version"
     record = with_version(played, "old") if is_policy else replace(played, **{name: value})
     lost = replace(fine, outcome="error", error="connection", cause="connection: x")
     fill(tmp_path, lost, record)  # not the first
+
     with pytest.raises(StoreError, match=sentence):
         fake_run(tmp_path, small_plan(2))
     assert len(read_records(tmp_path)) == 2
     assert read_plan(tmp_path) is None
 
 
-def test_a_torn_line_is_told_before_anything_is_played(tmp_path: Path) -> None:
+def test_a_torn_line_is_told_before_anything_is_played(tmp_path):
     (tmp_path / RECORDS_FILE).write_bytes(b'{"policy":"random","ta')
     ears = mock.Mock(spec=Reporter)
     fake_run(tmp_path, small_plan(1), reporter=ears)
     heard = [name for name, *_ in ears.method_calls if name in ("warn", "advance")]
+
     assert heard == ["warn", "advance", "advance"]
+
     ((notice,), _) = ears.warn.call_args
     assert "(22 bytes) to" in notice
     assert "again" not in notice
@@ -202,20 +209,21 @@ def test_a_torn_line_is_told_before_anything_is_played(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_tasks_that_a_policy_was_not_trained_on_are_named_once(
-    tmp_path: Path, trained: tuple[str, ...] | None, warned: list[str]
-) -> None:
+def test_tasks_that_a_policy_was_not_trained_on_are_named_once(tmp_path, trained, warned):
     ears = mock.Mock(spec=Reporter)
     needs = PolicyNeeds(trained_tasks=trained)
     plan = changed(
         small_plan(2), policies=(dataclasses.replace(read_policy("random"), needs=needs),)
     )
+
     fake_run(tmp_path, plan, reporter=ears)
-    assert [one.args[0] for one in ears.warn.call_args_list] == warned
+
+    assert [warning.args[0] for warning in ears.warn.call_args_list] == warned
 
 
-def test_workers_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_number_of_workers_chooses_the_executor(monkeypatch):
     assert isinstance(choose_executor(None), LocalProcesses)
+
     monkeypatch.setenv("ROBOIRG_WORKERS", "5")
     assert choose_executor(None) == LocalProcesses(5)
     assert choose_executor(0) == InProcess()
@@ -232,9 +240,7 @@ def test_workers_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
         ("words", OTHER_WORDS, "words"),
     ],
 )
-def test_a_record_of_another_version_is_not_stored(
-    tmp_path: Path, field: str, value: object, what: str
-) -> None:
+def test_a_record_of_another_version_is_not_stored(tmp_path, field, value, what):
     plan = small_plan(1).checked()
 
     def elsewhere(job: Job) -> Record:
@@ -246,8 +252,8 @@ def test_a_record_of_another_version_is_not_stored(
 
 
 def test_fingerprints_of_the_code_see_data_files_and_one_only_what_decides_verdicts(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, monkeypatch
+):
     folder = tmp_path / "roboirg"
     monkeypatch.setattr(episode_record, "__file__", str(folder / "a" / "b" / "module.py"))
     folder.mkdir()
@@ -267,9 +273,7 @@ def test_fingerprints_of_the_code_see_data_files_and_one_only_what_decides_verdi
 
 
 @pytest.mark.parametrize(("error", "place"), [("infrastructure", 1), ("environment", -1)])
-def test_what_was_lost_is_retried_at_once_and_errors_after_all_others(
-    tmp_path: Path, error: ErrorKind, place: int
-) -> None:
+def test_what_was_lost_is_retried_at_once_and_errors_after_all_others(tmp_path, error, place):
     played: list[str] = []
 
     def play(job: Job) -> Record:
@@ -280,11 +284,12 @@ def test_what_was_lost_is_retried_at_once_and_errors_after_all_others(
         return replace(record, outcome="error", error=error, cause=f"{error}: x")
 
     run_plan(small_plan(4), tmp_path, play, InProcess())
+
     assert played[place] == played[0]
     assert len(played) == len(small_plan(4).jobs()) + 1
 
 
-def test_machines_of_other_versions_are_named() -> None:
+def test_machines_of_other_versions_are_named():
     from roboirg.runs.run.ray_machines import MachineVersions
 
     random = read_policy("random")

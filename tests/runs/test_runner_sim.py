@@ -52,32 +52,34 @@ def run_here(*words: object) -> Result:
     return CliRunner().invoke(app, ["run", *map(str, words)])
 
 
-def test_an_invalid_action_is_told_and_what_a_policy_prints_goes_to_its_log(tmp_path: Path) -> None:
+def test_an_invalid_action_is_told_and_what_a_policy_prints_goes_to_its_log(tmp_path):
     (tmp_path / "mine.py").write_text(LOUD)
     words = ("--policy", "mine:Loud", "--tasks", "PickXtimes", "--settings", "direct")
     said = command("run", *words, "--episodes", "1", "--out", "o", "--workers", "1", cwd=tmp_path)
     assert said.returncode == 2
     assert said.stderr.count("\n") == 1
     assert "invalid action: " in said.stderr
+
     (record,) = read_records(tmp_path / "o")
     assert (record.outcome, record.steps) == ("error", 3)
-    told = " ".join(one.text for one in record.instruction)
+
+    told = " ".join(turn.text for turn in record.instruction)
     log = log_path(tmp_path / "o", record.slug).read_text()
     assert log == f"made\ntold: {told}\nasked\nasked\n"
     assert not {"told:", "asked"} & {*said.stdout.split(), *said.stderr.split()}
 
 
-def test_missing_vulkan_loses_no_record_and_no_video(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_missing_vulkan_loses_no_record_and_no_video(tmp_path, monkeypatch):
     words = ("--policy", "random", "--tasks", "PickXtimes", "--settings", "explicit",
              "--max-steps", "9", "--video", "all", "--out", tmp_path / "o",
              "--episodes")  # fmt: skip
     done = run_here(*words, "1", "--workers", "0")
     assert done.exit_code == 0, done.output
+
     (record,) = read_records(tmp_path / "o")
     assert record.render_device
     assert (tmp_path / "o" / str(record.video)).stat().st_size > 2_000
+
     monkeypatch.setenv("ROBOIRG_RENDER_DEVICE", "cuda:63")
     said = run_here(*words, "2", "--workers", "1")
     assert str(said.exception).startswith("The render device 'cuda:63'")
@@ -86,7 +88,7 @@ def test_missing_vulkan_loses_no_record_and_no_video(
 
 
 @pytest.mark.usefixtures("without_cache")
-def test_equal_commands_give_equal_records(tmp_path: Path) -> None:
+def test_equal_commands_give_equal_records(tmp_path):
     played = []
     for workers in (0, 1):
         folder = tmp_path / f"by {workers}"
@@ -97,6 +99,7 @@ def test_equal_commands_give_equal_records(tmp_path: Path) -> None:
         assert done.exit_code == 0, done.output
         played.append((read_plan(folder), all_comparable(folder)))
     assert played[0] == played[1]
+
     records = read_records(folder)
     assert {record.policy for record in records} == {"random", "forgetful"}
     for record in records:

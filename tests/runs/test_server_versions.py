@@ -41,10 +41,10 @@ class Told:
 
 
 def versions(folder: Path) -> list[str | None]:
-    return [one.server_version for one in read_records(folder)]
+    return [record.server_version for record in read_records(folder)]
 
 
-def test_a_run_stops_when_the_server_is_another_version(tmp_path: Path) -> None:
+def test_a_run_stops_when_the_server_is_another_version(tmp_path):
     plan = plan_of(4)
     with pytest.raises(StoreError, match=r"whose server version is a, but in random-.* it is b"):
         run_plan(plan, tmp_path, Told("a", "a", "b", "a"), InProcess())
@@ -55,16 +55,17 @@ def test_a_run_stops_when_the_server_is_another_version(tmp_path: Path) -> None:
             StoreError, match=f"server version is a, but in .* it is {words}; choose another"
         ):
             run_plan(plan, tmp_path, Told(other, other), InProcess())
+
     run_plan(plan, tmp_path, Told("a", "a"), InProcess())
     assert versions(tmp_path) == ["a"] * 4
 
 
-def test_a_version_that_controls_a_terminal_stops_no_run(tmp_path: Path) -> None:
+def test_a_version_that_controls_a_terminal_stops_no_run(tmp_path):
     run_plan(plan_of(2), tmp_path, Told(*["\x1b[2J\u202e" + "9" * 5000] * 2), InProcess())
-    assert {one[:12] for one in map(str, versions(tmp_path))} == {r"\x1b[2J\u202e"[:12]}
+    assert {version[:12] for version in map(str, versions(tmp_path))} == {r"\x1b[2J\u202e"[:12]}
 
 
-def test_errors_before_the_server_told_its_version_do_not_count(tmp_path: Path) -> None:
+def test_errors_before_the_server_told_its_version_do_not_count(tmp_path):
     plan = plan_of(3, tries=1)
     run_plan(plan, tmp_path, Told("refused", "a", "refused"), InProcess())
     assert versions(tmp_path) == ["a"] * 3
@@ -80,7 +81,7 @@ class Guide:
         pass
 
 
-def test_the_version_comes_from_the_server_also_behind_a_planner() -> None:
+def test_the_version_comes_from_the_server_also_behind_a_planner():
     with ChallengeServer() as server:
         client = make_policy(f"challenge://{server.place}?version=mine", 0)
         client.reset("go", {})  # type: ignore[typeddict-item]

@@ -43,30 +43,32 @@ SAID = (
 
 
 @pytest.mark.parametrize("subgoal", [3, b"pick", ["pick"], "x" * 301, "a\nb", "\x1b[2J", "\ud800"])
-def test_a_subgoal_is_a_short_text(subgoal: object) -> None:
+def test_a_subgoal_is_a_short_text(subgoal):
     with pytest.raises(InvalidValueError, match="The policy's subgoal"):
         policy_subgoal(SimpleNamespace(subgoal=subgoal))
 
 
-def test_a_subgoal_is_optional() -> None:
+def test_a_subgoal_is_optional():
     assert policy_subgoal(SimpleNamespace()) is policy_subgoal(SimpleNamespace(subgoal="")) is None
     assert policy_subgoal(SimpleNamespace(subgoal="x" * 300)) == "x" * 300
 
 
-def test_records_keep_them_and_refuse_others() -> None:
+def test_records_keep_them_and_refuse_others():
     record = make_record(JOB, "failure", "no", subgoals=SAID)
     assert read_record(encode(record), Path("r"), 1).subgoals == SAID
+
     long = replace(record, subgoals=(replace(SAID[0], text="x" * 301),))
     with pytest.raises(StoreError, match="text"):
         read_record(encode(long), Path("r"), 1)
 
 
-def test_the_page_and_the_table_show_them(tmp_path: Path) -> None:
+def test_the_page_and_the_table_show_them(tmp_path):
     spent = {"calls": 3.0, "answered_s": 6.5, "waited_s": 2.25}
     record = make_record(JOB, "failure", "no", subgoals=SAID, usage=spent)
     page = render([record])
     assert "(wrong thing; due: pick it up)" in page
     assert "sing (lost; due: nothing)" in page
+
     # Costs are per episode: in another one of the cell the planner named nothing.
     other = make_record(replace(JOB, episode=1), "failure", "no", usage={"calls": 1.0})
     fill(tmp_path, record, other)
@@ -74,14 +76,16 @@ def test_the_page_and_the_table_show_them(tmp_path: Path) -> None:
     assert f"{counts} 2 | 3.25 | 1.12 |" in call(*TABLE, tmp_path)
 
 
-def test_the_table_says_unknown_where_a_service_did_not_report_all_tokens(tmp_path: Path) -> None:
+def test_the_table_says_unknown_where_a_service_did_not_report_all_tokens(tmp_path):
     known = {"calls": 1.0, "input_tokens": 8.0, "output_tokens": 2.0, "cost_usd": 0.5}
     partly = {"calls": 1.0, "input_tokens": 4.0}
     played = (("direct", 0, known), ("contextual", 0, known), ("contextual", 1, partly))
     for setting, episode, usage in played:
         job = replace(JOB, episode=episode, options=InstructionOptions(setting))
         fill(tmp_path, make_record(job, "failure", "no", subgoals=SAID, usage=usage))
+
     printed = call(*TABLE, tmp_path)
+
     assert "| 1 | 8 | 2 | 0.5 |" in printed
     assert "| 1 | 6 | unknown | unknown |" in printed
 
@@ -93,7 +97,8 @@ class Planning:
     point = (0, 0)
 
     def reset(self, instruction: str, demonstration: object) -> None:
-        self.calls, self.subgoal = 0, None
+        self.calls = 0
+        self.subgoal = None
 
     def act(self, observation: dict) -> np.ndarray:
         row, column = (0, 0) if self.calls < 2 else self.point
@@ -103,9 +108,7 @@ class Planning:
 
 
 @pytest.mark.sim
-def test_a_played_episode_notes_what_is_new_with_the_stage_that_is_due(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_played_episode_notes_what_is_new_with_the_stage_that_is_due(monkeypatch):
     monkeypatch.setattr("roboirg.runs.play.rollout.load_policy", lambda prepared: Planning())
     env = roboirg.make(JOB.task, episode=0, cameras=(), grounded=True)
     _, info = env.reset()
@@ -113,9 +116,13 @@ def test_a_played_episode_notes_what_is_new_with_the_stage_that_is_due(
     env.close()
     monkeypatch.setattr(Planning, "point", point)
     result, _ = EpisodeRunner(Path()).play_once(JOB)
+
     assert result.outcome == "failure", result.cause
+
     words = "pick up the green cube for the first time"
-    assert [(one.step, one.point, one.due, one.verdict) for one in result.subgoals] == [
+    assert [
+        (subgoal.step, subgoal.point, subgoal.due, subgoal.verdict) for subgoal in result.subgoals
+    ] == [
         (0, (0, 0), words, "wrong_thing"),
         (20, point, words, "right"),
     ]

@@ -25,12 +25,14 @@ throw("import")
 
 class It:
     throw("class body")
-    cameras, demonstration_frames = ("front",), "none"
+    cameras = ("front",)
+    demonstration_frames = "none"
     depth = property(method("needs", value=False))
     version = property(method("version", value="1"))
     metadata = property(method("metadata", value={}))
     subgoal = property(method("subgoal"))
-    usage, act = method("usage", value={}), method("act", value=np.ones((24, 8)))
+    usage = method("usage", value={})
+    act = method("act", value=np.ones((24, 8)))
     __init__, reset, follow, hear, close = map(
         method, ("__init__", "reset", "follow", "hear", "close")
     )

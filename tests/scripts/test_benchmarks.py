@@ -44,7 +44,9 @@ def test_baselines_are_timed_once_a_round_and_rows_have_the_median_of_all_rounds
         Measure(0.6, "time", lambda: rate("time", 8.0), base, "one"),
         Measure(0.3, "memory", lambda: rate("memory", 0.25), unit="GiB"),
     )
+
     found = run_measures(rows, 3, lambda _text: None)
+
     assert asked == ["base", "pace", "time", "memory"] * 3
     assert [(row["value"], row["ratio"]) for row in found] == [(8.0, 2.0), (8.0, 0.5), (0.25, None)]
     assert [reaches(row) for row in found] == [True, False, True]
@@ -61,11 +63,13 @@ def test_a_file_of_figures_is_kept_up_to_date(tmp_path: Path) -> None:
     measured(first=1234.0, second=2.0)
     measured(second=3.0, third=4.0)
     figures = read_figures(path)
-    assert [(one["name"], one["value"]) for one in figures] == [
+
+    assert [(figure["name"], figure["value"]) for figure in figures] == [
         ("first", 1234.0), ("second", 3.0), ("third", 4.0),
     ]  # fmt: skip
-    assert all(one["date"] and one["machine"] and one["load"] >= 0 for one in figures)
+    assert all(figure["date"] and figure["machine"] and figure["load"] >= 0 for figure in figures)
     assert "| first | 1,234 s |  |  | at most 0.5 s |" in markdown_table(figures)
+
     path.write_text("[]")
     with pytest.raises(InvalidValueError, match="holds no results of bench"):
         measured(first=1.0)
@@ -82,8 +86,10 @@ def test_the_costs_of_a_command_that_fails_are_no_result(tmp_path: Path) -> None
 @pytest.mark.sim
 def test_the_file_has_the_rows_that_are_measured_with_their_goals() -> None:
     figures = read_figures(ROOT / "docs" / "bench.json")
-    measured = [(one.name, one.unit, one.goal) for one in all_measures()]
-    assert sorted(measured) == sorted((one["name"], one["unit"], one["goal"]) for one in figures)
+    measured = [(measure.name, measure.unit, measure.goal) for measure in all_measures()]
+    assert sorted(measured) == sorted(
+        (figure["name"], figure["unit"], figure["goal"]) for figure in figures
+    )
 
 
 def test_the_performance_page_shows_the_file_and_no_page_has_figures_of_its_own() -> None:

@@ -22,9 +22,11 @@ def test_splits_are_built_anew_for_what_is_named(tmp_path, monkeypatch, capsys):
     chosen = {"tasks": "VideoPlaceOrder,PickXtimes,PutInBox", "split": "val", "workers": 0}
     build_splits.build_splits(**chosen)
     printed = capsys.readouterr()
+
     assert printed.out == splits_text(shipped_splits())
     assert re.search(r"VideoPlaceOrder/val/\d+: seed \d+ is rejected, no room", printed.err)
     assert "episodes 52/52" in printed.err  # the other 98 are published
+
     build_splits.build_splits(**chosen, out=str(tmp_path / "splits.json"))
     assert (tmp_path / "splits.json").read_text() == splits_text(shipped_splits())
 

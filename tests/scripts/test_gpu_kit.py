@@ -56,7 +56,9 @@ def install(parts: Path) -> subprocess.CompletedProcess[str]:
 
 
 def test_parts_install_on_a_machine_that_reaches_nothing(parts: Path) -> None:
-    done, kit = install(parts), parts.parent / "kit"
+    done = install(parts)
+    kit = parts.parent / "kit"
+
     assert done.returncode == 0, done.stderr
     assert (kit / "site" / "thing.py").read_text() == "name = 'thing'\n"
     assert "culling: bool = True" in (kit / "trees" / "after" / SETTINGS).read_text()
@@ -68,17 +70,22 @@ def test_a_damaged_part_is_named_and_nothing_is_installed(parts: Path) -> None:
     content = bytearray(part.read_bytes())
     content[-1] ^= 1
     part.write_bytes(content)
+
     done = install(parts)
+
     assert done.returncode != 0
     assert "part-01" in done.stdout + done.stderr
     assert not (parts.parent / "kit").exists()
 
 
 def test_another_python_is_refused_with_what_would_be_right(tmp_path: Path, parts: Path) -> None:
-    kit, other = tmp_path / "packed", tmp_path / "others"
+    kit = tmp_path / "packed"
+    other = tmp_path / "others"
     (kit / "python").write_text("3.1")
     write_parts(kit, other, 10**6)
+
     done = install(other)
+
     assert done.returncode == 1
     assert re.search(r"python3 is 3\.\d+ here; the parts are for 3\.1 \(", done.stderr), done.stderr
 
@@ -89,10 +96,12 @@ def test_differences_are_counted_by_pixel_and_motion_by_bit() -> None:
     spotted[0, 0] = (0, 1, 0)
     spotted[0, 1] = (200, 9, 0)
     still = np.array([0.1, 0.2])
+
     found = difference(
         {"a": black, "b": black, "motion": still, "events": still},
         {"a": spotted, "b": black, "motion": still.copy(), "events": np.nextafter(still, 1)},
     )
+
     assert found == {
         "pixels": 40,
         "differ": 2 / 40,

@@ -32,18 +32,24 @@ def test_the_measured_part_has_all_tasks_that_have_words_and_no_shared_sentence(
         assert [line.split("|")[1].strip() for line in rows.split("\n") if line[:1] == "|"][2:] == (
             written
         )
+
     shared = part.partition("### Shared between the pools\n")[2].partition("###")[0]
     assert shared.count(" | 0 |\n") == 3
 
 
 def test_every_variant_has_an_example():
     page = PAGE.read_text()
-    pairs = [(name, one) for name, task in all_tasks().items() for one in plain_settings(task)[1:]]
+    pairs = [
+        (name, options)
+        for name, task in all_tasks().items()
+        for options in plain_settings(task)[1:]
+    ]
     for task, setting in pairs:
         assert page.count(f"### {task}, {setting}\n") == 1
         episode = card.example_episode(task, setting)
         assert f"`{episode.key}`" in page
     assert page.count("| explicit | ") == 40
+
     options = page.split("## Harder settings\n")[1].partition(MEASURED)[0]
     assert page.count("| resolved | ") == 40 + options.count("### ")
     assert options.count(", direct-rival\n") == 11
@@ -67,6 +73,7 @@ def test_the_walk_has_every_setting_and_how_each_implicit_one_leads_to_the_goal(
 def test_marks_are_around_the_mentions():
     said = instruct(card.example_episode("PickXtimes", "direct"), "direct")
     marked = language_examples.marked(said)
+
     assert marked.replace("*", "") == said.text
     for mention in said.mentions:
         sign = "**" if mention.role == "anaphor" else "*"

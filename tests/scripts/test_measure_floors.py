@@ -28,17 +28,19 @@ def test_the_file_holds_what_is_measured_and_is_read_as_it_was_written():
         assert (one.count, one.excess) == (row.count, pytest.approx(row.excess, abs=1e-4))
         for name in ("chance", "majority", "text-only", "scene-only", "union"):
             assert one.shares[name] == pytest.approx(row.shares[name], abs=1e-4)
+
     kept = stored.measured_floors(measure_floors.LANGUAGE_VERSION)
     assert kept is not None, AGAIN
-    own = {key: one for key, one in found.items() if key.task and key.split == stored.TEST}
+
+    own = {key: floor for key, floor in found.items() if key.task and key.split == stored.TEST}
     assert len(own) == 8
-    for key, one in own.items():
-        assert one.count == kept[key].count, AGAIN
+    for key, floor in own.items():
+        assert floor.count == kept[key].count, AGAIN
         for name in ("chance", "rules"):
-            assert one.shares[name] == kept[key].shares[name], AGAIN
+            assert floor.shares[name] == kept[key].shares[name], AGAIN
         for name in ("text-only", "scene-only"):
             again = pytest.approx(kept[key].shares[name].slots, abs=0.25)
-            assert one.shares[name].slots == again, AGAIN
+            assert floor.shares[name].slots == again, AGAIN
 
 
 def rule_table(by):
@@ -65,6 +67,7 @@ def test_the_rules_are_those_of_the_documentation(by, settings, options):
     grouping = "pattern" if by == "color exclusion" else None
     names = {row for row, _ in table} & {"chance", *measure_floors.SURFACE_RULES}
     assert {"chance", "surface"} <= names
+
     chosen = InstructionOptions(**options)
     for row in shortcut_rows(tuple(all_tasks()), ("test",), settings, chosen, by=grouping):
         column = row.group[-1] + (", competing" if options else "")

@@ -13,6 +13,7 @@ def test_the_item_holds(item):
 def test_names_are_unique_and_limits_have_reasons():
     limits = list(paper_audit.limits())
     names = [item.name for item in [*paper_audit.ITEMS, *limits]]
+
     assert len(names) == len(set(names))
     assert limits
     assert all(len(item.claim) > 40 for item in limits)
@@ -23,6 +24,7 @@ def test_an_item_that_fails_is_named(monkeypatch, capsys):
         paper_audit.same(1, 2)
 
     monkeypatch.setattr(paper_audit, "ITEMS", [paper_audit.Item("it", "is so", differs)])
+
     assert paper_audit.main("it") == 1
     assert "FAILS  it: is so\n       1 instead of 2" in capsys.readouterr().out
 
@@ -30,5 +32,6 @@ def test_an_item_that_fails_is_named(monkeypatch, capsys):
 def test_intervals_know_a_clear_change_from_chance():
     changes = figures.setting_changes()
     assert changes["FrameS-Modul", "direct"].is_clear
+
     low, high = changes["GroundSG-QwenVL", "direct"].interval
     assert low < 0 < high

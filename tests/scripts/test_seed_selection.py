@@ -61,7 +61,9 @@ def test_a_new_setting_does_not_change_which_seeds_are_accepted(
     every = {**all_settings(), "mute": mute}
     for module in ("settings", "scenarios.spoken"):
         monkeypatch.setattr(f"roboirg.language.{module}.all_settings", lambda: every)
+
     episode = get_episode("VideoUnmask", "val", 0)
+
     assert "mute" in settings_of(get_task("VideoUnmask"))
     assert find_refusals(episode) == {"mute": "it is mute"}
     assert [find_seed(slot, check_words) for slot in slots] == before

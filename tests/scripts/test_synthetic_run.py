@@ -29,6 +29,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_parts_of_records_give_the_cells_of_whole_records(run: Path) -> None:
     plan = read_plan(run)
     assert plan is not None
+
     whole, parts = (
         cells_of(make_frame([("", records)], plan.jobs()))
         for records in (read_records(run), read_results(run))
@@ -41,5 +42,6 @@ def test_a_page_reads_one_record_after_the_other(run: Path) -> None:
     page = write_report(
         Source(run), progress=lambda done, total: told.append((done, total))
     ).read_text()
+
     assert page.count('"turns":') == COUNT
     assert told == [(done, COUNT) for done in range(1, COUNT + 1)]

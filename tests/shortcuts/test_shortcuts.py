@@ -117,7 +117,7 @@ BY_HAND = {
 
 
 @pytest.mark.parametrize("slot", BY_HAND)
-def test_values_by_hand(slot):
+def test_each_rule_guesses_the_value_that_its_words_give(slot):
     for rule, text, found in BY_HAND[slot]:
         assert (rule, text, places(rule, text, *slot)) == (rule, text, (found,))
 
@@ -158,12 +158,12 @@ MOMENTS = (
         ),
     ],
 )
-def test_several_values_by_hand(rule, text, task, found):
+def test_each_rule_guesses_several_values(rule, text, task, found):
     assert guess_goal(rule, text, task) == found
 
 
 @pytest.mark.parametrize(("named", "other"), [("before", "after"), ("after", "before")])
-def test_two_moments_by_hand(named, other):
+def test_each_rule_guesses_between_two_moments(named, other):
     for rule, moment in {
         "surface": other,
         "last-mention": named,
@@ -176,7 +176,9 @@ def test_two_moments_by_hand(named, other):
 def test_amounts_in_another_order_are_the_same_goal():
     episode = get_episode("BinFill", "test", 3)  # three red cubes and one green cube
     text = "She wants one green cube and three red cubes. Put the former and the latter into it."
+
     guess = guess_goal("first-mention", text, "BinFill")
+
     assert goal_share(guess, episode) == 1
     assert draw_goal(guess, episode, np.random.default_rng(0)) == episode.goal
 
@@ -199,8 +201,10 @@ def test_any_text_gives_a_guess_of_the_right_shape(text, rule, task):
     for slot, found in guess.items():
         assert all(found)
         assert 1 <= len(found) <= vocabulary[slot].longest
+
     episode = get_episode(task, "test", 0)
     assert 0 <= goal_share(guess, episode) <= 1
+
     drawn = draw_goal(guess, episode, np.random.default_rng(1))
     assert drawn is None or drawn in get_task(task).goals(episode.scene)
     assert guess_goal(rule, text.upper().replace(" ", "  "), task) == guess
@@ -208,10 +212,11 @@ def test_any_text_gives_a_guess_of_the_right_shape(text, rule, task):
 
 @settings(max_examples=25)
 @given(named=st.lists(st.sampled_from(COLORS), min_size=1, max_size=6))
-def test_first_last_and_unnamed(named):
+def test_rules_take_the_first_the_last_or_what_is_not_named(named):
     text = " ".join(f"I like {color}." for color in named) + " Take it."
     assert places("first-mention", text, "PickXtimes", "color") == ((named[0],),)
     assert places("last-mention", text, "PickXtimes", "color") == ((named[-1],),)
+
     rest = tuple(color for color in COLORS if color not in named)
     assert places("elimination", text, "PickXtimes", "color") == (rest or COLORS,)
 
@@ -231,7 +236,7 @@ def test_vocabularies_hold_every_goal_of_the_test_split():
 
 
 @pytest.mark.parametrize(("task", "setting"), PAIRS)
-def test_shares_of_every_setting(task, setting):
+def test_shares_of_every_setting_are_of_its_hidden_slots(task, setting):
     for episode in first_episodes(task, "test", 2):
         for options in expressible_options(episode):
             if options.setting != setting:
@@ -246,10 +251,12 @@ def test_shares_of_every_setting(task, setting):
                 assert score_rule("elimination", told).goal == 1
 
 
-def test_shares_by_hand():
+def test_shares_of_a_known_episode_are_all_or_nothing():
     episode = get_episode("VideoPlaceButton", "test", 0)
     told = episode, instruct(episode, "direct")
+
     hidden = hidden_slots(told)
+
     assert score_rule("first-mention", told).slots == dict.fromkeys(hidden, 1)
     assert score_rule("elimination", told).slots == dict.fromkeys(hidden, 0)
     assert score_chance((episode, instruct(episode))) == ({}, 1)
@@ -286,7 +293,9 @@ def test_of_two_containers_of_which_one_is_named_only_the_described_one_counts()
 def test_only_slots_that_a_text_touches_count():
     episode = get_episode("VideoPlaceButton", "test", 0)
     said = instruct(episode, "direct")
+
     touched = replace(said, metadata={**said.metadata, "touched": ["relation"]})
+
     assert counted_slots((episode, said)) == hidden_slots((episode, said))
     assert counted_slots((episode, touched)) == ("relation",)
     assert set(score_chance((episode, touched)).slots) == {"relation"}
@@ -318,9 +327,10 @@ def test_rows_have_all_instructions():
     assert sum(row.count for row in rows["pattern"]) == 50
     assert [(row.group, row.count) for row in rows["task"]] == [(("reasoning", "BinFill"), 50)]
     assert {row.group[1] for row in rows["slot"]} == {"BinFill colors", "BinFill counts"}
+
     (whole,) = rows[None]
-    by_slot = {one.group: one.count * one.shares[CHANCE].slots for one in rows["slot"]}
-    hidden = sum(one.count for one in rows["slot"])
+    by_slot = {row.group: row.count * row.shares[CHANCE].slots for row in rows["slot"]}
+    hidden = sum(row.count for row in rows["slot"])
     assert sum(by_slot.values()) / hidden == pytest.approx(whole.shares[CHANCE].slots)
 
 
@@ -378,6 +388,7 @@ def test_bad_input_is_one_sentence(words, sentence):
 def test_without_scikit_learn_one_sentence_says_so(monkeypatch):
     monkeypatch.setitem(sys.modules, "sklearn.neural_network", None)
     outcome = call("--tasks", "StopCube", "--learned")
+
     assert isinstance(outcome.exception, MissingDependencyError)
     assert "[report]'" in str(outcome.exception)
 
@@ -387,7 +398,9 @@ def test_the_learned_floors_are_columns():
     (row,) = shortcut_rows(("StopCube",), ("test",), ("direct",), InstructionOptions(), learning=0)
     assert list(row.shares) == ["chance", *SURFACE_RULES, *LEARNED_FLOORS]
     assert row.shares["text-only"].goals > 0.9
+
     low, high = row.excess.interval(1)
     assert 0.5 < low < row.excess.value < high < 1
+
     wide = row.excess.interval(100)
     assert wide[0] < low < high < wide[1]

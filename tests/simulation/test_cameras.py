@@ -74,6 +74,7 @@ def test_one_drawing_gives_everything(world, cameras, takes):
         picture[:] = 0  # callers may do with a picture what they like
         assert cameras.picture("front")[seen].any()
     assert len(takes) >= 1
+
     cube.put(cube.item.position)
 
 
@@ -87,7 +88,9 @@ def test_pictures_do_not_depend_on_other_worlds_in_the_process():
     other.step(HOME_ACTION)
     other.picture("front")
     again = World(episode.scene)
+
     again.step(HOME_ACTION)
+
     for camera, picture in zip(CAMERAS, alone, strict=True):
         assert np.array_equal(first.picture(camera), picture)
         assert np.array_equal(again.picture(camera), picture)

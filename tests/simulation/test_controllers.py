@@ -22,11 +22,13 @@ def make(actions, **options):
 def test_a_pose_is_one_control_step_towards_it():
     env = make("ee_pose")
     assert env.action_space.shape == (7,)
+
     goal = np.array([-0.1, 0.1, 0.25, np.pi - 0.2, 0.1, 0.4])
     info = {}
     for step in range(1, 31):
         observation, *_, info = env.step(np.append(goal, -1.0))
         assert info["steps"] == step
+
     reached = observation["end_effector"] - goal
     reached[3:] = (reached[3:] + np.pi) % (2 * np.pi) - np.pi
     assert np.abs(reached).max() < 2e-3
@@ -34,36 +36,40 @@ def test_a_pose_is_one_control_step_towards_it():
 
 
 def test_joint_angles_and_the_pose_that_they_have_lead_to_the_same():
-    joints, poses = make("joint_angle"), make("ee_pose")
+    joints = make("joint_angle")
+    poses = make("ee_pose")
     target = HOME_ACTION + np.array([0.1, 0.1, -0.1, -0.1, 0.1, 0.1, 0.1, 0.0])
     for _ in range(30):
         wanted, *_ = joints.step(target)
+
     for _ in range(40):
         got, *_ = poses.step(np.append(wanted["end_effector"], 1.0))
+
     assert got["end_effector"] == pytest.approx(wanted["end_effector"], abs=2e-3)
 
 
 def test_waypoints_alone_do_a_whole_task():
     env = make("waypoint")
-    objects = {name: body.position for name, body in env.session.world.bodies.items()}
+    bodies = env.session.world.bodies
     slots = env.episode.goal.as_mapping()
-    cube, target, button = objects[f"cube_{slots['color']}"], objects["target"], objects["button"]
-    yaw = env.episode.scene[f"cube_{slots['color']}"].yaw
+    name = f"cube_{slots['color']}"
+    yaw = env.episode.scene[name].yaw
     yaw = (yaw + np.pi / 4) % (np.pi / 2) - np.pi / 4
 
-    def go(place, height, gripper, turn=0.0):
+    def go(place, height, gripper, turn=yaw):
         return env.step([place.x, place.y, height, np.pi, 0.0, turn, gripper])
 
     for _ in range(slots["repeats"]):
-        cube = env.session.world.bodies[f"cube_{slots['color']}"].position
+        cube = bodies[name].position
         for height, gripper in ((0.15, 1), (0.02, -1), (0.15, 0)):
-            go(cube, height, gripper, yaw)
-        assert Fact("picked", f"cube_{slots['color']}") in env.session.world.facts
+            go(cube, height, gripper)
+        assert Fact("picked", name) in env.session.world.facts
         # Neither -1 nor +1: the gripper stays as it was, closed.
         for height, gripper in ((0.15, 0.3), (0.02, 1), (0.15, 0.999)):
-            go(target, height, gripper, yaw)
-    go(button, 0.15, -1)
-    *_, terminated, truncated, info = go(button, 0.0075, -1)
+            go(bodies["target"].position, height, gripper)
+    go(bodies["button"].position, 0.15, -1, turn=0.0)
+    *_, terminated, truncated, info = go(bodies["button"].position, 0.0075, -1, turn=0.0)
+
     assert (info["status"], terminated, truncated) == ("success", True, False)
 
 
@@ -72,8 +78,10 @@ def test_the_gripper_takes_six_steps_and_only_for_exact_commands():
     here = env.session.world.robot.tool_pose.p
     observation, *_, info = env.step([*here, *DOWN, 0.5])
     moved = info["steps"]
+
     assert moved < 5
     assert observation["gripper"].min() > 0.039
+
     observation, *_, info = env.step([*here, *DOWN, -1.0])
     assert info["steps"] - 2 * moved in range(4, 9)
     assert observation["gripper"].max() < 0.005
@@ -85,6 +93,7 @@ def test_a_pose_out_of_reach_fails_the_episode_in_words(actions):
     _, reward, terminated, truncated, info = env.step(OUT_OF_REACH)
     assert (reward, terminated, truncated) == (0.0, True, False)
     assert (info["status"], info["steps"]) == ("failure", 0)
+
     reached = "no joint positions reach" if actions == "ee_pose" else "no straight move reaches"
     words = f"{reached} (1.500, 0.000, 0.300) with roll 3.142, pitch 0.000, yaw 0.000"
     assert info["cause"] == words
@@ -93,5 +102,6 @@ def test_a_pose_out_of_reach_fails_the_episode_in_words(actions):
 def test_time_is_up_in_the_middle_of_a_move():
     env = make("waypoint", max_steps=10)
     *_, terminated, truncated, info = env.step([-0.1, 0.1, 0.1, *DOWN, -1.0])
+
     assert (terminated, truncated) == (False, True)
     assert (info["status"], info["steps"]) == ("timeout", 10)

@@ -57,7 +57,8 @@ def unplanned(monkeypatch):
 @pytest.fixture
 def drawn(monkeypatch):
     """Cameras whose pictures have been drawn, in order."""
-    names, picture = [], Cameras.picture
+    names = []
+    picture = Cameras.picture
 
     def counted(self, camera):
         names.append(camera)
@@ -85,14 +86,17 @@ def test_a_replay_is_the_demonstration_to_the_last_bit(task):
     planned, replayed = (
         EpisodeSession(get_episode(task, "test", 3), visible=shown) for shown in (False, True)
     )
-    first, second = [], []
+    first = []
+    second = []
     made = planned.play_demonstration(lambda _: first.append(planned.state_hash()))
     restored = Recording.from_bytes(made.to_bytes())
     again = replayed.play_demonstration(lambda _: second.append(replayed.state_hash()), restored)
+
     assert first == second
     assert len(first) == restored.video_length(planned.episode) > 0
     assert again.end == made.end == restored.end
     assert planned.events == replayed.events
+
     # What cannot be read, such as the solver's memory of contacts, shows in what comes next.
     rng = np.random.default_rng(5)
     for _ in range(100):
@@ -120,7 +124,9 @@ def test_pictures_read_late_are_those_of_the_demonstration(task):
     _, info = env.reset()
     env.step_chunk(np.tile(HOME_ACTION + 0.1, (20, 1)))
     env.close()
+
     video = info["demonstration"]
+
     assert video.length == len(steps) == len(video["gripper"])
     for field, frames in seen.items():
         assert np.array_equal(video[field], np.stack(frames)), field
@@ -135,7 +141,9 @@ def test_depth_and_calibration_of_the_video_are_those_of_its_moments():
         lambda env, shown: seen.append(env._current.observation_builder.read()) if shown else 0
     )
     video = env.reset()[1]["demonstration"]
+
     assert list(video) == list(seen[0])
+
     same({key: np.stack([moment[key] for moment in seen]) for key in video}, dict(video))
 
 
@@ -143,14 +151,17 @@ def test_nothing_is_drawn_before_it_is_read(drawn):
     env, _, info = reset(cameras=("front", "wrist"))
     world = weakref.ref(env.session.world)
     assert drawn == ["front", "wrist"]  # the first observation
+
     video = info["demonstration"]
     assert (video.length, len(video["joint_positions"]), "front_rgb" in video) == (66, 66, True)
     assert "front_rgb (not drawn)" in repr(video)
     assert drawn == ["front", "wrist"]
+
     env.close()
     assert world() is None
     assert video["wrist_rgb"].shape == (66, 256, 256, 3)
     assert drawn == ["front", "wrist"] + ["wrist"] * 66
+
     other = pickle.loads(pickle.dumps(video))  # noqa: S301 - our own
     same(dict(other), dict(video))
     assert list(other) == list(video)
@@ -160,7 +171,8 @@ def test_nothing_is_drawn_before_it_is_read(drawn):
 
 
 def test_all_pictures_are_drawn_in_one_replay(drawn, monkeypatch):
-    replays, play = [], EpisodeSession.play_demonstration
+    replays = []
+    play = EpisodeSession.play_demonstration
     options = {"cameras": ("front", "wrist"), "depth": True, "demonstration_frames": 5}
     _, _, info = reset(**options)
     alone = dict(reset(**options)[2]["demonstration"])
@@ -172,11 +184,14 @@ def test_all_pictures_are_drawn_in_one_replay(drawn, monkeypatch):
     )
     video = info["demonstration"]
     wrist = video["wrist_rgb"]
+
     assert (len(replays), drawn) == (1, ["wrist"] * 14)
+
     video.draw()
     assert (len(replays), drawn) == (2, ["wrist"] * 14 + ["front"] * 14)
     assert "not drawn" not in repr(video)
     assert video["wrist_rgb"] is wrist
+
     same(alone, dict(video))
     pickle.dumps(video)
     video.draw()
@@ -223,12 +238,14 @@ def test_cold_warm_or_off_the_cache_changes_nothing(cache, monkeypatch, drawn, u
     at_first = len(drawn)
     assert len(list(cache.glob("actions/*"))) == 1
     assert len(list(cache.glob("frames/*"))) == 4
+
     with monkeypatch.context() as patch:
         patch.setenv("ROBOIRG_CACHE", "off")
         off = story()
     drawn.clear()
     unplanned()
     warm = story()
+
     assert len(drawn) == at_first - 2 * 11
     for arrays, info, record in (warm, off):
         assert record == cold[2]
@@ -245,10 +262,12 @@ def test_a_warm_reset_is_a_cold_one(task, cache, unplanned):
     small = [entry.stat().st_size < 200_000 for entry in cache.glob("actions/*")]
     # A shipped recording needs no cache.
     assert small == ([] if info["demonstration_source"] == "recorded" else [True])
+
     unplanned()
     env, again, warm = reset(task)
     same(dict(info.pop("demonstration")), dict(warm.pop("demonstration")))
     assert (info, observation.pop("instruction")) == (warm, again.pop("instruction"))
+
     same(observation, again)
     assert env.session.judge.index == len(env.episode.demonstration)
 
@@ -264,22 +283,22 @@ def kept_recording(cache):
 def test_a_replay_that_ends_differently_is_replaced_and_told(cache, caplog, fault):
     _, observation, info = reset()
     store, name, right = kept_recording(cache)
-    changes = {
-        "end": "0" * 64,
-        "actions": right.actions[::-1] + 0.3,
-        "stages": right.stages[:0],
+    wrong = {
+        "end": {"end": "0" * 64},
+        "actions": {"actions": right.actions[::-1] + 0.3},
+        "stages": {"stages": right.stages[:0], "actions": right.actions[:0]},
     }
-    wrong = {fault: changes[fault]}
-    if fault == "stages":
-        wrong["actions"] = right.actions[:0]
-    store.write(name, dataclasses.replace(right, **wrong).to_bytes())
+    store.write(name, dataclasses.replace(right, **wrong[fault]).to_bytes())
+
     _, after, rebuilt = reset()
+
     assert [record.levelname for record in caplog.records] == ["WARNING"]
     assert name in caplog.text
     assert f"{SHORT}/test/1" in caplog.text
     assert np.array_equal(after["end_effector"], observation["end_effector"])
     same(dict(info["demonstration"]), dict(rebuilt["demonstration"]))
     assert Recording.from_bytes(store.read(name)).end == right.end
+
     reset()
     assert len(caplog.records) == 1
 
@@ -291,7 +310,9 @@ def test_a_frame_hook_sees_the_right_demonstration_once(cache):
     seen = []
     env = roboirg.make(SHORT, episode=1, cameras=())
     env.set_frame_hook(lambda env, shown: seen.append(env.session.world.elapsed))
+
     env.reset()
+
     assert seen == list(range(1, 68))
 
 
@@ -300,6 +321,7 @@ def test_keys_change_with_what_determines_a_demonstration(monkeypatch):
     key = demonstration_cache.recording_key(episode)
     assert demonstration_cache.recording_key(get_episode(SHORT, "test", 1)) == key
     assert demonstration_cache.recording_key(get_episode(SHORT, "test", 2)) != key
+
     for name, other in (("_SOURCE_HASH", "another"), ("processor_features", lambda: "another")):
         with monkeypatch.context() as patch:
             patch.setattr(demonstration_cache, name, other)
@@ -307,6 +329,7 @@ def test_keys_change_with_what_determines_a_demonstration(monkeypatch):
             assert demonstration_cache.recording_key(episode) != key
         demonstration_cache._platform_fingerprint.cache_clear()
     assert demonstration_cache.recording_key(episode) == key
+
     fingerprint = demonstration_cache._platform_fingerprint()
     for part in ("sapien 3", "numpy ", "scipy ", "toppra ", "python 3"):
         assert part in fingerprint
@@ -319,9 +342,11 @@ def test_pictures_drawn_otherwise_are_other_entries(cache):
 
     faithful = read("faithful")
     assert len(list(cache.glob("frames/*"))) == 1
+
     key = frame_sequence.rendering_key(FAITHFUL)
     assert "llvmpipe" in key or "NVIDIA" in key
     assert ".so" in key
+
     light = read("light")
     assert len(list(cache.glob("frames/*"))) == 2
     assert not np.array_equal(light, faithful)
@@ -332,7 +357,9 @@ def test_pictures_drawn_otherwise_are_other_entries(cache):
 def test_a_recording_survives_as_it_is():
     steps = [RecordedStep(1, np.nextafter(np.arange(8.0), 9.0)), RecordedStep(2, np.full(8, -0.0))]
     recording = Recording.from_steps(steps, "ab12")
+
     again = Recording.from_bytes(recording.to_bytes())
+
     assert again.actions.tobytes() == recording.actions.tobytes()
     assert [step.stage for step in again.steps()] == [1, 2]
     assert again.end == "ab12"

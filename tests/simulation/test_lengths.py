@@ -46,7 +46,9 @@ def test_videos_are_as_long_as_the_known_ones_within_a_tenth(task, difficulty):
     low, high = VIDEOS[task, difficulty]
     episode = next(drawn_episodes(task, difficulty))
     frames = []
+
     EpisodeSession(episode, visible=False).play_demonstration(frames.append)
+
     assert 0.9 * low <= len(frames) <= 1.1 * high
 
 
@@ -61,6 +63,7 @@ def test_primitives_take_as_long_as_the_known_ones_within_fifteen_percent():
                 for action in itertools.chain.from_iterable(expert.execute(stage.primitive)):
                     session.step(action)
                 steps[stage.primitive.kind].append(session.world.elapsed - begin)
+
     assert set(steps) == set(PRIMITIVES)
     for kind, (low, high) in PRIMITIVES.items():
         assert 0.85 * low <= min(steps[kind]), kind

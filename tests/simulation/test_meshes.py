@@ -58,6 +58,7 @@ def test_meshes_have_a_share_of_the_cache(cache, monkeypatch):
         cached_arrays("thing", bytes([number]), lambda: {"zeros": np.zeros(200)})
         assert sum(path.stat().st_size for path in cache.iterdir()) <= 10_000
     assert 1 < len(complete(cache)) < 20
+
     open_cache("actions").write("a1", bytes(5000))
     assert open_cache("actions").read("a1") == bytes(5000)
 
@@ -79,14 +80,17 @@ def test_damaged_meshes_are_made_anew_and_told(cache):
 
     picture, complaints = draw()
     assert complaints == ""
+
     sound = {path.name: path.read_bytes() for path in cache.iterdir()}
     assert len(sound) == len(complete(cache)) == DERIVED
+
     harmed = [next(cache.glob(f"{name}-*")) for name in ("table", "link0")]
     harmed[0].write_bytes(sound[harmed[0].name][:-1000])
     raw = bytearray(sound[harmed[1].name])
     raw[len(raw) // 2] ^= 1
     harmed[1].write_bytes(raw)
     again, complaints = draw()
+
     assert again == picture
     for path in harmed:
         assert f"The cache entry {path} is damaged and will be rebuilt." in complaints
@@ -102,6 +106,7 @@ def test_the_table_is_the_installed_one():
             assert np.array_equal(getattr(ours, what), getattr(theirs, what))
         assert np.array_equal(ours.get_vertex_normal(), theirs.get_vertex_normal())
         assert np.array_equal(ours.get_vertex_uv(), theirs.get_vertex_uv())
+
     theirs = stock.parts[0].material
     assert (theirs.metallic_texture.download()[..., 2] == 255 * table_mesh.METALLIC).all()
     assert theirs.emission_texture is theirs.transmission_texture is None
@@ -114,6 +119,8 @@ def test_the_table_is_the_installed_one():
 def test_code_that_derives_is_part_of_the_key(cache, monkeypatch):
     cached_arrays("thing", b"", dict)
     monkeypatch.setattr(mesh_cache, "source_code", lambda *_: b"other code")
+
     cached_arrays("thing", b"", dict)
+
     assert len(complete(cache)) == 2
     assert robot_meshes.source_code("robot_meshes") != mesh_cache.source_code("robot_meshes")

@@ -50,7 +50,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def unpacked(folder):
-    return sorted(str(one.relative_to(folder)) for one in folder.rglob("*") if one.is_file())
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
 EVERYTHING = sorted([*model_files.MODEL_FILES, "LICENSE", "LICENSE-3RD-PARTY"])
@@ -60,10 +60,11 @@ def test_a_wheel_on_this_machine_is_unpacked_once(wheel, folder):
     said = []
     assert fetch_model_files(wheel, said.append) == folder
     assert unpacked(folder) == EVERYTHING
-    before = {one: one.stat().st_mtime_ns for one in folder.rglob("*")}
+
+    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*")}
     wheel.unlink()
     assert fetch_model_files(None, said.append) == folder
-    assert {one: one.stat().st_mtime_ns for one in folder.rglob("*")} == before
+    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*")} == before
     assert said == []
 
 
@@ -73,8 +74,10 @@ def test_missing_and_damaged_files_are_fetched_again(wheel, folder):
     (folder / model_files.MODEL_FILES[5]).write_text("damaged")
     with pytest.raises(MissingDependencyError, match=r"is missing in .*; run: roboirg fetch-model"):
         model_files.look_for_model_files()
+
     fetch_model_files(wheel, print)
     assert unpacked(folder) == EVERYTHING
+
     (folder / model_files.MODEL_FILES[5]).write_text("damaged")
     with pytest.raises(MissingDependencyError, match=r"not those of ManiSkill 3\.0\.1"):
         model_files.look_for_model_files()
@@ -127,6 +130,7 @@ def test_without_pip_the_wheel_comes_from_pypi_s_files(wheel, folder, monkeypatc
     assert unpacked(folder) == EVERYTHING
     assert len(said) == 1
     assert wheel.as_uri() in said[0]
+
     (folder / model_files.MODEL_FILES[0]).unlink()
     monkeypatch.setattr(model_fetch, "WHEEL_URL", f"{wheel.as_uri()}x")
     with pytest.raises(MissingDependencyError, match=r"Cannot download .*--wheel"):
@@ -151,5 +155,6 @@ def test_a_kill_while_unpacking_leaves_whole_files(wheel, folder):
     for name in unpacked(folder):
         assert (folder / name).read_bytes() == name.encode() * 50
     assert len(unpacked(folder)) == 6
+
     fetch_model_files(wheel, print)
     assert unpacked(folder) == EVERYTHING

@@ -34,17 +34,21 @@ def test_two_objects_change_places_on_opposite_lanes_and_the_others_stay():
     objects = tuple(cube(name, *xy, yaw=0.3 * i) for i, (name, xy) in enumerate(places.items()))
     world = World(Scene(objects, (Swap("a", "b", 10, 50, 0.07, ("c",)),)), visible=False)
     rest(world, 10)
+
     assert plane(world, "a") == pytest.approx(places["a"], abs=1e-4)
+
     rest(world, 26)  # the step with k = 35 is half way
     # a goes towards +y, so its left is -x; b comes the other way on its own left.
     assert plane(world, "a") == pytest.approx((-0.07, 0.0), abs=2e-3)
     assert plane(world, "b") == pytest.approx((0.07, 0.0), abs=2e-3)
     assert turn(world, "a") == pytest.approx(0.15, abs=1e-2)
+
     rest(world, 25)
     assert plane(world, "a") == pytest.approx(places["b"], abs=1e-4)
     assert plane(world, "b") == pytest.approx(places["a"], abs=1e-4)
     assert plane(world, "c") == pytest.approx(places["c"], abs=1e-4)
     assert turn(world, "a") == pytest.approx(0.3, abs=1e-3)
+
     rest(world, 5)
     assert plane(world, "a") == pytest.approx(places["b"], abs=1e-4)
 
@@ -58,7 +62,9 @@ def test_swaps_back_to_back_hand_over_and_wait_for_their_stage():
     )
     world = World(Scene(objects, swaps), visible=False)
     rest(world, 20)
+
     assert plane(world, "a") == pytest.approx(places["a"], abs=1e-4)
+
     world.note_stage(2)
     rest(world, 101)
     assert plane(world, "a") == pytest.approx(places["c"], abs=1e-4)
@@ -71,59 +77,81 @@ def test_what_is_away_comes_back_to_its_place_or_to_anothers():
     motions = (Away("a", 0, 5), Swap("b", "c", 0, 6, 0.0), Away("a", 8, 12, under="b"))
     world = World(Scene(objects, motions), visible=False)
     assert Fact("lying", "a") not in world.facts
+
     rest(world, 5)
     assert plane(world, "a")[0] > 5
     assert Fact("lying", "a") not in world.facts
+
     rest(world, 1)
     assert plane(world, "a") == pytest.approx((0.0, -0.1), abs=1e-4)
     assert Fact("lying", "a") in world.facts
+
     rest(world, 4)
     assert plane(world, "a")[0] > 5
+
     rest(world, 3)
     # Where b is now, with its own height: they push each other apart afterwards.
     assert plane(world, "a") == pytest.approx((0.1, 0.0), abs=0.03)
 
 
-def test_a_shuttle_runs_to_and_fro_and_stops_for_good_when_pressed():
-    pressed = Fact("pressed", "button")
-    run = Shuttle("s", Point(0, -0.3, 0.01), Point(0, 0.3, 0.01), 60, 5, pressed)
-    assert shuttle_position(run, 0) == run.begin
-    assert shuttle_position(run, 30).y == pytest.approx(0.0)
-    assert shuttle_position(run, 60) == run.end
-    assert shuttle_position(run, 90).y == pytest.approx(0.0)
-    assert shuttle_position(run, 120) == run.begin
-    assert shuttle_position(run, 300) == shuttle_position(run, 1000) == run.end
-    # Peak speed, from the facts: 0.0150 m a step for 60 steps a pass.
-    assert shuttle_position(run, 31).y - shuttle_position(run, 30).y == pytest.approx(0.015, 1e-2)
+PRESSED = Fact("pressed", "button")
+RUN = Shuttle("s", Point(0, -0.3, 0.01), Point(0, 0.3, 0.01), 60, 5, PRESSED)
 
+
+def test_a_shuttle_runs_to_and_fro():
+    places = [shuttle_position(RUN, step) for step in range(121)]
+
+    assert places[0] == places[120] == RUN.begin
+    assert places[30].y == pytest.approx(0.0)
+    assert places[60] == RUN.end
+    assert places[90].y == pytest.approx(0.0)
+    assert shuttle_position(RUN, 300) == shuttle_position(RUN, 1000) == RUN.end
+    # Peak speed, from the facts: 0.0150 m a step for 60 steps a pass.
+    assert places[31].y - places[30].y == pytest.approx(0.015, 1e-2)
+
+
+def shuttle_world():
+    """A world with a shuttle that a button stops, and a target in the middle of its way."""
     objects = (
         SceneObject("button", "button", Point(-0.06, 0.0, 0.0075)),
         SceneObject("target", "target", Point(0.0, 0.0, 0.01), radius=0.036, thickness=0.01),
-        SceneObject("s", "shuttle", run.begin, rgb=(0.2, 0.7, 0.4)),
+        SceneObject("s", "shuttle", RUN.begin, rgb=(0.2, 0.7, 0.4)),
     )
-    world = World(Scene(objects, (run,)), visible=False)
-    near, stopped = Fact("near", "s", "target"), Fact("stopped", "s", "target")
-    seen = []
-    for _ in range(33):
-        seen.append(near in world.step(physics_settings.HOME_ACTION))
+    return World(Scene(objects, (RUN,)), visible=False)
+
+
+def test_a_shuttle_is_near_the_target_as_its_positions_say():
+    world = shuttle_world()
+    near = []
+    for step in range(1, 34):
+        if Fact("near", "s", "target") in world.step(physics_settings.HOME_ACTION):
+            near.append(step)
         # The step that ends at t shows position t - 1.
-        assert world.bodies["s"].position.y == pytest.approx(
-            shuttle_position(run, world.elapsed - 1).y, abs=1e-6
-        )
-    assert [step for step, is_near in enumerate(seen, 1) if is_near] == [*range(27, 34)]
-    (joint,) = world.bodies["button"].button.active_joints
-    cap = world.bodies["button"].button
-    cap.set_qpos(np.array([-0.012]))
+        expected = shuttle_position(RUN, world.elapsed - 1).y
+        assert world.bodies["s"].position.y == pytest.approx(expected, abs=1e-6)
+
+    assert near == [*range(27, 34)]
+
+
+def test_a_pressed_button_stops_a_shuttle_for_good():
+    world = shuttle_world()
+    stopped = Fact("stopped", "s", "target")
+    rest(world, 33)
+    button = world.bodies["button"].button
+    (joint,) = button.active_joints
+
+    button.set_qpos(np.array([-0.012]))
     joint.set_drive_target(-0.012)
     world.step(physics_settings.HOME_ACTION)
-    assert pressed in world.facts
+    assert PRESSED in world.facts
     assert stopped not in world.facts
     rest(world, 1)
     assert stopped in world.facts
+
     where = world.bodies["s"].position
     joint.set_drive_target(0.0)
     rest(world, 30)
-    assert pressed not in world.facts
+    assert PRESSED not in world.facts
     assert world.bodies["s"].position == where
     assert stopped in world.facts
 
@@ -136,16 +164,22 @@ def test_a_light_glows_while_something_is_over_its_target_and_lingers():
         SceneObject("light", "marker", Point(0.0, 0.0, -0.005), radius=0.0401),
     )
     world = World(Scene(objects, (Glow("light", over, 20),)), visible=False)
-    light, falling = world.bodies["light"], world.bodies["a"]
+    light = world.bodies["light"]
+    falling = world.bodies["a"]
     rest(world, 1)
+
     assert over in world.facts
+
     rest(world, 1)
     assert light.position == pytest.approx(light.item.position)
+
     falling.put(Point(0.2, 0.2, 0.02))
     rest(world, 1)
     assert over not in world.facts
+
     rest(world, 20)
     assert light.position == pytest.approx(light.item.position)
+
     rest(world, 1)
     assert light.position.x > 5
 
@@ -163,7 +197,9 @@ def test_a_cube_that_falls_into_the_bin_is_gone_and_stays_counted():
         rest(world, 1)
         steps += 1
         assert steps < 20
+
     assert world.bodies["a"].position.x > 5
+
     rest(world, 10)
     assert binned in world.facts
     assert Fact("lying", "a") not in world.facts

@@ -109,6 +109,7 @@ def test_what_no_straight_line_reaches_is_reached_by_way_of_home(planner):
     goal = turned(place, 1.6)
     with pytest.raises(MotionPlanningError, match="joint limit"):
         planner.plan_straight(twisted, goal)
+
     path = planner.plan_move(twisted, goal)
     assert np.abs(path - HOME).max(axis=1).min() < 1e-6
     assert planner.forward_kinematics(path[-1]).position == pytest.approx(goal.position, abs=1e-5)
@@ -126,6 +127,7 @@ def test_a_move_to_where_one_is_takes_no_time():
 def test_every_short_move_has_a_timing(exponent, direction):
     way = np.array(direction) / np.linalg.norm(direction) * 10.0**exponent
     path = time_parameterize(np.stack([HOME, HOME + way]))
+
     assert path[0] == pytest.approx(HOME)
     assert path[-1] == pytest.approx(HOME + way, abs=1e-6)
 
@@ -134,7 +136,9 @@ def test_every_short_move_has_a_timing(exponent, direction):
 def test_to_stay_is_no_way_home(planner, tilt):
     start = planner.plan_straight(HOME, ToolPose(np.array([-0.1, 0.0, 0.2]), DOWN))[-1]
     place = planner.forward_kinematics(start)
+
     goal = ToolPose(place.position + tilt, place.rotation)
+
     assert len(planner.plan_move(start, goal)) <= 2
 
 
@@ -193,5 +197,6 @@ def test_where_open_fingers_land_on_neighbors_a_narrower_gripper_picks(monkeypat
     around = [(0.07, 0.0), (-0.07, 0.0), (0.0, 0.07), (0.0, -0.07)]
     cubes = [cube(f"cube_{number}", -0.05 + x, 0.1 + y) for number, (x, y) in enumerate(around)]
     assert lifted(cube("middle", -0.05, 0.1), *cubes)
+
     monkeypatch.setattr(primitives, "NARROW", primitives.OPEN)
     assert not lifted(cube("middle", -0.05, 0.1), *cubes)

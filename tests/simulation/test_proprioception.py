@@ -47,7 +47,7 @@ def test_angles_without_turns_are_those_of_numpy(before, now):
 
 @pytest.mark.parametrize("spread", [1.0, 1e-3, 1e-7])
 @pytest.mark.parametrize("around", [(0, 1, 0, 0), (1, 0, 1, 0), (1, 0, -1, 0), (0, 1, 0, -1)])
-def test_angles_near_where_they_jump(around, spread):
+def test_angles_near_where_they_jump_are_those_of_scipy(around, spread):
     rng = np.random.default_rng(0)
     for offset in rng.normal(0.0, spread, (300, 4)):
         pose = sapien.Pose(q=np.array(around) + offset)

@@ -41,6 +41,7 @@ def dropped(x, y, height, box=BOX):
 def test_a_roll_weighs_about_as_much_as_a_cube_and_lies_still():
     world = rest(World(Scene((TAPE,)), visible=False), 40)
     body = world.bodies["tape"]
+
     assert 0.05 <= body.physics.mass <= 0.1
     assert body.position == pytest.approx(TAPE.position, abs=1e-4)
     assert Fact("lying", "tape") in world.facts
@@ -49,6 +50,7 @@ def test_a_roll_weighs_about_as_much_as_a_cube_and_lies_still():
 def test_a_roll_is_picked_from_outside():
     world = World(Scene((TAPE,)), visible=False)
     execute(world, Primitive("pick_cube", "tape"))
+
     assert Fact("picked", "tape") in world.facts
     assert Fact("held", "tape") in world.facts
 
@@ -63,10 +65,13 @@ def test_a_roll_is_picked_by_its_wall():
     step_through(world, [expert._move(above, rotation)], HALF_OPEN)
     step_through(world, [expert._grip(physics_settings.OPEN)], HALF_OPEN)
     step_through(world, [expert._move(at, rotation)], HALF_OPEN)
+
     assert world.bodies["tape"].position == pytest.approx(TAPE.position, abs=2e-3)
+
     step_through(world, [expert._grip(physics_settings.CLOSED)])
     wall = object_sizes.TAPE_RADIUS - object_sizes.TAPE_HOLE_RADIUS
     assert world.robot.finger_positions.sum() == pytest.approx(wall, abs=3e-3)
+
     step_through(world, [expert._move(above, rotation)])
     assert Fact("picked", "tape") in world.facts
 
@@ -78,6 +83,7 @@ def test_a_box_takes_in_what_falls_between_its_walls(x, y):
     low, high = (
         object_sizes.BOX_FLOOR + size for size in (object_sizes.TAPE_HALF, object_sizes.TAPE_RADIUS)
     )
+
     assert low - 1e-3 <= world.bodies["tape"].position.z <= high + 1e-3
     assert Fact("binned", "tape", "box_green") in world.facts
     assert world.bodies["box_green"].position == pytest.approx(BOX.position)
@@ -92,12 +98,15 @@ def test_beside_a_box_is_not_inside():
 def test_what_is_held_over_a_box_is_not_inside():
     episode = get_episode("PutInBox", "test", 0)
     world = World(episode.scene, visible=False)
-    expert, box = MotionPrimitives(world), f"box_{episode.goal.text('color')}"
+    expert = MotionPrimitives(world)
+    box = f"box_{episode.goal.text('color')}"
     step_through(world, expert.execute(Primitive("pick_cube", "tape")))
     into = expert.execute(Primitive("put_into", "tape", box))
     inside = Fact("binned", "tape", box)
     step_through(world, itertools.islice(into, 2))
+
     assert inside not in world.facts
+
     step_through(world, into)
     assert inside in world.facts
 
@@ -116,18 +125,20 @@ def test_a_box_is_open_and_the_hand_does_not_touch_it():
                 touched.update(names)
 
     env.set_frame_hook(look)
+
     assert play(env, make_policy("oracle", 0))["status"] == "success"
     assert touched <= {"tape", f"box_{episode.goal.text('color')}"}
 
 
-def test_the_hole_is_seen():
-    """Through the hole the front camera sees the disc on which the roll lies."""
+def test_the_front_camera_sees_through_the_hole_of_a_roll():
     disc = SceneObject("target", "target", Point(0.0, 0.0, 0.005), radius=0.05)
     world = rest(World(Scene((disc, TAPE))), 2)
+
     seen = world.cameras.segmentation("front")
+
     tape, target = (world.bodies[name].entity.per_scene_id for name in ("tape", "target"))
     rows, columns = np.nonzero(seen == tape)
     inside = seen[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
     middle = inside[:, inside.shape[1] // 2]
-    first, last = np.flatnonzero(middle == tape)[[0, -1]]
+    first, *_, last = np.flatnonzero(middle == tape)
     assert target in middle[first:last]

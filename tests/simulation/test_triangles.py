@@ -21,6 +21,7 @@ def hills():
 def test_triangles_keep_their_places_and_normals_when_they_share_corners():
     corners, normals = hills()
     shared = index_triangles(hills())
+
     assert np.array_equal(shared.normals[shared.triangles[:, 0]], normals)
     for given, kept in zip(corners, shared.vertices[shared.triangles], strict=True):
         assert any(np.array_equal(np.roll(given, turn, axis=0), kept) for turn in range(3))
@@ -30,6 +31,7 @@ def test_triangles_keep_their_places_and_normals_when_they_share_corners():
 def test_they_can_have_their_own_corners_again():
     shared = index_triangles(hills())
     own = duplicate_vertices(shared)
+
     assert len(own.vertices) == 3 * len(own.triangles)
     assert np.array_equal(own.to_triangles().corners, shared.to_triangles().corners)
     assert np.array_equal(own.to_triangles().normals, hills().normals)
@@ -38,5 +40,6 @@ def test_they_can_have_their_own_corners_again():
 def test_none_is_no_special_case():
     nothing = Triangles(np.zeros((0, 3, 3), np.float32), np.zeros((0, 3), np.float32))
     shared = index_triangles(nothing)
+
     assert [len(field) for field in shared] == [0, 0, 0]
     assert len(duplicate_vertices(shared).to_triangles().corners) == 0

@@ -31,7 +31,8 @@ def covered(corners, shift):
     ticks = np.arange(SIZE // 2 - WINDOW, SIZE // 2 + WINDOW) + 0.5
     x, y = np.meshgrid(ticks, ticks)
     (ax, ay), (bx, by) = (
-        np.moveaxis(one, -1, 0)[..., None, None] for one in (places, np.roll(places, -1, axis=1))
+        np.moveaxis(corner, -1, 0)[..., None, None]
+        for corner in (places, np.roll(places, -1, axis=1))
     )
     areas = (bx - ax) * (y - ay) - (by - ay) * (x - ax)
     inside = (areas <= 0).all(axis=1) | (areas >= 0).all(axis=1)
@@ -84,6 +85,7 @@ def test_what_is_out_of_the_picture_is_left_out_and_what_is_at_the_eye_is_kept()
 def test_the_front_camera_s_frame():
     matrix = to_front_camera(sapien.Pose())
     far = np.linalg.norm(np.subtract(FRONT_TARGET, FRONT_EYE))
+
     assert matrix @ [*FRONT_TARGET, 1] == pytest.approx([0, 0, far, 1], abs=1e-6)
     # The camera looks back at the robot: the world's y is to its right, up is against its y.
     assert matrix[0, 1] == pytest.approx(1, abs=1e-6)

@@ -24,11 +24,13 @@ def world_of(task: str, index: int = 3, *, visible: bool = False) -> World:
     return World(episode.scene, visible=visible)
 
 
-def test_calls_that_may_hang_are_reported_while_they_run(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_calls_that_may_hang_are_reported_while_they_run(monkeypatch):
     calls: list[tuple[str, float]] = []
     world = world_of("PickXtimes", visible=True)
     monkeypatch.setattr(waiting, "_native_listeners", [lambda *call: calls.append(call)])
+
     rest(world, 1).picture("front")
+
     # A picture is begun in the background, and then fetched.
     assert [(code, since > 0.0) for code, since in calls] == [
         *[("physics", True), ("physics", False)],
@@ -38,11 +40,13 @@ def test_calls_that_may_hang_are_reported_while_they_run(monkeypatch: pytest.Mon
 
 def test_objects_rest_where_and_weigh_what_the_facts_say():
     world = rest(world_of("PickXtimes"), 40)
-    cube, button = world.bodies["cube_red"], world.bodies["button"]
+    cube = world.bodies["cube_red"]
+    button = world.bodies["button"]
     assert cube.position.z == pytest.approx(0.02, abs=1e-5)
     assert cube.physics.mass == pytest.approx(0.064)
     assert button.physics.mass == pytest.approx(0.0427, abs=1e-4)
     assert button.pressed_depth == pytest.approx(0.0005, abs=5e-5)
+
     cubes = {Fact("lying", f"cube_{color}") for color in ("red", "green", "blue")}
     assert world.facts == {Fact("still", "robot"), Fact("home", "robot"), *cubes}
 
@@ -55,6 +59,7 @@ def test_containers_appear_over_their_cubes_after_32_steps():
     )
     # Where they are parked is not a lift.
     assert world.facts == {Fact("still", "robot"), Fact("home", "robot")}
+
     rest(world, 33)
     for body in world.bodies.values():
         if body.item.kind == "container":
@@ -74,6 +79,7 @@ def test_a_released_motion_leaves_the_object_alone():
     moved = World(episode.scene, visible=False)
     rest(moved, 40)
     assert all(isinstance(motion, Away) for motion in episode.scene.motions)
+
     body = moved.bodies["container_0"]
     body.put(body.item.position._replace(z=0.3))
     rest(moved, 2)
@@ -99,7 +105,9 @@ def test_worlds_repeat_themselves_bit_for_bit(task):
 
     first = trace()
     other = world_of(TASKS[0], index=1)  # another world alive and moving makes no difference
+
     rest(other, 7)
+
     assert trace() == first
 
 
@@ -110,6 +118,7 @@ def test_the_gripper_opens_and_closes():
         world.step(closing)
     assert world.robot.finger_positions == pytest.approx([0, 0], abs=1e-3)
     assert Fact("home", "robot") not in world.facts
+
     rest(world, 10)
     assert world.robot.finger_positions == pytest.approx([0.04, 0.04], abs=1e-3)
 
@@ -119,7 +128,9 @@ def test_a_moving_arm_is_not_still():
     action = physics_settings.HOME_ACTION.copy()
     action[0] += 0.3
     world.step(action)
+
     assert Fact("still", "robot") not in world.facts
+
     for _ in range(40):
         world.step(action)
     assert Fact("still", "robot") in world.facts

@@ -57,11 +57,13 @@ def test_bin_fill_keeps_the_bin_off_the_button(monkeypatch):
 def test_bin_fill_goals_are_all_that_can_be_put_in():
     scene, _ = scenes("BinFill", "hard")[0]
     there = {c: len(of_color(scene, c)) for c in ("red", "blue", "green")}
+
     possible = [
         counts
         for counts in itertools.product(*(range(number + 1) for number in there.values()))
         if 1 <= sum(counts) <= 5
     ]
+
     assert len(bin_fill.goals(scene)) == len(possible)
     assert all(min(goal.numbers("counts")) >= 1 for goal in bin_fill.goals(scene))
 
@@ -71,6 +73,7 @@ def test_bin_fill_subgoals_count_within_a_color():
     goal = next(g for g in bin_fill.goals(scene) if g.numbers("counts") == (2, 1))
     first, second = goal.texts("colors")
     scene = replace(scene, color_order=())  # the goal's
+
     assert [stage.subgoal for stage in bin_fill.stages(scene, goal)] == [
         f"pick up the first {first} cube {{at}}",
         "put it into the bin {at}",
@@ -80,6 +83,7 @@ def test_bin_fill_subgoals_count_within_a_color():
         "put it into the bin {at}",
         "press the button {at}",
     ]
+
     turned = bin_fill.stages(replace(scene, color_order=(second,)), goal)
     assert [stage.subgoal for stage in turned[::2]] == [
         f"pick up the first {second} cube {{at}}",
@@ -112,7 +116,9 @@ def test_swing_stages_go_right_then_left_with_the_goals_cube(difficulty):
 def test_swing_subgoals_number_the_repetitions():
     scene, _ = scenes("SwingXtimes", "easy")[0]
     goal = swing_x_times.TASK.goals(scene)[1]
+
     color = goal.text("color")
+
     assert [stage.subgoal for stage in swing_x_times.stages(scene, goal)] == [
         f"pick up the {color} cube {{at}}",
         "move to the top of the right-side target {at} for the first time",

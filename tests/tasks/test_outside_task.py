@@ -85,14 +85,16 @@ def test_a_run_of_a_task_without_words_is_refused(task, monkeypatch):
 def test_its_causes_say_what_was_done_and_what_was_expected(task):
     episode = get_episode(NAME, "test", 2)
     color = episode.goal.text("color")
+
     judge = Judge(episode.stages, episode.scene)
+
     assert judge.update(0, frozenset([Fact("pressed", "button")])) is Status.FAILURE
     assert judge.cause == f"pressed the button too early; expected: pick up the {color} cube"
 
 
 @pytest.mark.sim
 @pytest.mark.parametrize("policy", ["oracle", "listener"])
-def test_policies_solve_it(task, policy):
+def test_built_in_policies_solve_a_task_from_outside(task, policy):
     env = roboirg.make(NAME, setting="contextual", episode=1, cameras=())
     assert play(env, make_policy(policy, 0))["status"] == "success"
 
@@ -122,5 +124,6 @@ def test_a_fact_that_can_never_hold_is_refused(task, monkeypatch, fact, sentence
         stages=lambda scene, goal: (Stage(fact, Primitive("pick_cube", "cube_red"), "go"),),
     )
     monkeypatch.setattr(splits, "get_task", lambda _name: made)
+
     with pytest.raises(RoboIRGError, match=re.escape(sentence)):
         splits.make_episode(NAME, 0, "easy")

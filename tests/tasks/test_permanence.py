@@ -50,6 +50,7 @@ def test_shape_and_swaps_and_picks_do_not_tell_each_other():
         points = layout_points(np.random.default_rng(episode.seed), 3)
         line = min(math.hypot(*point) for point in points) < 1e-9
         found[line, len(swaps(episode)), len(episode.goal.texts("colors"))] += 1
+
     assert len(found) == 8
     assert min(found.values()) > 0.06 * len(SEEDS)
 
@@ -58,21 +59,23 @@ def test_shape_and_swaps_and_picks_do_not_tell_each_other():
 @each_difficulty
 def test_swaps_follow_each_other_with_the_nearest_partner(task, difficulty):
     for episode in episodes(task, difficulty):
-        places = {one.name: one.position for one in containers(episode)}
+        places = {container.name: container.position for container in containers(episode)}
         plan = swaps(episode)
         assert [swap.start for swap in plan] == [64, 114, 164][: len(plan)]
         for swap in plan:
+            first = places.pop(swap.first)
+            nearest = min(apart(first, place) for place in places.values())
+            second = places.pop(swap.second)
             assert (swap.steps, swap.lane, swap.stage) == (50, 0.07, None)
-            others = set(places) - {swap.first}
-            reach = {other: apart(places[swap.first], places[other]) for other in others}
-            assert reach[swap.second] == min(reach.values())
-            assert set(swap.pinned) == others - {swap.second}
-            places[swap.first], places[swap.second] = places[swap.second], places[swap.first]
+            assert apart(first, second) == nearest
+            assert set(swap.pinned) == set(places)
+            places[swap.first] = second
+            places[swap.second] = first
 
 
 def final_places(episode):
     """Where the containers are after all exchanges, told by whose place it was."""
-    places = {one.name: one.name for one in containers(episode)}
+    places = {container.name: container.name for container in containers(episode)}
     for swap in swaps(episode):
         places[swap.first], places[swap.second] = places[swap.second], places[swap.first]
     return places
@@ -91,7 +94,7 @@ def test_where_the_cube_was_is_a_bad_guess(task, difficulty):
 
 
 @each_task
-def test_subgoals_in_order(task):
+def test_subgoals_name_presses_and_containers_in_order(task):
     presses = {
         "ButtonUnmask": [("press the button {at}", "button")],
         "ButtonUnmaskSwap": [
@@ -118,6 +121,7 @@ def test_subgoals_in_order(task):
 def test_scenes_with_fewer_than_three_containers_are_rejected():
     rng = np.random.default_rng(0)
     placed = unmask_swap.draw_containers_about(rng, [FOUR[0], FOUR[1]])
+
     assert len(placed) == 2
     with pytest.raises(SceneRejectedError, match="fewer than three"):
         unmask_swap.sample(rng, "easy", placed)
@@ -129,5 +133,7 @@ def test_placement_ends_at_the_first_container_that_fits_nowhere():
     # All of the second square is within the first container's clearance in every draw.
     tight = Region(0.0, 0.0, 0.03, 0.03)
     roomy = Region(0.5, 0.5, 0.1, 0.1)
+
     placed = unmask.draw_containers_in(np.random.default_rng(0), [tight, tight, roomy], 0.02)
-    assert [one.name for one in placed] == ["container_0"]
+
+    assert [thing.name for thing in placed] == ["container_0"]

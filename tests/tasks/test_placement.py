@@ -29,16 +29,19 @@ footprints = st.one_of(rectangles, circles)
 
 def outline(shape: Rectangle | Circle, inside: float) -> np.ndarray:
     """Points all over a shape shrunk (inside > 0) or grown (inside < 0) by some meters."""
-    u = np.linspace(-1, 1, 41)
     if isinstance(shape, Circle):
         angle, share = np.meshgrid(np.linspace(0, 2 * math.pi, 120), np.linspace(0, 1, 15))
         radius = share * max(shape.radius - inside, 0)
-        return np.stack(
-            [shape.x + (radius * np.cos(angle)).ravel(), shape.y + (radius * np.sin(angle)).ravel()]
-        )
-    x, y = np.meshgrid(u * max(shape.half_x - inside, 0), u * max(shape.half_y - inside, 0))
-    cos, sin = math.cos(shape.yaw), math.sin(shape.yaw)
-    return np.stack([shape.x + (cos * x - sin * y).ravel(), shape.y + (sin * x + cos * y).ravel()])
+        right = radius * np.cos(angle)
+        ahead = radius * np.sin(angle)
+    else:
+        u = np.linspace(-1, 1, 41)
+        x, y = np.meshgrid(u * max(shape.half_x - inside, 0), u * max(shape.half_y - inside, 0))
+        cos = math.cos(shape.yaw)
+        sin = math.sin(shape.yaw)
+        right = cos * x - sin * y
+        ahead = sin * x + cos * y
+    return np.stack([shape.x + right.ravel(), shape.y + ahead.ravel()])
 
 
 def contains(shape: Rectangle | Circle, points: np.ndarray, inside: float) -> bool:
@@ -76,7 +79,9 @@ def test_overlap_is_symmetric(first, second):
 @settings(max_examples=40)
 @given(rectangles, st.floats(0.001, 0.05), coordinates, coordinates)
 def test_growing_brings_an_edge_nearer_by_as_much(rectangle, by, x, y):
-    before, after = distance_to(rectangle, x, y), distance_to(rectangle.grown(by), x, y)
+    before = distance_to(rectangle, x, y)
+    after = distance_to(rectangle.grown(by), x, y)
+
     assert after <= before
     assert before - after <= by * math.sqrt(2) + 1e-9
 
@@ -124,7 +129,11 @@ def test_cubes_never_overlap_although_some_count_as_lines(first, second):
 def test_half_of_the_cubes_count_as_lines_in_either_direction():
     yaws = 2 * math.pi * np.random.default_rng(0).random(4000)
     found = [cube_obstacle(SceneObject("cube", "cube", Point(0, 0, 0.02), yaw)) for yaw in yaws]
-    lines = [(one.yaw - yaw) for one, yaw in zip(found, yaws, strict=True) if isinstance(one, Line)]
+
+    lines = [
+        (line.yaw - yaw) for line, yaw in zip(found, yaws, strict=True) if isinstance(line, Line)
+    ]
+
     assert 0.46 < len(lines) / len(yaws) < 0.54
     assert 0.45 < sum(turn > 0.1 for turn in lines) / len(lines) < 0.55
 
@@ -133,9 +142,11 @@ def test_half_of_the_cubes_count_as_lines_in_either_direction():
 def test_place_takes_the_first_free_draw(free_after):
     draws = iter(range(10_000))
     blocked = Circle(0, 0, 1)
+
     placed = place(
         lambda: next(draws), lambda n: Circle(0 if n < free_after else 9, 0, 1), [blocked]
     )
+
     assert placed == free_after
 
 

@@ -48,7 +48,10 @@ def test_tasks_are_meant_by_name_by_suite_or_all_together():
 @each_task
 def test_difficulties_do_not_differ(task):
     for seed in range(20):
-        drawn = {MODULES[task].sample(np.random.default_rng(seed), one) for one in DIFFICULTIES}
+        drawn = {
+            MODULES[task].sample(np.random.default_rng(seed), difficulty)
+            for difficulty in DIFFICULTIES
+        }
         assert len(drawn) == 1
 
 
@@ -65,23 +68,31 @@ def test_one_of_the_pair_is_on_the_robot_s_left_and_one_on_its_right(task):
 @each_task
 def test_every_goal_is_as_likely_on_either_side(task):
     kind, _ = PAIRS[task]
-    found = Counter(
-        (goal, left_to_right(scene, kind).index(goal.text("color"))) for scene, goal in scenes(task)
-    )
-    assert len(found) == 2 * len(get_task(task).goals(scenes(task)[0][0]))
-    expected = SEEDS / len(found)
-    assert all(abs(count - expected) <= 5 * expected**0.5 for count in found.values())
+
+    counts = Counter()
+    for scene, goal in scenes(task):
+        side = left_to_right(scene, kind).index(goal.text("color"))
+        counts[goal, side] += 1
+
+    goals = get_task(task).goals(scenes(task)[0][0])
+    assert len(counts) == 2 * len(goals)
+    expected = SEEDS / len(counts)
+    assert all(abs(count - expected) <= 5 * expected**0.5 for count in counts.values())
 
 
 def test_regions_are_mirrored():
-    left, right = Region(0.1, 0.2, 0.01, 0.02), Region(0.1, -0.2, 0.01, 0.02)
+    left = Region(0.1, 0.2, 0.01, 0.02)
+    right = Region(0.1, -0.2, 0.01, 0.02)
+
     regions = draw_regions(np.random.default_rng(0), ("yellow", "gray"), left)
+
     assert set(regions) == {"yellow", "gray"}
     assert set(regions.values()) == {left, right}
 
 
 def test_a_tape_without_a_place_rejects_the_seed():
-    region, full = Region(0, 0, 0.1, 0.1), [Rectangle(0, 0, 1, 1)]
+    region = Region(0, 0, 0.1, 0.1)
+    full = [Rectangle(0, 0, 1, 1)]
     with pytest.raises(SceneRejectedError, match="no place for tape"):
         draw_tape(np.random.default_rng(0), "tape", "yellow", region, 0.0, full)
 
@@ -97,8 +108,10 @@ def test_the_tape_belongs_into_the_one_box():
     goal = Goal.of(color="green")
     # Dropped beside the boxes, it may be picked up again.
     dropped = ([picked], [], [Fact("lying", "tape")], [picked], [])
+
     assert judged("PutInBox", goal, *dropped).status is Status.ONGOING
     assert judged("PutInBox", goal, *dropped, [inside["green"]]).status is Status.SUCCESS
+
     wrong = judged("PutInBox", goal, [picked], [], [inside["purple"]])
     assert wrong.status is Status.FAILURE
     assert (
@@ -107,7 +120,8 @@ def test_the_tape_belongs_into_the_one_box():
     assert judged("PutInBox", goal, [inside["purple"]]).status is Status.FAILURE
 
 
-PICKED, PLACED = Fact("picked", "tape_gray"), Fact("placed", "tape_gray", "target")
+PICKED = Fact("picked", "tape_gray")
+PLACED = Fact("placed", "tape_gray", "target")
 CYCLE = ([PICKED], [], [PLACED])
 OTHER = Fact("picked", "tape_yellow")
 
@@ -126,6 +140,7 @@ def test_as_often_as_wanted_and_then_no_more(repeats):
     # The last placement is evaluation 3 N - 1; the wait begins with the next.
     assert after(*waiting(WAIT_STEPS)).status is Status.ONGOING
     assert after(*waiting(WAIT_STEPS + 1)).status is Status.SUCCESS
+
     again = after(*waiting(WAIT_STEPS - 1), [PICKED])
     assert again.status is Status.FAILURE
     assert again.cause.startswith("picked up the gray tape again; expected: leave the tapes")
@@ -142,6 +157,7 @@ def test_the_other_tape_is_not_to_be_picked():
     goal = Goal.of(color="gray", repeats=1)
     assert judged("PickByCount", goal, [OTHER]).cause.startswith("picked up the yellow tape; ")
     assert judged("PickByCount", goal, [PICKED], [OTHER]).status is Status.FAILURE
+
     # Beside the target, and once more.
     beside = ([PICKED], [Fact("lying", "tape_gray")], *CYCLE, *waiting(WAIT_STEPS + 1))
     assert judged("PickByCount", goal, *beside).status is Status.SUCCESS

@@ -39,10 +39,11 @@ def scenes(task, difficulty):
 
 def shown(stages):
     """Each stage's primitive in short, with its place if it has one."""
-    return [
-        (kind, subject) if place is None else (kind, subject, place)
-        for kind, subject, place, *_ in (stage.primitive for stage in stages)
-    ]
+    found = []
+    for stage in stages:
+        kind, subject, place, *_ = stage.primitive
+        found.append((kind, subject) if place is None else (kind, subject, place))
+    return found
 
 
 @every_task
@@ -64,11 +65,12 @@ def test_videos_forbid_nothing_and_show_what_the_past_says(task, difficulty):
 # VideoRepick
 
 
-def test_repick_plan():
+def test_a_repick_has_a_cycle_for_each_repeat_and_a_press():
     scene, _ = drawn(VIDEO_REPICK, "hard")[0]
     target = scene.past[0].subject
     stages = VIDEO_REPICK.stages(scene, Goal.of(repeats=2))
     cycle = [("pick_cube", target), ("put_down", target)]
+
     assert shown(stages) == [*cycle, *cycle, ("press", "button")]
     assert [stage.primitive.height for stage in stages[1:4:2]] == [0.01, 0.01]
     assert [stage.timer for stage in stages] == ["pick", "put down", "pick", "put down", None]
@@ -96,14 +98,15 @@ def test_place_swaps_any_two_discs_in_the_last_hold(task):
     assert len(pairs) == 12
 
 
-def test_place_button_goals():
+def test_each_goal_of_place_button_takes_a_cube_to_a_disc():
     scene, _ = drawn(VIDEO_PLACE_BUTTON, "hard")[0]
     goals = VIDEO_PLACE_BUTTON.goals(scene)
     assert len(goals) == 6
-    for one in goals:
-        cube = f"cube_{one.text('color')}"
-        answer = {"before": "target_0", "after": "target_1"}[one.text("relation")]
-        stages = VIDEO_PLACE_BUTTON.stages(scene, one)
+
+    for goal in goals:
+        cube = f"cube_{goal.text('color')}"
+        answer = {"before": "target_0", "after": "target_1"}[goal.text("relation")]
+        stages = VIDEO_PLACE_BUTTON.stages(scene, goal)
         assert shown(stages) == [("pick_cube", cube), ("place_on", cube, answer)]
 
 

@@ -13,7 +13,7 @@ independent; each by itself is as in RoboMME.
 import functools
 import itertools
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 
 import numpy as np
 import pytest
@@ -56,7 +56,9 @@ def published(task, difficulty):
     found = (
         published_episode(task, split, index) for split in SPLITS for index in range(MOST_EPISODES)
     )
-    return [(one.scene, one.goal) for one in found if one and one.difficulty == difficulty]
+    return [
+        (drawn.scene, drawn.goal) for drawn in found if drawn and drawn.difficulty == difficulty
+    ]
 
 
 @functools.cache
@@ -68,10 +70,10 @@ def sampled(task, difficulty):
 
 def distances(first, second):
     return [
-        math.dist(one.position[:2], other.position[:2])
-        for one in first
+        math.dist(thing.position[:2], other.position[:2])
+        for thing in first
         for other in second
-        if one is not other
+        if thing is not other
     ]
 
 
@@ -80,31 +82,39 @@ def measures(scene, goal):
     found = {}
     for kind in KINDS:
         items = scene.of_kind(kind)
-        if not items:
-            continue
-        for axis in "xy":
-            values = [getattr(item.position, axis) for item in items]
-            found |= {f"first {kind} {axis}": values[0], f"last {kind} {axis}": values[-1]}
-            found |= {
-                f"mean {kind} {axis}": np.mean(values),
-                f"spread {kind} {axis}": np.ptp(values),
-            }
-        found[f"{kind} yaw"] = items[0].yaw % (2.0 * math.pi)
-        if len(items) > 1:
-            nearest = [min(distances([item], items)) for item in items]
-            found |= {f"nearest {kind}s": min(nearest), f"gap of {kind}s": np.mean(nearest)}
-    for one, other in itertools.combinations(KINDS, 2):
-        between = distances(scene.of_kind(one), scene.of_kind(other))
+        if items:
+            found |= measures_of_kind(kind, items)
+    for near, other in itertools.combinations(KINDS, 2):
+        between = distances(scene.of_kind(near), scene.of_kind(other))
         if between:
-            found |= {f"{one} to {other}": min(between), f"mean {one} to {other}": np.mean(between)}
+            found[f"{near} to {other}"] = min(between)
+            found[f"mean {near} to {other}"] = np.mean(between)
     wanted = wanted_object(scene, goal)
     if wanted is not None:
-        found |= {"wanted x": wanted.position.x, "wanted y": wanted.position.y}
-    for motion in scene.motions:
-        if isinstance(motion, Shuttle):
-            along = [end - begin for begin, end in zip(motion.begin, motion.end, strict=True)]
-            found |= {"length of path": math.hypot(*along), "direction": math.atan2(*along[:2])}
-            found |= {f"rgb {number}": value for number, value in enumerate(scene["shuttle"].rgb)}
+        found["wanted x"] = wanted.position.x
+        found["wanted y"] = wanted.position.y
+    for run in scene.motions_of(Shuttle):
+        x, y, z = (end - begin for begin, end in zip(run.begin, run.end, strict=True))
+        found["length of path"] = math.hypot(x, y, z)
+        found["direction"] = math.atan2(x, y)
+        for number, value in enumerate(scene["shuttle"].rgb):
+            found[f"rgb {number}"] = value
+    return found
+
+
+def measures_of_kind(kind, items):
+    """Quantities of the objects of a kind, of which there is at least one."""
+    found = {f"{kind} yaw": items[0].yaw % (2.0 * math.pi)}
+    for axis in "xy":
+        values = [getattr(item.position, axis) for item in items]
+        found[f"first {kind} {axis}"] = values[0]
+        found[f"last {kind} {axis}"] = values[-1]
+        found[f"mean {kind} {axis}"] = np.mean(values)
+        found[f"spread {kind} {axis}"] = np.ptp(values)
+    if len(items) > 1:
+        nearest = [min(distances([item], items)) for item in items]
+        found[f"nearest {kind}s"] = min(nearest)
+        found[f"gap of {kind}s"] = np.mean(nearest)
     return found
 
 
@@ -121,36 +131,49 @@ def wanted_object(scene, goal):
 def labels(scene, goal):
     """Countable traits of a scene: numbers of objects, slots of the goal, motions, the past."""
     found = {f"number of {kind}s": len(scene.of_kind(kind)) for kind in KINDS}
-    for slot, value in goal.slots:
-        values = value if isinstance(value, tuple) else (value,)
-        found |= {f"{slot} {place}": one for place, one in enumerate(values)}
-        found[f"length of {slot}"] = len(values)
-        if slot == "counts":
-            found["goal's cubes"] = sum(values)
+    found |= labels_of_goal(goal)
     cubes = (*scene.of_kind("cube"), *scene.of_kind("hidden_cube"))
     colors = [cube.color for cube in cubes]
-    found |= {"first color": colors[:1], "last color": colors[-1:]}
+    found["first color"] = colors[:1]
+    found["last color"] = colors[-1:]
     found["cubes per color"] = sorted(Counter(colors).values())
     found["over cubes"] = sorted(str(cube.inside) for cube in cubes)
     found["late"] = sum(motion.start == 0 for motion in scene.motions_of(Away))
-    swaps = scene.motions_of(Swap)
-    found["number of swaps"] = len(swaps)
-    found["undone"] = len({frozenset({one.first, one.second}) for one in swaps}) - len(swaps)
-    hiding = {cube.inside for cube in cubes}
-    answer = wanted_object(scene, goal)
-    for place, swap in enumerate(swaps):
-        moved = {swap.first, swap.second}
-        found[f"swap {place} moves the wanted"] = bool(
-            answer and {answer.name, answer.inside} & moved
-        )
-        found[f"swap {place} starts at a cube"] = swap.first in hiding
-        found[f"swap {place} moves discs in use"] = len(moved & {one.place for one in scene.past})
+    found |= labels_of_swaps(scene, wanted_object(scene, goal), cubes)
     found["interval"] = [run.interval for run in scene.motions_of(Shuttle)]
     found["length of the past"] = len(scene.past)
     if scene.past:
         found["past"] = [fact.kind for fact in scene.past]
         found["discs of the past"] = [fact.place for fact in scene.past[:2]]
-        found["number of the video's cube"] = list(scene.objects).index(answer)
+        found["number of the video's cube"] = list(scene.objects).index(wanted_object(scene, goal))
+    return found
+
+
+def labels_of_goal(goal):
+    """The slots of a goal, how many values each has, and how many cubes are counted in all."""
+    found = {}
+    for slot, value in goal.slots:
+        values = value if isinstance(value, tuple) else (value,)
+        for place, part in enumerate(values):
+            found[f"{slot} {place}"] = part
+        found[f"length of {slot}"] = len(values)
+        if slot == "counts":
+            found["goal's cubes"] = sum(values)
+    return found
+
+
+def labels_of_swaps(scene, wanted, cubes):
+    """What each swap moves, and how many swaps undo another one."""
+    swaps = scene.motions_of(Swap)
+    pairs = [{swap.first, swap.second} for swap in swaps]
+    wanted_names = {wanted.name, wanted.inside} if wanted else set()
+    hiding = {cube.inside for cube in cubes}
+    in_use = {moment.place for moment in scene.past}
+    found = {"number of swaps": len(swaps), "undone": len(set(map(frozenset, pairs))) - len(swaps)}
+    for place, (swap, moved) in enumerate(zip(swaps, pairs, strict=True)):
+        found[f"swap {place} moves the wanted"] = bool(wanted_names & moved)
+        found[f"swap {place} starts at a cube"] = swap.first in hiding
+        found[f"swap {place} moves discs in use"] = len(moved & in_use)
     return found
 
 
@@ -159,11 +182,22 @@ def p_values(task, difficulty, ours):
     theirs = published(task, difficulty)
     found = {}
     for traits, p_value in ((measures, same_distribution), (labels, same_shares)):
-        first, second = ([traits(*one) for one in scenes] for scenes in (ours, theirs))
-        for key in sorted(set().union(*first, *second)):
-            values = [[row[key] for row in rows if key in row] for rows in (first, second)]
-            found[key] = p_value(*values)
-    return {key: p for key, p in found.items() if p is not None}
+        our_values = values_by_trait(traits, ours)
+        their_values = values_by_trait(traits, theirs)
+        for key in our_values.keys() | their_values.keys():
+            p = p_value(our_values[key], their_values[key])
+            if p is not None:
+                found[key] = p
+    return found
+
+
+def values_by_trait(traits, scenes):
+    """Return for each trait its values in the scenes that have it."""
+    found = defaultdict(list)
+    for scene, goal in scenes:
+        for key, value in traits(scene, goal).items():
+            found[key].append(value)
+    return found
 
 
 def same_distribution(first, second):
@@ -172,17 +206,18 @@ def same_distribution(first, second):
         return 0.0
     if np.ptp([*first, *second]) < RESOLUTION:
         return None
-    return ks_2samp(*(np.round(one, 6) for one in (first, second)), method="asymp").pvalue
+    return ks_2samp(np.round(first, 6), np.round(second, 6), method="asymp").pvalue
 
 
 def same_shares(first, second):
     """Chi-square's p-value; labels that are rare in both are joined; None if only one is left."""
-    counts = [Counter(map(str, one)) for one in (first, second)]
+    counts = [Counter(map(str, values)) for values in (first, second)]
     both = counts[0] + counts[1]
     kept = [label for label in both if both[label] >= RARE]
-    table = [[*(one[label] for label in kept), 0] for one in counts]
-    for row, one in zip(table, counts, strict=True):
-        row[-1] = one.total() - sum(row)
+    table = []
+    for counted in counts:
+        row = [counted[label] for label in kept]
+        table.append([*row, counted.total() - sum(row)])
     filled = np.array(table)[:, np.sum(table, axis=0) > 0]
     return None if filled.shape[1] == 1 else chi2_contingency(filled).pvalue
 

@@ -96,7 +96,7 @@ OTHER_GOALS = {
 @each_task
 def test_other_goals_take_as_many_picks_and_are_not_on_the_way(task):
     episodes = [get_episode(task, "test", index) for index in (0, 2, 3)]
-    assert [len(other_goals(one)) for one in episodes] == OTHER_GOALS[task]
+    assert [len(other_goals(episode)) for episode in episodes] == OTHER_GOALS[task]
 
 
 @each_task
@@ -104,6 +104,7 @@ def test_other_goals_take_as_many_picks_and_are_not_on_the_way(task):
 def test_same_seed_same_episode_other_seed_other_scene(task, difficulty):
     first, second = valid(task, difficulty, 2)
     again = make_episode(task, first.seed, difficulty)
+
     assert again == first
     assert hash(again) == hash(first)
     assert first.scene != second.scene
@@ -200,7 +201,9 @@ def test_everything_lies_on_the_table_and_what_is_handled_within_reach(task):
     for episode in episodes(task):
         for item in episode.scene.objects:
             heights = HEIGHTS[item.kind]
-            assert any(item.position.z == pytest.approx(one, abs=1e-6) for one in heights), item
+            assert any(item.position.z == pytest.approx(height, abs=1e-6) for height in heights), (
+                item
+            )
         for stage in (*episode.demonstration, *episode.stages):
             handled = {stage.primitive.subject, stage.primitive.place} - {None, "robot"}
             for x, y, _ in (episode.scene[name].position for name in handled):
@@ -212,7 +215,8 @@ def test_everything_is_in_the_front_picture(task):
     for episode in episodes(task):
         for item in episode.scene.objects:
             right, down, ahead = FRONT @ (*item.position, 1)
-            u, v = CENTER + FOCAL * right / ahead, CENTER + FOCAL * down / ahead
+            u = CENTER + FOCAL * right / ahead
+            v = CENTER + FOCAL * down / ahead
             assert ahead > 0
             assert 0 <= u < 256, item
             assert 0 <= v < 256, item

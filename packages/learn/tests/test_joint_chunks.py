@@ -21,7 +21,9 @@ class Rehearsed(LearnedPolicy):
     def __init__(self, waypoints):
         reader = SimpleNamespace(plan={"tasks": ["ButtonUnmask"]})
         super().__init__(SimpleNamespace(reader=reader, version="rehearsed"))
-        self.waypoints, self.pictures, self.tools = waypoints, [], []
+        self.waypoints = waypoints
+        self.pictures = []
+        self.tools = []
 
     def reset(self, instruction, demonstration):
         self.left, self.demonstration, self.seen = [*self.waypoints], demonstration, self
@@ -57,14 +59,17 @@ class Guided(Rehearsed):
 
 @pytest.mark.sim
 def test_in_joint_angles_a_policy_sees_and_does_what_it_does_in_waypoints():
-    episode, one = get_episode("ButtonUnmask", "train", 0), Guided()
+    episode = get_episode("ButtonUnmask", "train", 0)
+    one = Guided()
     other = Rehearsed(one.waypoints)
     ends = [
         play(make(episode, **PolicyNeeds.of(policy).env_options), policy)
         for policy in (one, JointChunks(other))
     ]
+
     assert [end["status"] for end in ends] == ["success"] * 2
     assert ends[0]["steps"] == ends[1]["steps"]
+
     # Looks within the last waypoint are not seen any more where that is one action.
     count = len(one.tools)
     assert np.allclose(one.tools, other.tools[:count], atol=1e-5)
@@ -83,9 +88,11 @@ def test_what_cannot_be_reached_is_waited_for_and_the_video_is_thinned():
     policy = Rehearsed([np.array([[2.0, 2.0, 2.0, np.pi, 0.0, 0.0, 0.0]])] * 2)
     chunks = JointChunks(policy)
     chunks.reset("wait", video)
+
     assert policy.demonstration["front_rgb"].tolist() == [0, 8]
     assert policy.demonstration["end_effector"].shape == (10, 6)
     for _ in range(2):
         assert np.allclose(chunks.act(STATE), np.tile([*HOME, 1.0], (8, 1)))
+
     chunks.reset("wait", {**video, "front_rgb": np.arange(0, 10, 8)})
     assert policy.demonstration["front_rgb"].tolist() == [0, 8]

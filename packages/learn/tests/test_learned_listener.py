@@ -1,5 +1,6 @@
 """The listener that learns: labels, what it reads and sees, its file, and its command."""
 
+import itertools
 import json
 import re
 from pathlib import Path
@@ -31,6 +32,7 @@ def test_without_pytorch_one_sentence_says_what_to_do(monkeypatch, tmp_path):
     for spec in ("learned:none", "trained:none?reader=none"):
         with pytest.raises(MissingDependencyError, match="pip install torch"):
             make_policy(spec, 0)
+
     done = CliRunner().invoke(
         app, ["learn", "listener", "--out", str(tmp_path / "new.safetensors")]
     )
@@ -41,22 +43,27 @@ def test_without_pytorch_one_sentence_says_what_to_do(monkeypatch, tmp_path):
 @pytest.mark.sim
 def test_labels_are_what_is_visible_and_where():
     episode = get_episode("VideoUnmask", "train", 0)
-    first, later = look(episode)
+    places = [item.position[:2] for item in episode.scene.objects]
     cubes = {"cube red", "cube green", "cube blue"}
+
+    first, later = look(episode)
+
     assert cubes <= set(first.names)
     assert "container" not in first.names  # they appear over the cubes
     assert not cubes & set(later.names)
     assert later.names.count("container") == len(episode.scene.of_kind("container"))
     for view in (first, later):
         assert (view.picture.shape, len(view.centers)) == ((256, 256, 3), len(view.names))
-        there = {item.name: item.position[:2] for item in episode.scene.objects}
         for name, place in zip(view.names, view.positions, strict=True):
-            assert min(np.linalg.norm(place - one) for one in there.values()) < 0.01, name
+            assert min(np.linalg.norm(place - other) for other in places) < 0.01, name
     for name, (column, row) in zip(first.names, first.centers, strict=True):
         if name in cubes:
             pixel = first.picture[round(float(row)), round(float(column))].astype(int)
             assert ("red", "green", "blue")[int(pixel.argmax())] in name
-    hidden = episode.scene.of_kind("hidden_cube")[0]
+
+
+def test_a_hidden_cube_is_labeled_as_a_cube_of_its_color():
+    hidden, *_ = get_episode("VideoUnmask", "train", 0).scene.of_kind("hidden_cube")
     assert class_of(hidden) == f"cube {hidden.color}"
 
 
@@ -86,14 +93,19 @@ def test_digits_are_read_as_words():
 def test_intervals_grow_with_the_differences_between_trainings():
     rng = np.random.default_rng(0)
     tasks = [(rng.random((3, 50)) < 0.8).astype(float) for _ in range(11)]
-    alike = trained_rate([np.tile(one[:1], (3, 1)) for one in tasks])
-    single = trained_rate([one[:1] for one in tasks])
+
+    alike = trained_rate([np.tile(task[:1], (3, 1)) for task in tasks])
+    single = trained_rate([task[:1] for task in tasks])
     assert alike.rate == pytest.approx(single.rate)
     assert alike.interval == pytest.approx(single.interval)
-    apart = trained_rate([one * [[1], [1], [0.5]] for one in tasks])
+
+    apart = trained_rate([task * [[1], [1], [0.5]] for task in tasks])
     assert len(set(apart.by_seed)) == 3
     low, high = apart.interval
     assert low < min(apart.by_seed) < max(apart.by_seed) < high
+
+
+def test_a_rate_of_one_has_an_interval_below_it():
     certain = trained_rate([np.ones((3, 50))])
     assert certain.rate == 1.0
     assert 0.9 < certain.interval[0] < certain.interval[1] == 1.0
@@ -104,13 +116,11 @@ def scene_of(*views):
     from roboirg_learn.listener.object_relations import SeenObjects, TablePlane, relate
 
     classes = ("container", "cube red")
-    seen = [
-        SeenObjects(
-            np.array([classes.index(one[0]) for one in view], np.int64),
-            np.array([one[1:] for one in view], np.float32),
-        )
-        for view in views
-    ]
+    seen = []
+    for view in views:
+        numbers = np.array([classes.index(name) for name, *_ in view], np.int64)
+        places = np.array([place for _, *place in view], np.float32)
+        seen.append(SeenObjects(numbers, places))
     return relate(seen, TablePlane(np.eye(3), np.zeros((4, 2))), classes)
 
 
@@ -185,7 +195,7 @@ def test_by_place_other_goals_of_a_scene_are_told_too(torch):
     episode = get_episode("ButtonUnmask", "train", 3)
     plan = ReaderPlan((episode.task,), ("explicit", "spatial"), goals=3)
     told = list(said([episode], plan))
-    explicit, *others = [one.goal for one, _ in told]
+    explicit, *others = [episode.goal for episode, _ in told]
     assert explicit == episode.goal
     by_place = others
     assert by_place[0] == episode.goal
@@ -242,8 +252,8 @@ def test_an_encoder_of_one_s_own_is_trained_and_loaded(few, torch, tmp_path, mon
     picture = look(get_episode("StopCube", "val", 0))[0].picture
     with torch.no_grad():
         mine, theirs, dark = (
-            one.reader([one.see([seen])._replace(task="StopCube", text="Stop it.")])[0]
-            for one, seen in ((model, picture), (again, picture), (again, picture // 2))
+            reader.reader([reader.see([seen])._replace(task="StopCube", text="Stop it.")])[0]
+            for reader, seen in ((model, picture), (again, picture), (again, picture // 2))
         )
     assert torch.equal(mine, theirs)
     assert not torch.equal(mine, dark)
@@ -275,29 +285,49 @@ def test_what_a_variant_does_not_get_changes_nothing(torch):
     assert hide(without_video, "video") is without_video
 
 
-@pytest.mark.sim
-def test_the_study_writes_every_listener_tables_and_goes_on(few, tmp_path):
+@pytest.fixture
+def study(few, tmp_path):
+    """Run a short study of two seeds; returns its folder, and what runs it again."""
     short = {"scenes": 2, "detector_epochs": 1, "reader_epochs": 1, "seeds": 2}
     plan = plan_file(tasks="StopCube", training=short)
-    words = ["learn", "listener", "--study", "--plan", plan, "--out", str(tmp_path)]
-    done = CliRunner().invoke(app, words)
-    assert done.exit_code == 0, done.output
-    files = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*-?.*")}
-    names = {f"{variant.name}-{seed}" for variant in VARIANTS[:2] for seed in (0, 1)}
-    assert {path.name for path in files} == {
-        f"{name}.{end}" for name in names for end in ("safetensors", "jsonl")
-    }
-    text = (tmp_path / "study.md").read_text()
+
+    def run():
+        words = ["learn", "listener", "--study", "--plan", plan, "--out", str(tmp_path)]
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == 0, done.output
+
+    run()
+    return tmp_path, run
+
+
+@pytest.mark.sim
+def test_the_study_writes_every_listener_its_answers_and_tables(study):
+    folder, _ = study
+
+    expected = set()
+    for variant, seed in itertools.product(VARIANTS[:2], (0, 1)):
+        name = f"{variant.name}-{seed}"
+        expected |= {f"{name}.safetensors", f"{name}.jsonl"}
+    assert {path.name for path in folder.glob("*-?.*")} == expected
+    text = (folder / "study.md").read_text()
     assert text.count("## ") == 3
     assert "2 training seeds" in text
-    answers = [json.loads(line) for line in (tmp_path / "all-1.jsonl").read_text().splitlines()]
-    goals = {place: get_episode("StopCube", "test", place).goal["visit"] for place in range(3)}
-    for one in answers:
-        assert one["is_right"] == (one["understood"]["visit"] == goals[one["episode"]])
-    lost = tmp_path / "explicit-1.safetensors"
+    for line in (folder / "all-1.jsonl").read_text().splitlines():
+        answer = json.loads(line)
+        goal = get_episode("StopCube", "test", answer["episode"]).goal
+        assert answer["is_right"] == (answer["understood"]["visit"] == goal["visit"])
+
+
+@pytest.mark.sim
+def test_a_study_trains_again_only_the_listener_that_is_lost(study):
+    folder, run = study
+    times = {path: path.stat().st_mtime_ns for path in folder.glob("*-?.*")}
+    text = (folder / "study.md").read_text()
+    lost = folder / "explicit-1.safetensors"
     lost.unlink()
-    again = CliRunner().invoke(app, words)
-    assert again.exit_code == 0, again.output
-    changed = {path for path, time in files.items() if path.stat().st_mtime_ns != time}
+
+    run()
+
+    changed = {path for path, time in times.items() if path.stat().st_mtime_ns != time}
     assert changed == {lost, lost.with_suffix(".jsonl")}
-    assert (tmp_path / "study.md").read_text() == text
+    assert (folder / "study.md").read_text() == text

@@ -69,16 +69,21 @@ def recorded():
 @pytest.mark.sim
 def test_labels_are_the_expert_s_own_while_the_way_is_disturbed(recorded):
     assert recorded.status == "success"
+
     episode = get_episode("ButtonUnmask", "random", 0)
     for decision in decisions_of(recorded):
         if decision.move.at_thing:
             at = recorded.things[decision.look, decision.thing, :2]
             action = recorded.actions[recorded.looks.tolist().index(decision.look)]
             assert np.linalg.norm(action[:2] - at) < 0.02
-    grasped = [one.thing for one in decisions_of(recorded) if one.move.turn == "align"]
+    grasped = [
+        decision.thing for decision in decisions_of(recorded) if decision.move.turn == "align"
+    ]
     goal = episode.goal.texts("colors")
     inside = {item.inside for item in episode.scene.objects if item.color in goal}
+
     assert {recorded.names[thing] for thing in grasped} == inside
+
     plain = record_expert(episode, disturbed=False)
     assert not np.array_equal(plain.tool[: len(recorded.tool)], recorded.tool[: len(plain.tool)])
 
@@ -107,46 +112,57 @@ def made_up(actions, looks):
 
 
 def test_a_move_that_was_not_made_has_the_label_of_the_one_that_was():
-    down, close = [0, 0, 0.02, 0, 0, 0, 0], [0, 0, 0.02, 0, 0, 0, -1]
+    down = [0, 0, 0.02, 0, 0, 0, 0]
+    close = [0, 0, 0.02, 0, 0, 0, -1]
     above = [0, 0, 0.15, 0, 0, 0, 0]
+
     found = decisions_of(made_up([above, down, down, close, above], [0, 1, 2, 3, 4]))
-    assert [one.look for one in found] == [0, 1, 2, 4]
-    assert [one.move.gripper for one in found] == [0, -1, -1, 0]
+
+    assert [decision.look for decision in found] == [0, 1, 2, 4]
+    assert [decision.move.gripper for decision in found] == [0, -1, -1, 0]
 
 
 @pytest.mark.sim
 def test_an_interrupted_training_goes_on_where_it_was(recorded, tmp_path):
     torch = pytest.importorskip("torch")
+    train = trainer(recorded, tmp_path)
+    passes = []
+
+    def stop(work, done, total, note):
+        if done == 2:
+            raise KeyboardInterrupt
+
+    whole = train("whole", lambda *_: None)
+    with pytest.raises(KeyboardInterrupt):
+        train("parts", stop)
+    parts = train("parts", lambda work, done, total, note: passes.append(done))
+
+    assert passes == [3, 4]
+    for name, value in whole.state_dict().items():
+        assert torch.equal(value, parts.state_dict()[name]), name
+    curve = json.loads((tmp_path / "parts" / "body-recurrent-0.json").read_text())
+    assert [line["epoch"] for line in curve] == [1, 2, 3, 4]
+
+
+def trainer(recorded, out):
+    """Return what trains a body in four passes, in a folder of a given name."""
     from roboirg_learn.listener.vocabulary import parts_of_tasks
     from roboirg_learn.policy.body_training import BodyLayout, BodyLesson, train_body
     from roboirg_learn.policy.trained_body import GoalLayout
 
     plan = BodyPlan(("ButtonUnmask",), body_epochs=4)
     episode = get_episode("ButtonUnmask", "random", 0)
-    sight, decisions = sight_of([recorded]), decisions_of(recorded)
+    decisions = decisions_of(recorded)
     goals = GoalLayout(plan.tasks, parts_of_tasks(plan.tasks))
-
-    def stop(work, done, total, note):
-        if done == 2:
-            raise KeyboardInterrupt
+    layout = BodyLayout(sight_of([recorded]), goals, common_moves([decisions]))
 
     def train(name, progress):
-        folder = tmp_path / name
+        folder = out / name
         folder.mkdir(exist_ok=True)
         lessons = [BodyLesson(Recorded(episode, recorded), decisions)] * 3
-        layout = BodyLayout(sight, goals, common_moves([decisions]))
         return train_body(plan, lessons, layout, folder, progress)
 
-    whole = train("whole", lambda *_: None)
-    with pytest.raises(KeyboardInterrupt):
-        train("parts", stop)
-    passes = []
-    parts = train("parts", lambda work, done, total, note: passes.append(done))
-    assert passes == [3, 4]
-    for name, value in whole.state_dict().items():
-        assert torch.equal(value, parts.state_dict()[name]), name
-    curve = json.loads((tmp_path / "parts" / "body-recurrent-0.json").read_text())
-    assert [one["epoch"] for one in curve] == [1, 2, 3, 4]
+    return train
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -171,10 +187,12 @@ def test_covered_cubes_are_not_to_be_seen_and_completed_stages_are_counted(recor
     assert recorded.done[0] == 0
     assert (np.diff(recorded.done) >= 0).all()
     assert stages - 1 <= recorded.done[-1] <= stages
+
     classes = np.array(recorded.classes)
     cubes = np.char.startswith(classes, "cube")
     assert recorded.visible[0, cubes].all()
     assert not recorded.visible[0, classes == "container"].any()
+
     covered = int(np.flatnonzero(recorded.steps >= 40)[0])
     assert not recorded.visible[covered, cubes].any()
     assert recorded.visible[covered, classes == "container"].all()
@@ -186,6 +204,7 @@ def test_a_recording_is_read_as_it_was_written(recorded, tmp_path):
     save_recording(recorded, path)
     for name, value in load_recording(path)._asdict().items():
         np.testing.assert_equal(value, getattr(recorded, name), err_msg=name)
+
     path.write_bytes(path.read_bytes()[:100])
     with pytest.raises(InvalidValueError, match="delete it to make it again"):
         load_recording(path)
@@ -228,14 +247,18 @@ def test_a_version_is_of_plan_and_tensors_and_not_of_the_file(tmp_path):
         return load_trained(path, "body", lambda file: file).version
 
     first = version({"seed": 0, "tasks": ["BinFill"]}, 1.0)
+
     assert version({"tasks": ["BinFill"], "seed": 0}, 1.0, moves=[1]) == first
+
     others = [
         version({"seed": 1, "tasks": ["BinFill"]}, 1.0),
         version({"seed": 0, "tasks": ["BinFill"]}, 2.0),
         version({"seed": 0, "tasks": ["BinFill"]}, 1.0, "depths"),
     ]
     assert len({first, *others}) == 4
-    row, column = torch.zeros(1, 2), torch.zeros(2, 1)
+
+    row = torch.zeros(1, 2)
+    column = torch.zeros(2, 1)
     assert TrainedFile({"plan": {}}, {"a": row}).version != (
         TrainedFile({"plan": {}}, {"a": column}).version
     )
@@ -249,7 +272,7 @@ def test_each_task_is_learned_and_shows_how_training_goes(tasks):
 
     found = list(zip(tasks, held_back(tasks), strict=True))
     for task in set(tasks):
-        own = [is_held for one, is_held in found if one == task]
+        own = [is_held for decision_task, is_held in found if decision_task == task]
         assert not own[0]
         assert sum(own) == (len(own) + HELD_BACK - 2) // HELD_BACK
 
@@ -275,6 +298,7 @@ def test_what_cannot_be_learned_is_said_before_anything_is_recorded(tmp_path, mo
     monkeypatch.setitem(ENCODERS, "pixels", PixelEncoder)
     out = tmp_path / "policy"
     (tmp_path / "file").touch()
+
     for place, options, words in (
         (out, ("--tasks", "StopCube", "--settings", "spatial"), "None of these tasks has the"),
         (out, ("--plan", plan_file(training={"encoders": {"bert": {}}})), "no encoder 'bert'"),
@@ -289,7 +313,8 @@ def test_what_cannot_be_learned_is_said_before_anything_is_recorded(tmp_path, mo
     assert not (out / "recordings").exists()
 
 
-BODY, READER = "recurrent-0.body.safetensors", "explicit-0.reader.safetensors"
+BODY = "recurrent-0.body.safetensors"
+READER = "explicit-0.reader.safetensors"
 FEW = {"scenes": 3, "drawn": 2, "detector_epochs": 1, "body_epochs": 2, "reader_epochs": 1}
 
 
@@ -313,15 +338,20 @@ def test_the_command_makes_a_policy_that_plays_by_pictures_alone(folder, tmp_pat
     assert (read_policy(spec).is_privileged, read_policy(spec).is_hosted) == (False, True)
     assert read_policy(spec).needs.trained_tasks == ("ButtonUnmask",)
     assert not hasattr(make_policy(spec, 0), "attach")
+
     out = tmp_path / "runs"
     call = ["run", "--policy", spec, "--tasks", "ButtonUnmask", "--settings", "explicit,direct"]
     done = CliRunner().invoke(app, [*call, "--episodes", "1", "--out", str(out)])
     assert done.exit_code == 0, done.output
+
     played = read_records(next(out.rglob("records.jsonl")).parent)
-    memories = [(one.error, one.policy_metadata["trained"]["body"]["memory"]) for one in played]
+    memories = [
+        (record.error, record.policy_metadata["trained"]["body"]["memory"]) for record in played
+    ]
     assert memories == [(None, "recurrent")] * 2
+
     curve = json.loads((folder[0] / "body-recurrent-0.json").read_text())
-    assert [one["epoch"] for one in curve] == [1, 2]
+    assert [line["epoch"] for line in curve] == [1, 2]
 
 
 @pytest.mark.sim
@@ -335,8 +365,10 @@ def test_what_is_there_is_used_again_and_another_plan_loses_nothing(folder):
         ([*call[2:], plan_file(training=FEW | {"body_epochs": 3})], "was trained by another plan"),
     ):
         assert words in learn(*options)
+
     other = ["--body", place / BODY, "--out", place / "new", "--tasks", "BinFill"]
     assert "no task of this body 'BinFill'" in learn(*other, what="reader")
+
     done = CliRunner().invoke(app, [*call, plan, "--memory", "none", "--settings", "none"])
     assert done.exit_code == 0, done.output
     assert (place / "none-0.body.safetensors").exists()
@@ -358,7 +390,8 @@ def test_a_reader_is_trained_for_a_body_that_is_there_and_goes_on_where_it_was(t
     whole = CliRunner().invoke(app, call)
     assert whole.exit_code == 0, whole.output
     assert PolicyFiles(SHIPPED.body, out).spec in whole.output
-    reader, body = load_reader(out), load_body(SHIPPED.body)
+    reader = load_reader(out)
+    body = load_body(SHIPPED.body)
     assert (reader.plan["tasks"], reader.plan["body"]) == (["StopCube"], body.version)
     assert reader.vocabulary[1:] == (body.sight.classes, *body.goals)
     assert not list(tmp_path.rglob("recordings"))
@@ -375,7 +408,9 @@ def test_what_is_printed_to_be_played_can_be_played(capsys):
     print_policy(PolicyFiles(Path("a"), Path("my b")), plan)
     words = shlex.split(capsys.readouterr().out.partition("roboirg run ")[2])
     options = dict(zip(words[::2], words[1::2], strict=True))
+
     assert options["--policy"] == "trained:a?reader=my%20b"
+
     make_plan(policies=["oracle"], tasks=plan.tasks, settings=options["--settings"], split="val")
 
 

@@ -23,7 +23,10 @@ from roboirg_learn.policy.policy_plan import (  # noqa: E402
     PLANNERS,
 )
 
-CLASSES, PARTS, THINGS, LOOKS = 3, 4, 5, 12
+CLASSES = 3
+PARTS = 4
+THINGS = 5
+LOOKS = 12
 AT_THINGS = (True, False, True)
 MEMORIES = sorted(set(body_net.MEMORIES) - {HANDS, *PLANNERS})
 
@@ -59,24 +62,26 @@ def body_of(memory):
 def changed(batch, looks):
     """Return a batch in which these looks show something else."""
     other = batch_of(99)
-    places, tool = batch.places.clone(), batch.tool.clone()
+    places = batch.places.clone()
+    tool = batch.tool.clone()
     places[:, looks], tool[:, looks] = other.places[:, looks], other.tool[:, looks]
     return batch._replace(places=places, tool=tool)
 
 
-def same(one, other):
-    return all(torch.allclose(a, b, atol=1e-5) for a, b in zip(one[:3], other[:3], strict=True))
+def same(first, other):
+    return all(torch.allclose(a, b, atol=1e-5) for a, b in zip(first[:3], other[:3], strict=True))
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
 def test_no_memory_sees_the_future(memory):
-    body, batch = body_of(memory), batch_of(1)
+    body = body_of(memory)
+    batch = batch_of(1)
     assert same(body(batch), body(changed(batch, slice(8, None))))
 
 
 def first_of(batch, looks, things):
     """Return the first looks of a batch, in which some things were not yet seen, and the last."""
-    parts = [one[:, :looks, :things] for one in batch[:5]]
+    parts = [part[:, :looks, :things] for part in batch[:5]]
     last = torch.tensor([[looks - 1]])
     return batch._replace(
         **dict(zip(batch._fields, parts, strict=False)),
@@ -88,9 +93,12 @@ def first_of(batch, looks, things):
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
 def test_what_is_carried_gives_what_all_looks_give(memory):
-    body, batch = body_of(memory), batch_of(1)
+    body = body_of(memory)
+    batch = batch_of(1)
     batch.seen[:, :4, 3:], batch.known[:, :4, 3:] = False, False
+
     carried = Carried()
+
     for looks, things in ((1, 3), (4, 3), (5, THINGS), (5, THINGS), (LOOKS, THINGS)):
         part = first_of(batch, looks, things)
         assert same(body(part, carried), body(part))
@@ -98,7 +106,9 @@ def test_what_is_carried_gives_what_all_looks_give(memory):
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
 def test_the_present_counts_and_with_memory_the_past(memory):
-    body, batch = body_of(memory), batch_of(1, (7,))
+    body = body_of(memory)
+    batch = batch_of(1, (7,))
+
     assert not same(body(batch), body(changed(batch, slice(7, 8))))
     assert same(body(batch), body(changed(batch, slice(0, 7)))) == (memory == "none")
 
@@ -106,7 +116,8 @@ def test_the_present_counts_and_with_memory_the_past(memory):
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
 def test_padding_changes_nothing(memory):
     """An episode answers the same next to a longer one with more things."""
-    body, batch = body_of(memory), batch_of(1)
+    body = body_of(memory)
+    batch = batch_of(1)
     short = batch._replace(
         **{
             name: getattr(batch, name)[:, :9]
@@ -114,26 +125,36 @@ def test_padding_changes_nothing(memory):
         }
     )
     there = batch.there.clone()
+
     there[:, 9:] = False
+
     assert same(body(batch._replace(there=there)), body(short))
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
 def test_what_is_unknown_is_never_chosen(memory):
-    body, batch = body_of(memory), batch_of(1)
-    seen, known = batch.seen.clone(), batch.known.clone()
-    seen[:, :, 2], known[:, :, 2] = False, False
+    body = body_of(memory)
+    batch = batch_of(1)
+    seen = batch.seen.clone()
+    known = batch.known.clone()
+    seen[:, :, 2] = False
+    known[:, :, 2] = False
+
     things = body(batch._replace(seen=seen, known=known)).things
+
     assert (things.argmax(-1) != 2).all()
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
 def test_only_memory_chooses_what_is_out_of_sight(memory):
-    body, batch = body_of(memory), batch_of(1)
+    body = body_of(memory)
+    batch = batch_of(1)
     seen = batch.seen.clone()
     seen[:, 7, 2] = False
     things = body(batch._replace(seen=seen)).things
+
     can = bool((things[0, 1, :, 2] > -1e3).all())
+
     assert can == (memory == "recurrent")
 
 
@@ -149,17 +170,21 @@ def test_fast_weights_are_read_as_by_hand():
     """With W = 2, b = (0, 1) and k = (3, 4): z = (6, 9) and rms(z) = sqrt(58.5)."""
     fast = Fast(2 * torch.eye(2)[None, None], torch.tensor([[[[0.0, 1.0]]]]))
     norm = FastNorm(torch.zeros(1, 1, 2), torch.zeros(1, 1, 2))
+
     read = fast.read(torch.tensor([[[[3.0, 4.0]]]]), norm).flatten()
+
     assert torch.allclose(read, torch.tensor([6.0, 9.0]) / 58.5**0.5 + torch.tensor([3.0, 4.0]))
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_a_step_goes_down_the_gradient_of_the_inner_loss(seed):
     fast, norm, keys, values, rates = fast_numbers(seed)
-    weights, biases = (one.clone().requires_grad_() for one in fast)
+    weights, biases = (weights.clone().requires_grad_() for weights in fast)
     error = norm(keys @ weights + biases) - (values - keys)
     (rates * error.square() / 2).sum().backward()
+
     after = fast.after(keys, values, rates, norm)
+
     assert torch.allclose(after.weights, weights.detach() - weights.grad, atol=1e-5)
     assert torch.allclose(after.biases, biases.detach() - biases.grad, atol=1e-5)
 
@@ -168,6 +193,7 @@ def test_a_step_is_clipped_and_what_is_not_there_changes_nothing():
     fast, norm, keys, values, rates = fast_numbers(0)
     far = fast.after(keys * 100, values, rates * 100, norm)
     assert torch.allclose((far.weights - fast.weights).norm(), torch.tensor(MOST_CHANGE))
+
     still = fast.after(keys, values, torch.zeros_like(rates), norm)
     assert torch.equal(still.weights, fast.weights)
     assert torch.equal(still.biases, fast.biases)
@@ -177,33 +203,42 @@ def test_even_frames_are_all_until_there_are_enough():
     few = even_frames(torch.tensor([[5, 31]]))[0]
     assert few[0].tolist() == [0, 1, 2, 3, 4, 5] + [-1] * 26
     assert few[1].tolist() == list(range(32))
+
     many = even_frames(torch.tensor([[32, 620]]))[0]
-    assert many[0].tolist() == [round(one * 32 / 31) for one in range(32)]
-    assert many[1].tolist() == [20 * one for one in range(32)]
+    assert many[0].tolist() == [round(look * 32 / 31) for look in range(32)]
+    assert many[1].tolist() == [20 * look for look in range(32)]
 
 
 def test_modulation_leaves_the_residual_alone():
     """With scale and shift zero the body answers bit for bit as one without memory."""
-    modulated, plain, batch = body_of("framesamp"), body_of("none"), batch_of(1)
+    modulated = body_of("framesamp")
+    plain = body_of("none")
+    batch = batch_of(1)
     missing, unexpected = plain.load_state_dict(modulated.state_dict(), strict=False)
+
     assert not missing
     assert all(name.startswith("memory.") for name in unexpected)
+
     different = modulated(batch), plain(batch)
     assert not all(
         torch.equal(a, b) for a, b in zip(different[0][:3], different[1][:3], strict=True)
     )
+
     for layer in modulated.memory.layers:
         torch.nn.init.zeros_(layer.scale_shift.weight)
-    for one, other in zip(modulated(batch)[:3], plain(batch)[:3], strict=True):
-        assert torch.equal(one, other)
+    for ours, other in zip(modulated(batch)[:3], plain(batch)[:3], strict=True):
+        assert torch.equal(ours, other)
 
 
 def test_only_the_robot_sees_the_tokens_of_fast_weights():
-    body, batch = body_of("ttt"), batch_of(1, (7,))
+    body = body_of("ttt")
+    batch = batch_of(1, (7,))
     given = []
     body.encoder.layers[0].linear1.register_forward_hook(lambda _, one, __: given.append(one[0]))
-    for one in (batch, changed(batch, slice(0, 7))):
-        body(one)
+    for history in (batch, changed(batch, slice(0, 7))):
+        body(history)
+
     robot, *things = (given[0] - given[1]).abs().amax(-1)[0]
+
     assert robot > 1e-4
     assert max(things) == 0

@@ -19,7 +19,9 @@ CLASSES = ("button", "container", "cube blue", "cube red")
 CORNERS = np.array([(x, y) for x in (-0.3, 0.2) for y in (-0.4, 0.3)])
 FLAT = TablePlane(np.eye(3), CORNERS)
 LEFT, FORWARD, DISTANCE = range(3)
-FIXED, CODES, RANKS = 7, 6, 3
+FIXED = 7
+CODES = 6
+RANKS = 3
 
 
 def objects_of(*items):
@@ -48,7 +50,9 @@ def test_a_plane_is_found_from_pairs_of_places():
     matrix = np.array([[0.9, -0.2, 0.1], [0.1, -1.1, 0.4], [0.3, 0.2, 1.0]])
     places = rng.random((30, 2))
     positions = TablePlane(matrix, CORNERS).find(places)
+
     found = fit_plane(places, positions)
+
     assert found.find(places) == pytest.approx(positions, abs=1e-9)
     assert found.corners.min(axis=0) == pytest.approx(positions.min(axis=0))
     assert found.corners.max(axis=0) == pytest.approx(positions.max(axis=0))
@@ -88,26 +92,24 @@ def test_containers_are_ranked_by_what_an_earlier_picture_showed():
     assert rank(scene, 0, landmark_of("container", view=1)) != ([], [])
 
 
-coordinates = st.floats(-0.5, 0.5).map(lambda one: round(one, 3))
+coordinates = st.floats(-0.5, 0.5).map(lambda number: round(number, 3))
 
 
 @given(st.lists(st.tuples(st.sampled_from(CLASSES), coordinates, coordinates), max_size=12))
 def test_ranks_are_those_of_sorting(items):
     scene = scene_of(items)
     assert scene.relations.shape == (len(items), relation_count(len(CLASSES)))
-    for number, (name, x, y) in enumerate(items):
+    for number, (name, _, _) in enumerate(items):
         kind = name.split()[0]
-        others = [one for one in items if one[0].split()[0] == kind]
-        far = np.hypot(x - ROBOT_BASE[0], y - ROBOT_BASE[1])
-        for landmark, own, key in (
-            (LEFT, -y, lambda one: -one[2]),
-            (FORWARD, x, lambda one: one[1]),
-            (DISTANCE, far, lambda one: np.hypot(one[1] - ROBOT_BASE[0], one[2] - ROBOT_BASE[1])),
-        ):
-            values = [key(one) for one in others]
-            near, _ = rank(scene, number, landmark)
+        same_kind = [place for place, item in enumerate(items) if item[0].split()[0] == kind]
+        for landmark, measure in ((LEFT, left), (FORWARD, forward), (DISTANCE, distance)):
+            own = measure(items[number])
+            values = [measure(items[place]) for place in same_kind]
             before = sum(value < own - 1e-6 for value in values)
             ties = sum(abs(value - own) <= 1e-6 for value in values)
+
+            near, _ = rank(scene, number, landmark)
+
             assert len(near) <= 1
             if near:
                 assert before <= near[0] < before + ties
@@ -115,8 +117,23 @@ def test_ranks_are_those_of_sorting(items):
                 assert before + ties > RANKS
 
 
+def left(item):
+    _, _, y = item
+    return -y
+
+
+def forward(item):
+    _, x, _ = item
+    return x
+
+
+def distance(item):
+    _, x, y = item
+    return np.hypot(x - ROBOT_BASE[0], y - ROBOT_BASE[1])
+
+
 def test_nothing_is_left_of_a_scene_that_is_not_looked_at():
     left = nothing_of(scene_of([("cube red", 0.0, 0.0)]))
     assert left.looks == 0
-    assert all(len(one) == 0 for one in left[:4])
+    assert all(len(part) == 0 for part in left[:4])
     assert left.relations.shape[1] == relation_count(len(CLASSES))

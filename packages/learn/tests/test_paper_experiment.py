@@ -34,7 +34,7 @@ ROW_OF = {system: row_name(memory) for memory, system in SYSTEMS.items()}
 
 def played(options):
     """Return what one policy plays; those of the options need PyTorch and files."""
-    others = {name: one for name, one in options.items() if name != "policy"}
+    others = {name: value for name, value in options.items() if name != "policy"}
     return make_plan(**others, policies=["oracle"]).jobs()
 
 
@@ -52,6 +52,7 @@ def test_rows_and_the_hands_of_others_name_body_and_reader():
     policies = part_options("planner", ExperimentPlan(), FILES, {})["policy"]
     hands = [dict(split_spec(name, spec).options) for name, spec in policies.items()]
     own = "trained:subgoal.body?reader=my%20words.reader"
+
     assert policies["small-subgoal"] == own
     assert {"hands": own} in hands
     assert {"reader": "my words.reader", "hands": "scripted"} in hands
@@ -62,6 +63,7 @@ def test_held_out_words_are_spoken_in_every_split():
     for part in PARTS:
         jobs = played(part_options(part, ExperimentPlan(), FILES, changes))
         assert {job.options.wordings for job in jobs} == {"test"}
+
     jobs = played(part_options("main", ExperimentPlan(), FILES, {"episodes": "1"}))
     assert {job.options.wordings for job in jobs} == {None}
 
@@ -76,9 +78,9 @@ def values(section, row):
 def rows_like(found):
     """Return published-like results as those of the rows of the systems."""
     return [
-        msgspec.structs.replace(one, policy=ROW_OF[one.policy])
-        for one in found
-        if one.policy in ROW_OF
+        msgspec.structs.replace(result, policy=ROW_OF[result.policy])
+        for result in found
+        if result.policy in ROW_OF
     ]
 
 
@@ -86,10 +88,10 @@ def resolved(results):
     """Return their implicit results in the resolved form, all won."""
     return [
         msgspec.structs.replace(
-            one, outcome="success", options=replace(one.options, form="resolved")
+            result, outcome="success", options=replace(result.options, form="resolved")
         )
-        for one in results
-        if one.options.setting != "explicit"
+        for result in results
+        if result.options.setting != "explicit"
     ]
 
 
@@ -104,7 +106,7 @@ def sections(part, *results):
 def test_the_same_questions_have_the_same_answers_for_equal_rates():
     """Resolved forms are compared with references, and with nothing else."""
     systems = "pi0.5", "FrameS-Modul"
-    found = rows_like(one for system in systems for one in like_published("main", system))
+    found = rows_like(result for system in systems for result in like_published("main", system))
     carried, apart, where, kept = sections("main", *found)
     for system in systems:
         row = ROW_OF[system]
@@ -115,6 +117,7 @@ def test_the_same_questions_have_the_same_answers_for_equal_rates():
             assert values(where, row) == pytest.approx(values(where, system), abs=0.11)
     assert values(where, "FrameS-Modul") == pytest.approx([39.8, 5.3, 24.4, 17.3], abs=0.1)
     assert values(carried, "FrameS-Modul")[0] == pytest.approx(-16.1, abs=0.1)
+
     both = sections("main", *found, *resolved(found))
     lost = [100 - 21.2, 100 - 13.6, 100 - 17.3, 100 - 12.4]
     assert values(both[-1], "small-none") == pytest.approx(lost, abs=0.2)

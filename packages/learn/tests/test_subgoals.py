@@ -50,6 +50,7 @@ def test_a_point_means_the_place_that_it_was_taken_from():
     place = np.array([-0.05, 0.11, 0.02])
     subgoal = SubgoalForm("pick up the red cube {at}").at(points_of(place))
     assert split_point(subgoal)[1] is not None
+
     found = asked_numbers(subgoal, SIGHT)
     assert found[-3] == 1
     assert np.allclose(found[-2:], place[:2], atol=0.004)
@@ -60,7 +61,8 @@ def test_a_point_means_the_place_that_it_was_taken_from():
 def recorded_of(episode, done):
     """Return a recording in which every object moves a little at each look."""
     names = tuple(item.name for item in episode.scene.objects)
-    looks, rng = len(done), np.random.default_rng(0)
+    looks = len(done)
+    rng = np.random.default_rng(0)
     things = np.zeros((looks, len(names), 4), np.float32)
     things[..., :2] = (
         rng.uniform(-0.1, 0.1, (len(names), 2)) + np.arange(looks)[:, None, None] / 500
@@ -75,19 +77,20 @@ def recorded_of(episode, done):
 
 def test_recordings_yield_the_subgoal_that_is_due_with_a_point_from_its_beginning():
     episode = get_episode("PickXtimes", "train", 0)
-    recorded = recorded_of(episode, [0, 0, 1, 1, 1])
-    due = subgoals_due(recorded, episode, range(5))
-    assert [one.move.words for one in due] == [
-        episode.stages[number].subgoal for number in (0, 0, 1, 1, 1)
-    ]
-    assert [recorded.names[one.thing] for one in due] == [
-        episode.stages[number].points_at for number in (0, 0, 1, 1, 1)
-    ]
     done = [0, 0, 1, 1, 1]
+    stages = [episode.stages[number] for number in done]
+    recorded = recorded_of(episode, done)
+
+    due = subgoals_due(recorded, episode, range(5))
     exact = recorded_subgoals(recorded, episode, done, None)
+
+    assert [decision.move.words for decision in due] == [stage.subgoal for stage in stages]
+    names = [recorded.names[decision.thing] for decision in due]
+    assert names == [stage.points_at for stage in stages]
     assert exact[0] == exact[1] != exact[2] == exact[3] == exact[4]
     wanted = points_of(recorded.things[2, due[2].thing, :3].astype(float))
     assert np.abs(np.array(split_point(exact[2])[1])[::-1] - wanted).max() <= 0.5
+
     moved = recorded_subgoals(recorded, episode, done, np.random.default_rng(0))
     away = np.subtract(split_point(moved[2])[1], split_point(exact[2])[1])
     assert 0 < np.abs(away).max() <= FARTHEST + 1
@@ -98,13 +101,15 @@ def test_a_planner_remembers_changes_of_subgoal():
     for form, look in ((0, 2), (0, 4), (1, 7), (0, 9)):
         history.name(form, look)
     assert history.switches == [2, 7, 9]
+
     done, under_way, rest = np.split(history.context(19), [3, 6])
     assert done.tolist() == [1, 1, 0]
     assert under_way.tolist() == [1, 0, 0]
     assert rest.tolist() == [0.25, 0, 0, 0]
     assert len(history.context(19)) == context_size(3)
+
     kept = history.kept(video=2, look=19)
-    assert [one for one in kept if one >= 0] == [0, 1, 2, 7, 9, 19]
+    assert [look for look in kept if look >= 0] == [0, 1, 2, 7, 9, 19]
     assert len(kept) == VIDEO_FRAMES + SWITCHES + 1
 
 
@@ -115,16 +120,20 @@ def test_chosen_looks_in_a_row_become_their_middle_one():
     history.choose([20, 21])
     history.choose([23, 40])
     kept = history.kept(video=0, look=60)
+
     assert kept[:4].tolist() == [6, 21, 23, 40]
     assert kept[4 : 4 + RECENT].tolist() == recent_looks(60)
+
     history.choose([22])  # joins what was apart, as of an even group the later one counts
     assert history.kept(video=0, look=60)[:3].tolist() == [6, 22, 40]
+
     history.choose(range(100, 200, 2))
     assert (history.kept(video=50, look=300) >= 0).sum() == VIDEO_FRAMES + KEYS + RECENT
 
 
 def test_what_is_replayed_is_what_a_planner_that_is_right_would_be_given():
-    forms, looks = np.array([0, 0, 1, 1, 0]), np.array([1, 4, 6, 9, 12])
+    forms = np.array([0, 0, 1, 1, 0])
+    looks = np.array([1, 4, 6, 9, 12])
     planned = replayed(forms, looks, 0, 2, chooses=True)
     history = PlannerHistory(2, chooses=True)
     for number, (form, look) in enumerate(zip(forms, looks, strict=True)):
@@ -133,7 +142,9 @@ def test_what_is_replayed_is_what_a_planner_that_is_right_would_be_given():
         history.name(form, look)
         if look in history.switches:
             history.choose([look])
+
     assert planned.keys[:, -1].tolist() == [1, 0, 1, 0, 1]
+
     unasked = replayed(np.array([0, -1, 1]), np.array([1, 2, 6]), 0, 2, chooses=True)
     assert (unasked.keys[1] == -1).all()
     assert np.array_equal(unasked.context[2], planned.context[2])
@@ -211,7 +222,8 @@ def test_a_learned_planner_leads_the_scripted_hands_and_others_lead_learned_ones
     from roboirg.policies.by_name.finding import make_policy, read_policy
     from roboirg_learn.policy.subgoal_following import LearnedHands, LearnedPlanner
 
-    own, scripted = saved.spec, f"{saved.spec}&hands=scripted"
+    own = saved.spec
+    scripted = f"{saved.spec}&hands=scripted"
     assert read_policy(own).is_hosted
     assert not read_policy(own).is_privileged
     assert read_policy(scripted).is_privileged
@@ -239,7 +251,9 @@ def test_hands_know_no_goal_and_planners_point_at_what_is_out_of_sight(saved):
 
     model = load_body(saved.body)
     size = len(model.forms)
-    looks, things, rng = 6, 3, np.random.default_rng(0)
+    looks = 6
+    things = 3
+    rng = np.random.default_rng(0)
     seen = np.ones((looks, things), bool)
     seen[4:, 1] = False
     shown = LookNumbers(
@@ -248,7 +262,8 @@ def test_hands_know_no_goal_and_planners_point_at_what_is_out_of_sight(saved):
         seen, np.ones_like(seen), rng.normal(0, 1, (looks, TOOL_NUMBERS)).astype(np.float32),
     )  # fmt: skip
     planned = replayed(np.array([0, 1]), np.array([2, 5]), 0, size, chooses=True)
-    goal, nothing = np.zeros(model.goals.size, np.float32), np.array([-1, -1])
+    goal = np.zeros(model.goals.size, np.float32)
+    nothing = np.array([-1, -1])
     numbers = EpisodeNumbers(shown, goal, np.array([2, 5]), *[nothing] * 3, planned)
     answer = model.planner(to_batch([numbers]))
     assert (answer.things[0, 1, :, 1] > -1e3).all()

@@ -28,7 +28,9 @@ def test_a_point_of_the_picture_is_the_place_that_it_shows(things):
     spots = np.array([spot for spot, _ in things])
     classes = np.array([kind for _, kind in things])
     positions = np.column_stack([spots, SIGHT.heights[classes]])
+
     found = SIGHT.places(classes, points_of(positions))
+
     np.testing.assert_allclose(found, spots, atol=1e-5)
 
 
@@ -37,14 +39,18 @@ def test_a_point_of_the_picture_is_the_place_that_it_shows(things):
     st.randoms(use_true_random=False),
 )
 def test_things_that_stay_keep_their_tracks_in_whatever_order_they_are_found(things, rng):
-    apart = [one for n, one in enumerate(things) if all(
-        math.dist(one[0], other[0]) > 0.02 or one[1] != other[1] for other in things[:n]
-    )]  # fmt: skip
+    apart = []
+    for spot, kind in things:
+        if all(math.dist(spot, other) > 0.02 or kind != like for other, like in apart):
+            apart.append((spot, kind))
+    order = rng.sample(range(len(apart)), len(apart))
+    spots, kinds = zip(*apart, strict=True)
     tracks = Tracks()
-    first = tracks.update(look_of([kind for _, kind in apart], [spot for spot, _ in apart]))
-    mixed = rng.sample(range(len(apart)), len(apart))
-    again = tracks.update(look_of([apart[n][1] for n in mixed], [apart[n][0] for n in mixed]))
-    assert again.tolist() == [first[n] for n in mixed]
+
+    first = tracks.update(look_of(kinds, spots))
+    again = tracks.update(look_of([kinds[n] for n in order], [spots[n] for n in order]))
+
+    assert again.tolist() == [first[n] for n in order]
     assert tracks.count == len(apart)
     assert tracks.seen[: tracks.count].all()
 
@@ -54,7 +60,8 @@ def test_containers_that_change_places_keep_their_tracks():
     for share in np.linspace(0.0, 1.0, 8):
         smooth = share * share * (3 - 2 * share)
         aside = 0.07 * math.sin(math.pi * smooth)
-        one, other = (-0.1 + 0.2 * smooth, aside), (0.1 - 0.2 * smooth, -aside)
+        one = (-0.1 + 0.2 * smooth, aside)
+        other = (0.1 - 0.2 * smooth, -aside)
         mine = tracks.update(look_of([0, 0], [one, other]))
         assert mine.tolist() == [0, 1], share
     np.testing.assert_allclose(tracks.places[:2], [(0.1, 0.0), (-0.1, 0.0)], atol=1e-6)
@@ -63,7 +70,9 @@ def test_containers_that_change_places_keep_their_tracks():
 def test_what_is_lost_keeps_its_place_and_is_found_again():
     tracks = Tracks()
     tracks.update(look_of([1, 2], [(0.0, 0.1), (0.1, -0.1)]))
+
     tracks.update(look_of([2], [(0.1, -0.1)]))
+
     assert tracks.seen[:2].tolist() == [False, True]
     np.testing.assert_allclose(tracks.places[0], (0.0, 0.1))
     # The way it was carried out of sight is no speed: it need not go on.
@@ -83,8 +92,10 @@ def test_a_grasp_takes_the_side_that_needs_the_shortest_turn(now, angle):
     tool = np.array([0.3, 0.3, 0.15, math.pi, 0.0, now, 0.04])
     turn = np.array([math.cos(4 * angle), math.sin(4 * angle)])
     found = waypoint(move, tool, np.array([0.1, -0.1]), turn)
+
     assert found[[0, 1, 2, 6]].tolist() == [0.1, -0.1, 0.02, -1.0]
     assert abs(found[5] - now) <= math.pi / 4 + 1e-9
+
     quarters = (found[5] - angle) / (math.pi / 2)
     assert abs(quarters - round(quarters)) < 1e-6
 
@@ -92,7 +103,9 @@ def test_a_grasp_takes_the_side_that_needs_the_shortest_turn(now, angle):
 def test_a_move_from_the_tool_keeps_its_angle():
     move = Move(False, -0.1, 0.0, 0.2, "keep", 0.0)
     tool = np.array([0.3, 0.2, 0.15, math.pi, 0.0, 1.0, 0.04])
+
     found = waypoint(move, tool, np.zeros(2), np.array([1.0, 0.0]))
+
     np.testing.assert_allclose(found, [0.2, 0.2, 0.2, math.pi, 0.0, 1.0, 0.0])
 
 
@@ -100,5 +113,6 @@ def test_rare_moves_are_not_learned():
     usual, rare = (Move(True, 0.0, 0.0, z, "align", 0.0) for z in (0.1, 0.2))
     often = [LookDecision(0, usual, 0)] * round(3 / RAREST)
     once = [LookDecision(0, rare, 0)]
+
     assert common_moves([often, once]) == (usual,)
     assert common_moves([often[:3], once]) == (usual, rare)

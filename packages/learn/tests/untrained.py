@@ -13,5 +13,6 @@ def reader_for(classes, goals, **plan):
     """Return a reader that fits a body of these classes and goals."""
     vocabulary = Vocabulary(("cube", "pick"), classes, *goals)
     about = ReaderPlan(goals.tasks, **plan).about
-    task_net, net = TaskNet(vocabulary).eval(), ListenerNet(vocabulary).eval()
+    task_net = TaskNet(vocabulary).eval()
+    net = ListenerNet(vocabulary).eval()
     return TrainedReader(vocabulary, np.zeros((4, 2)), task_net, net, about)

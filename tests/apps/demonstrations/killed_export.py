@@ -24,7 +24,8 @@ PLAN = ExportPlan(
 
 
 def main(out, last):
-    replace, files = Path.replace, itertools.count(1)
+    replace = Path.replace
+    files = itertools.count(1)
 
     def killed(part, path):
         if next(files) == last:

@@ -66,40 +66,46 @@ def _recorded(episode, spec, only_successes, policy_name="oracle", variation=0):
     status = "failure" if episode.index == 1 else "success"
     video_length = 4 if spec.video and episode.demonstration else 0
     rows = video_length + 1 + STEPS + variation
+    facts = TrajectoryFacts(
+        task=episode.task,
+        split=episode.split,
+        episode=episode.index,
+        seed=episode.seed,
+        difficulty=episode.difficulty,
+        variation=variation,
+        policy=policy_name,
+        status=status,
+        cause="" if status == "success" else "dropped the cube",
+        video_length=video_length,
+        steps=STEPS + variation,
+        demonstration_source="planned" if video_length else "none",
+        environment_version=ENVIRONMENT_VERSION,
+        coding=spec.coding,
+        depth=spec.depth,
+        actions=spec.actions,
+        disturbed=spec.disturbed,
+    )
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
-        tracks = PictureTracks(archive, spec)
-        for row in range(rows):
-            seen = {f"{one}_rgb": picture(one, episode.seed, row) for one in CAMERAS}
-            seen |= {f"{one}_depth": depth(episode.seed, row) for one in CAMERAS}
-            tracks.add(seen)
-        tracks.finish()
-        facts = TrajectoryFacts(
-            task=episode.task,
-            split=episode.split,
-            episode=episode.index,
-            seed=episode.seed,
-            difficulty=episode.difficulty,
-            variation=variation,
-            policy=policy_name,
-            status=status,
-            cause="" if status == "success" else "dropped the cube",
-            video_length=video_length,
-            steps=STEPS + variation,
-            demonstration_source="planned" if video_length else "none",
-            environment_version=ENVIRONMENT_VERSION,
-            coding=spec.coding,
-            depth=spec.depth,
-            actions=spec.actions,
-            disturbed=spec.disturbed,
-        )
-        arrays = arrays_of(
-            episode, rows, video_length, has_depth=spec.depth, disturbed=spec.disturbed
-        )
-        counts = {f"{one}_histogram": tracks.histograms[one] for one in spec.cameras}
-        write_arrays(archive, facts, arrays | counts)
-    if only_successes and status != "success":
-        file = io.BytesIO()
-        with zipfile.ZipFile(file, "w") as archive:
+        if only_successes and status != "success":
             write_arrays(archive, facts, {})
+        else:
+            arrays = arrays_of(
+                episode, rows, video_length, has_depth=spec.depth, disturbed=spec.disturbed
+            )
+            histograms = _write_pictures(archive, spec, episode.seed, rows)
+            write_arrays(archive, facts, arrays | histograms)
     return file.getvalue(), facts
+
+
+def _write_pictures(archive, spec, seed, rows):
+    """Write pictures of all moments, and return how often each color is in them."""
+    tracks = PictureTracks(archive, spec)
+    for row in range(rows):
+        seen = {}
+        for camera in CAMERAS:
+            seen[f"{camera}_rgb"] = picture(camera, seed, row)
+            seen[f"{camera}_depth"] = depth(seed, row)
+        tracks.add(seen)
+    tracks.finish()
+    return {f"{camera}_histogram": tracks.histograms[camera] for camera in spec.cameras}

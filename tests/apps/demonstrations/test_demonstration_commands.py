@@ -52,7 +52,9 @@ def test_a_dry_run_says_how_big_it_gets_and_writes_nothing(
     (tmp_path / "policy_lying_here.py").write_text(own)
     monkeypatch.chdir(tmp_path)
     words = ("export", "demonstrations", *FEW, *within(**choices), "--dry-run", "--out")
+
     code, out, err = roboirg(*words, tmp_path / "data")
+
     assert (code, out) == (0, "")
     assert err == size
     assert not (tmp_path / "data").exists()
@@ -68,6 +70,7 @@ def test_an_export_tells_its_progress_and_its_end(roboirg, tmp_path, synthetic):
     assert "2 episodes" in out
     assert "1 success, 1 failure" in out
     assert (root / "meta/info.json").exists()
+
     code, _, err = roboirg(*words)
     assert code == 2
     assert "complete export already" in err
@@ -79,6 +82,7 @@ def test_an_export_tells_its_progress_and_its_end(roboirg, tmp_path, synthetic):
 def test_robomme_s_format_has_the_video(roboirg, tmp_path, synthetic, format, frames):  # noqa: A002
     root = tmp_path / "data"
     words = (*FEW, "--tasks", "VideoUnmask", "--format", format, "--workers", "0", "--out", root)
+
     assert roboirg("export", "demonstrations", *words)[0] == 0
     assert f" {frames}" in (root / "README.md").read_text()
 
@@ -102,6 +106,7 @@ def test_recordings_speak_the_words_for_training(roboirg, tmp_path, synthetic, m
     code, _, err = roboirg("export", "demonstrations", *words, *more, "--out", root)
     assert code == 0
     assert tuple(re.findall("episodes that it has seen|words held out", err)) == warns
+
     table = parquet.read_table(root / "meta/demonstrations.parquet").to_pylist()
     for row in table:
         episode = get_episode(row["task"], row["split"], row["episode"])
@@ -143,7 +148,9 @@ def test_a_replay_prints_what_deviates(roboirg, export, monkeypatch):
         return ReplayResult(recorded.name, status, "success", 3, 6, final, final)
 
     monkeypatch.setattr(dataset_replay, "replay", replay)
+
     code, out, _ = roboirg("replay", root)
+
     assert code == 2
     assert "PickXtimes/train/2/0: failure after 3 of 6 steps (recorded: success)" in out
     assert (

@@ -41,9 +41,11 @@ def contents(root):
 @pytest.mark.slow
 def test_a_killed_export_continues_without_a_broken_file(tmp_path, synthetic):
     """Killed again and again, each time a few files later."""
-    whole, out = tmp_path / "whole", tmp_path / "killed"
+    whole = tmp_path / "whole"
+    out = tmp_path / "killed"
     export_run.run_export(killed_export.PLAN, whole, 0, quiet)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(HERE), *sys.path])}
+
     for last in itertools.count(2, 3):
         command = [sys.executable, HERE / "killed_export.py", out, str(last)]
         done = subprocess.run(command, env=environment, check=False)
@@ -52,29 +54,34 @@ def test_a_killed_export_continues_without_a_broken_file(tmp_path, synthetic):
         if done.returncode == 0:
             break
         assert done.returncode == -signal.SIGKILL
+
     assert last > 10
     assert contents(out) == contents(whole)
 
 
 def test_each_trajectory_is_recorded_once(tmp_path, synthetic, make_plan, monkeypatch):
-    played, told = [], []
+    out = tmp_path / "data"
+    played = []
+    progress = []
 
     def record(episode, *args, **options):
-        if len(played) == 3 and not told:  # the second export has told of its progress
+        is_first_export = not progress
+        if is_first_export and len(played) == 3:
             raise KeyboardInterrupt
         played.append((episode.task, episode.index))
         return synthetic_trajectories.record(episode, *args, **options)
 
     monkeypatch.setattr(export_run, "record_trajectory", record)
     with pytest.raises(KeyboardInterrupt):
-        export_run.run_export(make_plan(), tmp_path / "data", 0, quiet)
-    export_run.run_export(make_plan(), tmp_path / "data", 0, lambda *now: told.append(now))
+        export_run.run_export(make_plan(), out, 0, quiet)
+    export_run.run_export(make_plan(), out, 0, lambda *now: progress.append(now))
+
     assert len(set(played)) == len(played) == 6
-    assert told[0][:3] == ("record", 3, 6)
-    assert told[-1][:3] == ("write", 4, 4)
-    sizes = [size for work, _, _, size in told if work == "record"]
+    assert progress[0][:3] == ("record", 3, 6)
+    assert progress[-1][:3] == ("write", 4, 4)
+    sizes = [size for work, _, _, size in progress if work == "record"]
     assert sizes == sorted(set(sizes))  # of all trajectories up to then
-    assert not (tmp_path / "data" / export_run.WORK_FOLDER).exists()
+    assert not (out / export_run.WORK_FOLDER).exists()
 
 
 def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, monkeypatch):
@@ -82,7 +89,9 @@ def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, m
     export_run.run_export(make_plan(), tmp_path / "v3", 0, quiet, kept)
     monkeypatch.setattr(export_run, "record_trajectory", None)
     plan = make_plan(format="lerobot-v2.1", settings=("reasoning",))
+
     summary = export_run.run_export(plan, tmp_path / "v21", 0, quiet, kept)
+
     assert summary.recorded == 0
     assert summary.episodes == 4
 
@@ -90,7 +99,8 @@ def test_kept_trajectories_serve_other_formats(tmp_path, synthetic, make_plan, m
 def test_kept_trajectories_of_other_outcomes_words_or_worlds_are_not_taken(
     tmp_path, synthetic, make_plan, monkeypatch
 ):
-    kept, spoken = tmp_path / "kept", {"policy": "listener", "episodes": (0,)}
+    kept = tmp_path / "kept"
+    spoken = {"policy": "listener", "episodes": (0,)}
     for number, (version, changes, recorded) in enumerate(
         (
             (ENVIRONMENT_VERSION, {}, 6),
@@ -118,13 +128,14 @@ def test_a_trajectory_s_name_has_all_that_it_depends_on(make_plan):
         "size": 64, "actions": "waypoint", "disturbed": True,
     }  # fmt: skip
     assert set(spec) == set(job.spec._fields)
-    words = (replace(job.options, setting="direct"), replace(job.options, form="resolved"))
-    others = [
-        *(job._replace(**{name: value}) for name, value in fields.items()),
-        *(job._replace(spec=job.spec._replace(**{name: value})) for name, value in spec.items()),
-        *(job._replace(options=one) for one in words),
-    ]
-    assert len({one.path(Path()) for one in (job, *others)}) == 1 + len(others)
+
+    others = [job._replace(**{name: value}) for name, value in fields.items()]
+    for name, value in spec.items():
+        others.append(job._replace(spec=job.spec._replace(**{name: value})))
+    for words in ({"setting": "direct"}, {"form": "resolved"}):
+        others.append(job._replace(options=replace(job.options, **words)))
+
+    assert len({exported.path(Path()) for exported in (job, *others)}) == 1 + len(others)
 
 
 def test_a_stopped_export_of_another_version_is_another_one(make_plan, monkeypatch):
@@ -143,16 +154,17 @@ def test_failures_are_exported_only_on_request(export):
     successes = list(read_dataset(export("successes")))
     root = export("all", outcomes="all")
     everything = list(read_dataset(root))
-    assert {one.status for one in successes} == {"success"}
-    assert [one.status for one in everything].count("failure") == 2
+    assert {recorded.status for recorded in successes} == {"success"}
+    assert [recorded.status for recorded in everything].count("failure") == 2
     assert len(everything) == len(successes) + 2
+
     stats = json.loads((root / "meta/stats.json").read_text())["next.success"]
     assert stats["mean"] == pytest.approx([4 / (6 * synthetic_trajectories.STEPS)])
 
 
 def test_variations_are_trajectories_of_their_own(export):
     found = list(read_dataset(export(tasks=("PickXtimes",), variations=3, disturbed=True)))
-    assert [(one.name, len(one.actions)) for one in found] == [
+    assert [(recorded.name, len(recorded.actions)) for recorded in found] == [
         (f"PickXtimes/train/{episode}/{variation}", synthetic_trajectories.STEPS + variation)
         for episode in (0, 2)
         for variation in range(3)
@@ -161,10 +173,11 @@ def test_variations_are_trajectories_of_their_own(export):
 
 def test_a_policy_is_recorded_in_every_setting(export):
     root = export(tasks=("PickXtimes",), policy="listener", episodes=(0,))
-    assert [one.name for one in read_dataset(root)] == [
+    assert [recorded.name for recorded in read_dataset(root)] == [
         "PickXtimes/train/0/0/explicit-implicit",
         "PickXtimes/train/0/0/direct-implicit",
     ]
+
     table = parquet.read_table(root / "meta/demonstrations.parquet")
     assert set(table["policy"].to_pylist()) == {"listener"}
 
@@ -174,9 +187,11 @@ def test_the_action_of_a_disturbed_frame_is_what_should_have_been_done(export):
     (executed,) = read_dataset(root)
     table = parquet.read_table(root / "data/chunk-000/file-000.parquet")
     labels = np.array(table["action"].to_pylist())
+
     assert np.allclose(labels, executed.actions + 1.0)
     assert np.array_equal(table["executed_action"].to_pylist(), executed.actions)
     assert "**disturbed**" in (root / "README.md").read_text()
+
     (row,) = parquet.read_table(root / "meta/demonstrations.parquet").to_pylist()
     assert (row["disturbed"], row["actions"]) == (True, "joint_angle")
 
@@ -190,7 +205,7 @@ def test_other_options_and_folders_are_refused(tmp_path, export, make_plan, monk
     (strange / "thesis.tex").touch()
     with pytest.raises(InvalidValueError, match="is not empty and no export"):
         export_run.run_export(make_plan(), strange, 0, quiet)
-    assert [one.name for one in strange.iterdir()] == ["thesis.tex"]
+    assert [path.name for path in strange.iterdir()] == ["thesis.tex"]
 
     monkeypatch.setattr(export_run, "record_trajectory", None)
     with pytest.raises(TypeError):
@@ -233,6 +248,7 @@ def test_the_card_tells_counts_and_lines_to_train(export):
     assert "--dataset.video_backend=pyav" in card
     assert "--policy.pretrained_backbone_weights=null" in card
     assert "--policy.push_to_hub=false" in card
+
     text = (export("v21", format="lerobot-v2.1") / "README.md").read_text()
     config = text.split("```python\n")[1].split("```")[0]
     compile(config, "config", "exec")
@@ -242,6 +258,7 @@ def test_the_card_tells_counts_and_lines_to_train(export):
 def test_an_explicit_instruction_is_its_own_resolved_form(make_plan):
     both = make_plan(forms=("implicit", "resolved"), settings=("explicit", "direct", "spatial"))
     assert [len(said) for _, said in recording_jobs(both)] == [1 + 2 + 2] * 6
+
     alone = make_plan(forms=("resolved",), settings=("explicit", "direct"))
     assert [len(said) for _, said in recording_jobs(alone)] == [2] * 6
 
@@ -250,9 +267,13 @@ def test_states_alone_need_no_pictures(export):
     root = export(pictures="none", video=True)
     card = (root / "README.md").read_text()
     assert "There are no pictures." in card
+
     # What `datasets.load_dataset` and the Hub's viewer read: frames, and no table of facts.
     pattern = yaml.safe_load(card.split("---")[1])["configs"][0]["data_files"]
     assert {*root.glob(pattern)} == {*(root / "data").rglob("*.parquet")}
-    assert [one.task for one in read_dataset(root)] == ["PickXtimes"] * 2 + ["VideoUnmask"] * 2
+    assert [recorded.task for recorded in read_dataset(root)] == ["PickXtimes"] * 2 + [
+        "VideoUnmask"
+    ] * 2
+
     info = json.loads((root / "meta/info.json").read_text())
     assert not [name for name in info["features"] if "image" in name]

@@ -77,7 +77,34 @@ def texts_of(root):
 def test_every_frame_is_as_recorded(export, version):
     state, action, *pictures = COLUMNS[version]
     root = export(format=version)
-    texts, index = texts_of(root), 0
+
+    facts = pd.read_parquet(root / "meta/demonstrations.parquet").set_index("episode_index")
+    index = 0
+    for row, frames in episodes_of(root):
+        told = facts.loc[row["episode_index"]]
+        episode = get_episode(told.task, told.split, int(told.episode))
+        expected = synthetic.arrays_of(episode, len(frames) + 1, 0, has_depth=False)
+        for time, frame in enumerate(frames):
+            assert (frame["index"], frame["frame_index"]) == (index, time)
+            assert frame["timestamp"] == pytest.approx(time / 20, abs=1e-6)
+            finger, _ = expected["gripper"][time]
+            assert frame[state] == [*expected["joint_positions"][time], finger]
+            assert frame[action] == expected["actions"][time + 1].tolist()
+            for camera, name in zip(CAMERAS, pictures, strict=True):
+                shown = synthetic.picture(camera, episode.seed, time)
+                assert np.array_equal(decoded(frame[name]), shown)
+            index += 1
+    info = read_json(root / "meta/info.json")
+    assert (info["fps"], info["total_frames"]) == (20, index)
+    # Two tasks and settings; episode 1 of each task fails.
+    assert info["total_episodes"] == len(facts) == 8
+
+
+@pytest.mark.parametrize("version", COLUMNS)
+def test_every_frame_has_the_words_of_its_episode(export, version):
+    root = export(format=version)
+
+    texts = texts_of(root)
     facts = pd.read_parquet(root / "meta/demonstrations.parquet").set_index("episode_index")
     for row, frames in episodes_of(root):
         told = facts.loc[row["episode_index"]]
@@ -85,27 +112,32 @@ def test_every_frame_is_as_recorded(export, version):
         assert told.text == instruct(episode, told.setting, told.form).text == row["tasks"][0]
         assert told.explicit == instruct(episode).text
         assert row["length"] == len(frames) == synthetic.STEPS
-        expected = synthetic.arrays_of(episode, len(frames) + 1, 0, has_depth=False)
-        for time, frame in enumerate(frames):
-            assert (frame["index"], frame["frame_index"]) == (index, time)
-            assert frame["timestamp"] == pytest.approx(time / 20, abs=1e-6)
-            assert texts[frame["task_index"]] == told.text
-            joints, fingers = expected["joint_positions"][time], expected["gripper"][time]
-            assert frame[state] == [*joints, fingers[0]]
-            assert frame[action] == expected["actions"][time + 1].tolist()
-            for camera, name in zip(CAMERAS, pictures, strict=True):
-                shown = synthetic.picture(camera, episode.seed, time)
-                assert np.array_equal(decoded(frame[name]), shown)
-            index += 1
-    info = read_json(root / "meta/info.json")
-    assert (info["fps"], info["total_frames"], info["total_tasks"]) == (20, index, len(texts))
-    # Two tasks and settings; episode 1 of each task fails.
-    assert info["total_episodes"] == len(facts) == 8
+        assert {texts[frame["task_index"]] for frame in frames} == {told.text}
+    assert read_json(root / "meta/info.json")["total_tasks"] == len(texts)
 
 
-def test_version_3_has_rewards_subgoals_and_statistics_and_stores_pictures_once(export):
+def test_version_3_has_rewards_and_subgoals(export):
     root = export()
-    info, stats = read_json(root / "meta/info.json"), read_json(root / "meta/stats.json")
+
+    _, frames = next(episodes_of(root))
+    episode = get_episode("PickXtimes", "train", 0)
+    expected = synthetic.arrays_of(episode, synthetic.STEPS + 1, 0, has_depth=False)
+    for time, frame in enumerate(frames):
+        is_last = time == synthetic.STEPS - 1
+        assert frame["pose_action"] == pytest.approx(expected["pose_actions"][time + 1])
+        assert frame["subgoal"] == expected["subgoals"][time + 1]
+        assert frame["next.done"] == frame["next.success"] == is_last
+        assert frame["next.reward"] == float(is_last)
+        assert not frame["is_video_demo"]
+    info = read_json(root / "meta/info.json")
+    assert info["splits"] == {"train": "0:8"}
+    assert set(info["features"]) == set(frames[0])
+    assert None not in [feature["names"] for feature in info["features"].values()]
+
+
+def test_version_3_has_statistics_of_episodes_and_of_all_frames(export):
+    root = export()
+
     every = []
     for row, frames in episodes_of(root):
         end = len(every) + len(frames)
@@ -113,19 +145,8 @@ def test_version_3_has_rewards_subgoals_and_statistics_and_stores_pictures_once(
         states = np.array([frame["observation.state"] for frame in frames])
         assert np.allclose(row["stats/observation.state/max"], states.max(axis=0))
         every += frames
-    episode = get_episode("PickXtimes", "train", 0)
-    expected = synthetic.arrays_of(episode, synthetic.STEPS + 1, 0, has_depth=False)
-    for time, frame in enumerate(every[: synthetic.STEPS]):
-        is_last = time == synthetic.STEPS - 1
-        assert frame["pose_action"] == pytest.approx(expected["pose_actions"][time + 1])
-        assert frame["subgoal"] == expected["subgoals"][time + 1]
-        assert frame["next.done"] == frame["next.success"] == is_last
-        assert frame["next.reward"] == float(is_last)
-        assert not frame["is_video_demo"]
-    assert info["splits"] == {"train": "0:8"}
-    assert set(info["features"]) == set(every[0])
-    assert None not in [feature["names"] for feature in info["features"].values()]
-    assert set(stats) == set(info["features"]) - {"subgoal", "grounded_subgoal"}
+    stats = read_json(root / "meta/stats.json")
+    assert set(stats) == set(every[0]) - {"subgoal", "grounded_subgoal"}
     for name in ("observation.state", "action", "index", "next.success"):
         values = np.array([np.atleast_1d(frame[name]) for frame in every], dtype=float)
         for what in ("min", "max", "mean", "std"):
@@ -134,12 +155,18 @@ def test_version_3_has_rewards_subgoals_and_statistics_and_stores_pictures_once(
         assert stats[name]["count"] == [len(every)]
     pixels = np.stack([decoded(frame[WRIST]) for frame in every]).reshape(-1, 3) / 255.0
     assert np.ravel(stats[WRIST]["mean"]) == pytest.approx(pixels.mean(axis=0))
-    # Pictures of two settings are stored once.
-    both, single = (
-        sum(path.stat().st_size for path in (root / "data").rglob("*.parquet"))
-        for root in (root, export("one", settings=("explicit",)))
-    )
+
+
+def test_version_3_stores_pictures_of_two_settings_once(export):
+    both = data_bytes(export())
+    single = data_bytes(export("one", settings=("explicit",)))
+
     assert both < 1.3 * single
+
+
+def data_bytes(root):
+    """Return the size of an export's frames, with their pictures."""
+    return sum(path.stat().st_size for path in (root / "data").rglob("*.parquet"))
 
 
 @pytest.mark.parametrize(
@@ -149,11 +176,14 @@ def test_one_camera_in_small_pictures(export, version, pictures):
     root = export(
         cameras=("wrist",), size=96, pictures=pictures, format=version, settings=("explicit",)
     )
-    info, stats = read_json(root / "meta/info.json"), read_json(root / "meta/stats.json")
+    info = read_json(root / "meta/info.json")
+    stats = read_json(root / "meta/stats.json")
     shown = [name for name in info["features"] if "images" in name]
+
     assert shown == [name for name in stats if "images" in name] == [WRIST]
     assert info["features"][WRIST]["shape"] == [96, 96, 3]
     assert stats[WRIST]["count"] == stats["action"]["count"] == [4 * synthetic.STEPS]
+
     seed = get_episode("PickXtimes", "train", 0).seed
     expected = scaled_square(synthetic.picture("wrist", seed, 3), 96)
     if pictures == "png":
@@ -166,15 +196,16 @@ def test_one_camera_in_small_pictures(export, version, pictures):
 
 
 def test_the_video_comes_before_the_policy_and_is_marked(export):
-    root = export(video=True, pictures="lossless-video", tasks=("VideoUnmask",), episodes=(0,))
     episode = get_episode("VideoUnmask", "train", 0)
-    counted = read_json(root / "meta/stats.json")[WRIST]["count"]
-    assert counted == [2 * (4 + synthetic.STEPS)]
+    key = "videos/observation.images.wrist"
+
+    root = export(video=True, pictures="lossless-video", tasks=("VideoUnmask",), episodes=(0,))
+
+    assert read_json(root / "meta/stats.json")[WRIST]["count"] == [2 * (4 + synthetic.STEPS)]
     for row, frames in episodes_of(root):
         assert [frame["is_video_demo"] for frame in frames].index(False) == 4
         expected = synthetic.arrays_of(episode, len(frames) + 1, 4, has_depth=False)
         assert frames[3]["action"] == expected["actions"][4].tolist()
-        key = "videos/observation.images.wrist"
         assert row[f"{key}/from_timestamp"] == 0.0
         assert row[f"{key}/to_timestamp"] == pytest.approx(len(frames) / 20)
         video = frames_of(root / f"{key}/chunk-000/file-000.mp4")
@@ -187,14 +218,18 @@ def test_version_2_1_has_a_file_per_episode_and_describes_its_columns(export):
     info = read_json(root / "meta/info.json")
     assert len(read_lines(root / "meta/episodes_stats.jsonl")) == 8
     assert (info["total_videos"], info["total_chunks"]) == (0, 1)
+
     paths = list((root / "data").rglob("*.parquet"))
     assert len(paths) == 8
+
     # LeRobot reads this version without saying what the columns are.
     described = json.loads(parquet.read_schema(paths[0]).metadata[b"huggingface"])
     types = described["info"]["features"]
     assert types["image"] == {"_type": "Image"}
+
     value = {"dtype": "float32", "_type": "Value"}
     assert types["actions"] == {"feature": value, "length": 8, "_type": "Sequence"}
+
     modality = read_json(root / "meta/modality.json")
     assert modality["state"]["gripper"] == {"start": 7, "end": 8, "original_key": "state"}
 

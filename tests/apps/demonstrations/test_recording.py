@@ -28,7 +28,8 @@ class Impatient:
         self.rows = np.linspace(HOME_ACTION, HOME_ACTION + 0.2, 13)
 
     def act(self, observation):
-        rows, self.rows = self.rows, ()
+        rows = self.rows
+        self.rows = ()
         if len(rows) == 0:
             raise MotionPlanningError("It is too far.")
         return rows
@@ -46,23 +47,30 @@ class Impatient:
 )
 def test_pictures_are_the_simulators_bit_for_bit_and_actions_replay(tmp_path, task, spec):
     """The same actions in a new world lead to the same pictures and states."""
-    path, episode = tmp_path / "one.zip", get_episode(task, "train", 0)
-    facts = record_trajectory(episode, policy := Impatient(), path, spec, only_successes=False)
-    ended = (facts.status, facts.cause, facts.steps, policy.rows)
-    assert ended == ("failure", "It is too far.", 13, "closed")
+    path = tmp_path / "one.zip"
+    episode = get_episode(task, "train", 0)
+    policy = Impatient()
+    facts = record_trajectory(episode, policy, path, spec, only_successes=False)
+    assert (facts.status, facts.cause, facts.steps) == ("failure", "It is too far.", 13)
+    assert policy.rows == "closed"
+
     recorded = load_trajectory(path)
-    every = {"observe_every": 1, "demonstration_frames": 9}
-    env = make(episode, cameras=spec.cameras, depth=spec.depth, grounded=True, **every)
-    observation, info = env.reset()
-    shown, first = info["demonstration"], facts.video_length
-    assert first == shown.length
-    assert np.array_equal(recorded.actions[:first].astype(np.float32), shown.actions.astype("f4"))
-    later = env.step_chunk(recorded.actions[first + 1 :])[0]["history"]
+    start = facts.video_length
+    env = make(
+        episode, cameras=spec.cameras, depth=spec.depth, grounded=True, observe_every=1,
+        demonstration_frames=9,
+    )  # fmt: skip
+    first, info = env.reset()
+    video = info["demonstration"]
+    last = env.step_chunk(recorded.actions[start + 1 :])[0]
+
+    assert start == video.length
+    assert np.array_equal(recorded.actions[:start].astype(np.float32), video.actions.astype("f4"))
     with zipfile.ZipFile(path) as archive:
         for camera in spec.cameras:
-            for number, picture in enumerate(shown[f"{camera}_rgb"]):
+            for number, picture in enumerate(video[f"{camera}_rgb"]):
                 assert np.array_equal(read_picture(archive, camera, 9 * number), picture)
-        for row, seen in enumerate((observation, *later), first):
+        for row, seen in enumerate((first, *last["history"]), start):
             for name in ("joint_positions", "gripper", "end_effector"):
                 assert np.array_equal(getattr(recorded, name)[row], seen[name])
             for camera in spec.cameras:
@@ -87,10 +95,13 @@ def test_a_disturbed_expert_is_labeled_by_what_it_meant_and_replays_exactly(
     table = parquet.read_table(tmp_path / "data/data/chunk-000/file-000.parquet")
     labels = np.array(table["action"].to_pylist())
     differs = np.abs(labels - recorded.actions).max(axis=1) > 1e-6
+
     assert 0 < differs.sum() < len(differs)
+
     result = replay(recorded)
     assert result.agrees
     assert (result.status, result.largest, result.final) == ("success", 0.0, 0.0)
+
     if actions == "joint_angle":
         recorded.actions[len(recorded.actions) // 2 :, :7] += 0.2
         changed = replay(recorded)

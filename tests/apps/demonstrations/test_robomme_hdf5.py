@@ -53,38 +53,44 @@ def test_time_steps_have_robommes_fields(export):
 
 @pytest.mark.parametrize(("task", "video"), [("PickXtimes", 0), ("VideoUnmask", 4)])
 def test_a_builder_reads_what_was_recorded(export, task, video):
-    root = export(format="robomme-hdf5", video=True, settings=("explicit",))
-    episode, rows = get_episode(task, "train", 2), video + 1 + synthetic.STEPS
+    episode = get_episode(task, "train", 2)
+    rows = video + 1 + synthetic.STEPS
     expected = synthetic.arrays_of(episode, rows, video, has_depth=True)
     # The policy's first observation, which follows the way home, is no time step.
     kept = [row for row in range(rows) if row != video]
-    before = None
+
+    root = export(format="robomme-hdf5", video=True, settings=("explicit",))
+
     with h5py.File(root / f"record_dataset_{task}.h5", "r") as file:
         setup = file["episode_2/setup"]
         assert setup["seed"][()] == episode.seed
         assert [text.decode() for text in setup["task_goal"][()]] == [instruct(episode).text]
+        label_before = None
         for row, step in zip(kept, time_steps(file, "episode_2"), strict=True):
-            obs, info = step["obs"], step["info"]
+            obs = step["obs"]
             for camera in ("front", "wrist"):
                 shown = synthetic.picture(camera, episode.seed, row)
                 assert np.array_equal(obs[f"{camera}_rgb"][()], shown)
             assert np.array_equal(obs["joint_state"][()], expected["joint_positions"][row])
             assert obs["is_gripper_close"][()] == (expected["gripper"][row].min() < 0.03)
             assert np.array_equal(step["action/joint_action"][()], expected["actions"][row])
+            info = step["info"]
             assert info["is_video_demo"][()] == (row < video)
             assert info["grounded_subgoal"][()].decode() == expected["grounded_subgoals"][row]
             label = (row < video, info["simple_subgoal"][()])
-            assert info["is_subgoal_boundary"][()] == (label != before)
-            before = label
+            assert info["is_subgoal_boundary"][()] == (label != label_before)
+            label_before = label
 
 
 def test_several_settings_share_their_time_steps(export):
     root = export(format="robomme-hdf5", video=True)
     goals = set()
+
     for folder in ("explicit-implicit", "direct-implicit"):
         path = root / folder / "record_dataset_PickXtimes.h5"
         assert path.stat().st_size < 200_000
         with h5py.File(path, "r") as file:
             assert len(time_steps(file, "episode_0")) == synthetic.STEPS
             goals.add(file["episode_0/setup/task_goal"][0])
+
     assert len(goals) == 2

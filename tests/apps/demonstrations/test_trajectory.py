@@ -28,17 +28,21 @@ def frames_of(content):
 
 
 def test_a_trajectory_is_read_as_it_was_written(tmp_path):
-    episode, path = get_episode("VideoUnmask", "train", 0), tmp_path / "one.zip"
+    episode = get_episode("VideoUnmask", "train", 0)
+    path = tmp_path / "one.zip"
     facts = synthetic.record(episode, None, path, RecordingSpec(video=True, depth=True))
     found = load_trajectory(path)
+
     assert found.facts == load_facts(path) == facts
     assert (facts.video_length, facts.frames) == (4, 4 + synthetic.STEPS)
     assert set(found.calibration) == {
         f"{camera}_{kind}" for camera in ("front", "wrist") for kind in ("extrinsic", "intrinsic")
     }
+
     with zipfile.ZipFile(path) as archive:
         for row in range(facts.frames + 1):
-            picture, depth = read_picture(archive, "wrist", row), read_depth(archive, "wrist", row)
+            picture = read_picture(archive, "wrist", row)
+            depth = read_depth(archive, "wrist", row)
             assert np.array_equal(picture, synthetic.picture("wrist", episode.seed, row))
             assert np.array_equal(depth, synthetic.depth(episode.seed, row))
 
@@ -51,6 +55,7 @@ def test_pictures_can_be_dropped_and_nothing_else(tmp_path):
     for _ in range(2):
         drop_pictures(path)
         assert not has_pictures(path)
+
     after = load_trajectory(path)
     assert after.facts == before.facts
     assert np.array_equal(after.actions, before.actions)
@@ -67,7 +72,9 @@ def test_a_damaged_trajectory_is_named(tmp_path):
 def test_a_video_shows_what_was_encoded(coding, most):
     encoder = VideoEncoder(coding, 256)
     pictures = np.stack([synthetic.picture("front", 7, row) for row in range(25)])
-    for one in pictures:
-        encoder.add(one)
+    for picture in pictures:
+        encoder.add(picture)
+
     found = np.stack(frames_of(encoder.finish()))
+
     assert np.abs(found.astype(int) - pictures).mean() <= most

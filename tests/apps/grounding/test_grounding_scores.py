@@ -42,14 +42,16 @@ def items(tasks=TASKS, episodes=8):
 
 def rows_of(answers, kind, dataset=None):
     (score,) = [
-        one for one in score_answers(dataset or items(), answers, "model") if one.kind == kind
+        score for score in score_answers(dataset or items(), answers, "model") if score.kind == kind
     ]
     return score, {row.summary.key.options.setting: row for row in score_rows(score)}
 
 
 def item_of(task, setting="direct", index=0):
     return next(
-        one for one in items() if (one.task, one.setting, one.episode) == (task, setting, index)
+        item
+        for item in items()
+        if (item.task, item.setting, item.episode) == (task, setting, index)
     )
 
 
@@ -69,22 +71,28 @@ def test_random_answers_are_at_chance(kind):
     known = {item.id: item for item in items()}
     seeds = range(math.ceil(3_000 / len(items())))
     found = [
-        (judge_reply(known[one.id], kind, one.reply).right, guess_chance(known[one.id], kind))
+        (
+            judge_reply(known[answer.id], kind, answer.reply).right,
+            guess_chance(known[answer.id], kind),
+        )
         for seed in seeds
-        for one in floor_answers("chance", items(), seed)
-        if one.kind == kind
+        for answer in floor_answers("chance", items(), seed)
+        if answer.kind == kind
     ]
     assert len(found) >= 3_000
+
     right, expected = np.mean(found, axis=0)
     assert abs(right - expected) < 0.03
 
 
 def test_random_pixels_hit_as_often_as_masks_are_large():
     item = item_of("StopCube")
-    one = replace(item, points=item.points[:1])
+    single = replace(item, points=item.points[:1])
     share = 64 / 256**2
     either = replace(item, points_in_order=False)
-    chances = [guess_chance(each, "points") for each in (one, item, either)]
+
+    chances = [guess_chance(each, "points") for each in (single, item, either)]
+
     assert chances == pytest.approx([share, share**2, 2 * share**2])
 
 
@@ -98,9 +106,10 @@ def test_random_pixels_hit_as_often_as_masks_are_large():
         ("Because it is red.", None),
     ],
 )
-def test_letters_are_read(reply, understood):
-    item = next(one for one in items() if len(one.choices) == 3)
+def test_a_choice_is_read_by_its_letter(reply, understood):
+    item = next(item for item in items() if len(item.choices) == 3)
     verdict = judge_reply(item, "choice", reply)
+
     assert verdict.understood == understood
     assert verdict.right == (understood == item.choice)
 
@@ -131,9 +140,11 @@ def test_slots_are_judged_one_by_one():
     answer = json.loads(item.answer)
     other = {**answer, "repeats": answer["repeats"] % 5 + 1}
     verdict = judge_reply(item, "slots", f"I think: ```json\n{json.dumps(other)}\n```")
+
     assert verdict.parts == {"color": True, "repeats": False}
     assert not verdict.right
     assert json.loads(verdict.understood) == other
+
     nonsense = judge_reply(item, "slots", "red, I guess")
     assert nonsense == (False, None, {"color": False, "repeats": False})
     assert judge_reply(item, "slots", json.dumps(answer)).right
@@ -153,7 +164,9 @@ def test_slots_are_judged_one_by_one():
 def test_points_must_lie_in_the_masks_in_order(points, right, parts):
     item = item_of("PickXtimes")
     reply = json.dumps({"points": [{"x": x, "y": y} for x, y in points]})
+
     verdict = judge_reply(item, "points", reply)
+
     assert verdict.right == right
     assert list(verdict.parts.values()) == parts
 
@@ -161,6 +174,7 @@ def test_points_must_lie_in_the_masks_in_order(points, right, parts):
 def test_points_of_amounts_have_no_order():
     item = item_of("BinFill")
     assert not item.points_in_order
+
     swapped = [{"x": 30, "y": 40}, {"x": 10, "y": 40}]
     assert judge_reply(item, "points", json.dumps({"points": swapped})).right
     assert not judge_reply(item, "points", json.dumps({"points": [swapped[0]] * 2})).right
@@ -186,9 +200,12 @@ def test_scores_are_what_plain_counts_give():
         if item.episode < 4
     ]
     score, rows = rows_of(given, "slots")
-    explicit, direct = rows["explicit"], rows["direct"]
+    explicit = rows["explicit"]
+    direct = rows["direct"]
+
     assert (explicit.summary.rate, direct.summary.rate, direct.summary.gap.value) == (1, 0, -1)
     assert direct.summary.counts.trials == 4 * len(TASKS)
+
     p_value = 2 * 0.5 ** (4 * len(TASKS))
     assert direct.summary.gap.p_value == pytest.approx(p_value)
     # Four settings are tested together; spatial has fewer tasks, so its p-value is larger.
@@ -205,6 +222,7 @@ def test_shortcuts_are_right_as_often_as_their_probability_says(rule):
     """The expected success of the listeners in `roboirg tables --floors`, or of a guess."""
     dataset = items(episodes=24, tasks=("PickXtimes", "VideoPlaceButton"))
     _, rows = rows_of(floor_answers(rule, dataset), "slots", dataset)
+
     for setting in ("direct", "reasoning", "contextual"):
         jobs = [
             Job(
@@ -220,13 +238,16 @@ def test_shortcuts_are_right_as_often_as_their_probability_says(rule):
         row = rows[setting]
         expected = row.command_chance if rule == "command" else float(floor_level(rule, jobs))
         assert float(row.summary.rate) == pytest.approx(expected, abs=0.15)
+
     assert rule != "command" or rows["explicit"].summary.rate == 1
 
 
 def test_the_words_alone_are_learned_from_the_train_split():
     pytest.importorskip("sklearn")
     dataset = [item for item in items(("StopCube",), 50) if item.setting in ("explicit", "direct")]
+
     _, rows = rows_of(floor_answers("text-only", dataset), "slots", dataset)
+
     assert rows["explicit"].summary.rate > 0.9
     assert rows["direct"].summary.rate > rows["direct"].chance + 0.3
 
@@ -235,6 +256,7 @@ def test_the_words_alone_are_learned_from_the_train_split():
 def test_a_floor_answers_every_item_whatever_the_others_are(name):
     few = [item for item in items() if item.task == "StopCube" and item.episode < 2]
     found = list(floor_answers(name, few))
+
     assert {answer.id for answer in found} == {item.id for item in few}
     assert all(answer.reply in LETTERS for answer in found if answer.kind == "choice")
     assert set(found) <= set(floor_answers(name, items()))
@@ -251,7 +273,9 @@ def test_answers_are_read_in_every_form(tmp_path):
     write_answers(path, written)
     path.write_text(path.read_text() + "\n")
     found = read_answers(path, items())
+
     assert found == written
+
     known = {item.id: item for item in items()}
     for answer in found:
         assert judge_reply(known[answer.id], answer.kind, answer.reply).right
@@ -271,6 +295,7 @@ def test_answers_are_read_in_every_form(tmp_path):
 def test_bad_files_are_one_sentence(tmp_path, line, words):
     path = tmp_path / "answers.jsonl"
     path.write_text(line.replace("ID", items()[0].id))
+
     with pytest.raises(InvalidValueError, match=words):
         read_answers(path, items())
     with pytest.raises(InvalidValueError, match="cannot be read"):
@@ -284,23 +309,27 @@ def run(*arguments):
 
 def test_the_command_scores_compares_and_reports(tmp_path, snapshot):
     """Right, wrong, unusable and missing answers; tasks with more and with fewer of them."""
-    some = [
-        replace(item, video=f"{item.task}.mp4")
-        for number, item in enumerate(items())
-        if item.episode < 2 and (item.task, number % 3) != ("BinFill", 0)
-    ]
-    right = [Answer(item.id, "slots", item.answer) for item in some]
-    mixed = [Answer(item.id, "choice", "A") for item in some if item.setting == "direct"]
+    data = tmp_path / "set"
+    report = tmp_path / "report.md"
+    floors = tmp_path / "floors"
+    right = tmp_path / "right.v2.jsonl"
+    mixed = tmp_path / "mixed.jsonl"
+    some = []
+    for number, item in enumerate(items()):
+        if item.episode < 2 and (item.task, number % 3) != ("BinFill", 0):
+            some.append(replace(item, video=f"{item.task}.mp4"))
+    write_items(some, data)
+    write_answers(right, [Answer(item.id, "slots", item.answer) for item in some])
+    answers = [Answer(item.id, "choice", "A") for item in some if item.setting == "direct"]
     for number, item in enumerate(some):
         replies = (item.answer, item.goals[0], "No idea.", item.goals[-1], item.answer)
         if number % 7:
-            mixed.append(Answer(item.id, "slots", replies[number % 5]))
-    data, report, floors = (tmp_path / name for name in ("set", "report.md", "floors"))
-    write_items(some, data)
-    write_answers(tmp_path / "right.v2.jsonl", right)
-    write_answers(tmp_path / "mixed.jsonl", mixed)
-    done = run(tmp_path / "right.v2.jsonl", tmp_path / "mixed.jsonl", "--data", data,
-               "--floor", "chance", "--write-floors", floors, "--report", report)  # fmt: skip
+            answers.append(Answer(item.id, "slots", replies[number % 5]))
+    write_answers(mixed, answers)
+
+    done = run(right, mixed, "--data", data, "--floor", "chance",
+               "--write-floors", floors, "--report", report)  # fmt: skip
+
     assert done.exit_code == 0, done.output
     assert done.output.replace(str(tmp_path), "FOLDER") == snapshot(name="printed")
     _, mixed_report = report.read_text().split("\n## mixed, slots\n")

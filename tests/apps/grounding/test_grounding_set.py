@@ -101,7 +101,7 @@ def test_choices_are_goals_of_the_scene_in_other_words_and_one_is_right(task):
 def test_who_hears_the_command_alone_can_only_guess_among_the_choices():
     for task, index in itertools.product(BENCHMARK, range(1, 3)):
         episode, items = items_of(task, index)
-        for item in (one for one in items if one.command_chance < 1):
+        for item in (item for item in items if item.command_chance < 1):
             fitting = goals_of_command(said_of(item, episode), episode)
             answers = [goal_schema(task).answers[goal] for goal in fitting]
             assert set(item.choice_answers) <= set(answers), item.text
@@ -109,12 +109,13 @@ def test_who_hears_the_command_alone_can_only_guess_among_the_choices():
 
 def test_items_are_as_stored(snapshot):
     """Choices, hidden slots, expressions and questions, of amounts, of two things and of one."""
-    found = [
-        [getattr(item, name) for name in SHOWN]
-        for task, index in SEEN[1:]
-        for item in items_of(task, index, forms=FORMS)[1]
-    ]
-    assert "\n".join(map(json.dumps, found)) == snapshot
+    lines = []
+    for task, index in SEEN[1:]:
+        _, items = items_of(task, index, forms=FORMS)
+        for item in items:
+            lines.append(json.dumps([getattr(item, name) for name in SHOWN]))
+
+    assert "\n".join(lines) == snapshot
 
 
 def test_places_of_the_right_choice_are_balanced():
@@ -135,10 +136,12 @@ def test_ids_are_unique_and_the_same_whatever_the_answer():
         for item in items_of(task, 1, forms=FORMS, every_variant=True)[1]
     ]
     assert len(set(found)) == len(found)
+
     episode = get_episode("PickXtimes", "test", 3)
     options = InstructionOptions("direct")
     name = item_id(episode, options)
     others = get_task("PickXtimes").goals(episode.scene)
+
     assert {item_id(replace(episode, goal=goal), options) for goal in others} == {name}
     assert item_id(get_episode("PickXtimes", "val", 3), options) != name
 
@@ -157,6 +160,7 @@ def test_the_test_split_has_2550_items():
         )
     )
     spatial = sum(get_task(task).spatial for task in BENCHMARK)
+
     assert counts["spatial"] == 50 * spatial
     assert counts.total() == 50 * (4 * len(BENCHMARK) + spatial) == 2550
 
@@ -175,10 +179,13 @@ def test_options_that_a_setting_does_not_read_keep_their_defaults():
 @settings(max_examples=30)
 @given(st.data())
 def test_masks_survive_their_run_lengths(data):
-    height, width = data.draw(st.integers(1, 9)), data.draw(st.integers(1, 9))
+    height = data.draw(st.integers(1, 9))
+    width = data.draw(st.integers(1, 9))
     bits = data.draw(st.lists(st.booleans(), min_size=height * width, max_size=height * width))
     mask = np.array(bits).reshape(height, width)
+
     counts = encode_mask(mask)
+
     assert all(counts[1:])
     assert (decode_mask(counts, mask.shape) == mask).all()
     if mask.any():
@@ -215,6 +222,7 @@ def test_what_is_not_there_yet_is_pointed_at_by_what_is_in_its_place():
     (referent,) = find_referents(episode)
     assert episode.scene[referent.objects[0]].color == episode.goal.texts("colors")[0]
     assert referent.kind == "hidden_cube"
+
     episode = get_episode("VideoUnmask", "test", 0)
     (referent,) = find_referents(episode)
     inside = episode.scene.hidden_in(referent.objects[0])
@@ -222,25 +230,24 @@ def test_what_is_not_there_yet_is_pointed_at_by_what_is_in_its_place():
 
 
 def test_of_an_amount_every_thing_of_the_color_will_do():
-    episode = next(
-        one
-        for one in (get_episode("BinFill", "test", index) for index in range(50))
-        if len(one.goal.texts("colors")) > 1
-    )
+    episodes = (get_episode("BinFill", "test", index) for index in range(50))
+    episode = next(drawn for drawn in episodes if len(drawn.goal.texts("colors")) > 1)
     for referent in find_referents(episode):
         (color,) = {episode.scene[name].color for name in referent.objects}
-        alike = [one for one in episode.scene.of_kind("cube") if one.color == color]
+        alike = [cube for cube in episode.scene.of_kind("cube") if cube.color == color]
         assert len(alike) == len(referent.objects)
 
 
 def test_the_question_is_the_listener_s_and_the_others_share_its_beginning():
-    own, listener = load_prompts("grounding_questions"), load_prompts("listener")
+    own = load_prompts("grounding_questions")
+    listener = load_prompts("listener")
     assert listener.fill("system").startswith(own.fill("system"))
+
     _, items = items_of("PickXtimes", 0)
     for item in items:
         assert item.text in item.said
         for line in (
-            f"{letter}. {one}" for letter, one in zip(LETTERS, item.choices, strict=False)
+            f"{letter}. {choice}" for letter, choice in zip(LETTERS, item.choices, strict=False)
         ):
             assert line in item.choice_question
 
@@ -259,27 +266,31 @@ def exported(tmp_path_factory):
 
 
 @pytest.mark.sim
-def test_pixels_lie_in_masks_of_the_right_things(exported):
+@pytest.mark.parametrize(("task", "index"), SEEN)
+def test_pixels_lie_in_masks_of_the_right_things(exported, task, index):
     """The right place is computed from poses and the camera, not from the segmentation."""
     _, folder, _ = exported
     items = {item.task: item for item in read_items(folder) if item.setting == "direct"}
-    for task, index in SEEN:
-        episode, item = get_episode(task, "test", index), items[task]
-        referents = find_referents(episode)
-        env = RoboIRGEnv(episode, cameras=("front",), calibration=True, demonstration_frames="none")
-        observation, _ = env.reset()
-        for point, referent in zip(item.points, referents, strict=True):
-            mask = point.mask
-            assert mask[point.y, point.x]
-            seen = 0
-            for name in referent.objects:
-                column, row = project(observation, env.session.world.bodies[name].position)
-                near = mask[max(0, row - 9) : row + 10, max(0, column - 9) : column + 10]
-                seen += near.any()
-            assert seen
+    points = items[task].points
+    episode = get_episode(task, "test", index)
+    env = RoboIRGEnv(episode, cameras=("front",), calibration=True, demonstration_frames="none")
+    observation, _ = env.reset()
+
+    for point, referent in zip(points, find_referents(episode), strict=True):
+        mask = point.mask
+        assert mask[point.y, point.x]
+        places = [
+            project(observation, env.session.world.bodies[name].position)
+            for name in referent.objects
+        ]
+        assert any(
+            mask[max(0, row - 9) : row + 10, max(0, column - 9) : column + 10].any()
+            for column, row in places
+        )
+        if len(places) == 1:
+            ((column, row),) = places
             rows, columns = np.nonzero(mask)
-            if len(referent.objects) == 1:
-                assert np.hypot(rows.mean() - row, columns.mean() - column) < 12
+            assert np.hypot(rows.mean() - row, columns.mean() - column) < 12
 
 
 def project(observation, position):
@@ -291,20 +302,36 @@ def project(observation, position):
 
 @pytest.mark.sim
 def test_pictures_are_stored_once_and_all_are_there(exported):
-    request, folder, facts = exported
-    items = read_items(folder)
-    paths = {path for item in items for path in (item.picture, *item.frames)}
-    assert facts.pictures == len(paths) == sum(1 for _ in (folder / "pictures").iterdir())
+    _, folder, facts = exported
+    paths = set()
+    for item in read_items(folder):
+        paths |= {item.picture, *item.frames}
+
+    assert facts.pictures == len(paths) == len(list((folder / "pictures").iterdir()))
     assert all((folder / path).is_file() for path in paths)
-    video = next(item for item in items if item.task == "VideoUnmask")
+
+
+@pytest.mark.sim
+def test_tasks_with_a_video_have_its_film_and_some_frames(exported):
+    request, folder, _ = exported
+    items = read_items(folder)
+
+    (video,) = [item for item in items if item.task == "VideoUnmask" and item.setting == "direct"]
     assert (folder / video.video).read_bytes()[4:8] == b"ftyp"
     with av.open(str(folder / video.video)) as film:  # as fast as it was
         assert film.streams.video[0].average_rate * request.frames_every == CONTROL_RATE
     assert len(video.frames) == 4
     assert all(item.video is None for item in items if not item.task.startswith("Video"))
-    table = pytest.importorskip("pyarrow.parquet").read_table(
-        folder / "data" / "test-00000-of-00001.parquet"
-    )
+
+
+@pytest.mark.sim
+def test_the_table_has_every_item_with_its_pictures(exported):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    _, folder, facts = exported
+    items = read_items(folder)
+
+    table = parquet.read_table(folder / "data" / "test-00000-of-00001.parquet")
+
     columns = json.loads(table.schema.metadata[b"huggingface"])["info"]["features"]
     assert columns["picture"] == {"_type": "Image"}
     assert columns["frames"]["feature"] == {"_type": "Image"}
@@ -312,22 +339,24 @@ def test_pictures_are_stored_once_and_all_are_there(exported):
     assert len(rows) == facts.items
     for row, item in zip(rows, items, strict=True):
         assert (row["id"], row["choices"]) == (item.id, item.choices)
-        for one in (row["picture"], *row["frames"]):
-            assert one["bytes"] == (folder / one["path"]).read_bytes()
+        for picture in (row["picture"], *row["frames"]):
+            assert picture["bytes"] == (folder / picture["path"]).read_bytes()
 
 
 def test_the_card_says_what_the_dataset_holds(tmp_path, monkeypatch, snapshot):
     items = [
-        msgspec.structs.replace(one, video=f"{task}.mp4" if task == "StopCube" else None)
+        msgspec.structs.replace(item, video=f"{task}.mp4" if task == "StopCube" else None)
         for task, split in (("StopCube", "val"), ("BinFill", "test"))
-        for one in items_of(task, 1, every_variant=task == "BinFill", split=split)[1]
+        for item in items_of(task, 1, every_variant=task == "BinFill", split=split)[1]
     ]
     (tmp_path / "large").write_bytes(bytes(3 << 20))
     monkeypatch.setattr(dataset_export, "collect_items", lambda *_: items)
     monkeypatch.setattr(dataset_export, "write_parquet", lambda *_: None)
     request = ExportRequest((), (), (), frames=8, frames_every=16)
     digest = export_grounding(request, tmp_path, 0).sha256
+
     card = (tmp_path / CARD).read_text().replace(digest, "SHA-256")
+
     assert card.replace(__version__, "VERSION") == snapshot
 
 

@@ -52,13 +52,15 @@ def own_verdicts():
 
 
 def test_the_listener_is_asked_what_the_dataset_asks_and_takes_its_answer():
-    item = next(one for one in items() if one.setting == "direct")
+    item = next(item for item in items() if item.setting == "direct")
     episode = get_episode(item.task, item.split, item.episode)
     with fake_vlm([item.answer]) as server:
         goal = make_listener(server).decide(stand_in(episode, item.setting), item.text)
         assert is_right(goal, episode)
         system, user = server.requests[0]["messages"]
+
     texts = [part["text"] for part in user["content"] if part["type"] == "text"]
+
     assert texts == [item.said, item.shown, item.now, item.slots_question]
     assert item.slots_system in words_of({"messages": [system]})
 
@@ -97,20 +99,23 @@ def test_inspect_and_our_scores_agree(data, tmp_path):
     pytest.importorskip("inspect_ai")
     from roboirg.apps.grounding.inspect_grounding import log_answers
 
-    tries = []
+    lengths = []
 
     def scripted(messages):
         texts = [part.text for part in messages[1].content if part.type == "text"]
-        tries.append(len(messages))
+        lengths.append(len(messages))
         return replies()[texts[0], texts[-1]]
 
+    verdicts = own_verdicts()
+    ours = {name: verdict.right for name, verdict in verdicts.items()}
+    unusable = sum(verdict.understood is None for verdict in verdicts.values())
+
     log = run_inspect(data, scripted, tmp_path)
-    ours = {name: verdict.right for name, verdict in own_verdicts().items()}
-    assert {str(one.id): bool(one.scores["right"].value) for one in log.samples} == ours
-    wanted = {item.id: replies()[asked(item)] for item in items()}
-    assert {one.id: one.reply for one in log_answers(log)} == wanted
-    unusable = sum(verdict.understood is None for verdict in own_verdicts().values())
-    assert tries.count(4) == unusable > 0  # each of them was asked once more
+
+    assert {str(sample.id): bool(sample.scores["right"].value) for sample in log.samples} == ours
+    given = {answer.id: answer.reply for answer in log_answers(log)}
+    assert given == {item.id: replies()[asked(item)] for item in items()}
+    assert lengths.count(4) == unusable > 0  # each of them was asked once more
     metrics = log.results.scores[0].metrics
     assert metrics["accuracy"].value == pytest.approx(sum(ours.values()) / len(ours))
     assert metrics["direct"].value > 0
@@ -130,7 +135,8 @@ def test_inspect_asks_the_other_questions(data, tmp_path, question):
     log = run_inspect(
         data, scripted, tmp_path, question, settings="direct", tasks="PickXtimes,StopCube"
     )
-    assert {one.metadata["setting"] for one in log.samples} == {"direct"}
+
+    assert {sample.metadata["setting"] for sample in log.samples} == {"direct"}
     assert log.results.scores[0].metrics["accuracy"].value == 1
 
 

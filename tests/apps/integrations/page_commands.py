@@ -41,11 +41,14 @@ def run_page(section, folder, values, page=PAGE, **variables):
         **variables: of the environment.
     """
     scripts = blocks(section, "sh", page)
-    if section is not None:
-        (scripts,) = [[one] for one in scripts if "pip install" in one]
+    if section is None:
+        for content in blocks(section, "yaml", page):
+            first_line = content.partition("\n")[0]
+            (folder / first_line.lstrip("# ")).write_text(content)
+    else:
+        scripts = [script for script in scripts if "pip install" in script]
+        assert len(scripts) == 1
     commands = [line for line in _joined("".join(scripts)) if not is_installation(line)]
-    for content in blocks(section, "yaml", page) if section is None else ():
-        (folder / content.partition("\n")[0].lstrip("# ")).write_text(content)
     (folder / "integrations").symlink_to(ROOT / "integrations")
     environment = os.environ | variables
     for name, first in (("PATH", Path(sys.executable).parent), ("PYTHONPATH", HERE)):

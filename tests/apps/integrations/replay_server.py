@@ -17,14 +17,17 @@ class ReplayServer(PredictModelServer):
 
     def __init__(self, table, log, batch):
         super().__init__(max_batch_size=batch)
-        self.replay, self.log, self.players = Replay(table), log, {}
+        self.replay = Replay(table)
+        self.log = log
+        self.players = {}
 
     def predict_batch(self, obs_batch, ctx_batch):
-        return [self.answer(*one) for one in zip(obs_batch, ctx_batch, strict=True)]
+        return [self.answer(*question) for question in zip(obs_batch, ctx_batch, strict=True)]
 
     def answer(self, obs, ctx):
         if ctx.session_id not in self.players:
-            picture, words = obs["images"]["agentview"], obs["task_description"]
+            picture = obs["images"]["agentview"]
+            words = obs["task_description"]
             self.players[ctx.session_id] = self.replay.play(picture, words)
         self.tell("observation", sorted(obs))
         return {"actions": next(self.players[ctx.session_id])}

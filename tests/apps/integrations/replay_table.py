@@ -68,7 +68,8 @@ def _record(task, episode):
     )
     observation, info = env.reset()
     key = key_of(observation["front_rgb"], observation["instruction"])
-    policy, rows = make_policy("oracle", 0), []
+    policy = make_policy("oracle", 0)
+    rows = []
     policy.attach(env)
     policy.reset(observation["instruction"], info["demonstration"])
     env.draws = False
@@ -105,7 +106,8 @@ class ReplayPolicy:
     demonstration_frames = "none"
 
     def __init__(self, seed=0):
-        self.replay, self.player = Replay(os.environ["REPLAY_TABLE"]), None
+        self.replay = Replay(os.environ["REPLAY_TABLE"])
+        self.player = None
 
     def reset(self, instruction, demonstration):
         self.player = None
@@ -130,9 +132,9 @@ def own_outcomes(spec, meshes=MESHES):
             environment=EnvironmentOptions(MAX_STEPS, meshes=meshes),
             options=InstructionOptions(SETTING),
         )
-        one, _ = EpisodeRunner(Path()).play_once(job)
-        assert one.outcome in ("success", "failure"), one
-        played.append((task, episode, one.outcome == "success", one.steps))
+        record, _ = EpisodeRunner(Path()).play_once(job)
+        assert record.outcome in ("success", "failure"), record
+        played.append((task, episode, record.outcome == "success", record.steps))
     for task in PLAYED:
         assert {success for name, _, success, _ in played if name == task} == {True, False}, task
     return played

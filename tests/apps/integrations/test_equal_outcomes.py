@@ -53,6 +53,8 @@ def test_the_page_s_program_has_the_outcomes_of_our_runner(table, ours, tmp_path
     (tmp_path / "my_policy.py").write_text(MY_POLICY)
     run_page("Gymnasium", tmp_path, {}, REPLAY_TABLE=str(table))
     lines = read_verdicts(tmp_path)
-    assert [one["setting"] for one in lines] == [SETTING] * EPISODES
-    found = [(one["task"], one["episode"], one["success"], one["steps"]) for one in lines]
+
+    assert [line["setting"] for line in lines] == [SETTING] * EPISODES
+
+    found = [(line["task"], line["episode"], line["success"], line["steps"]) for line in lines]
     assert sorted(found) == sorted(ours)

@@ -66,6 +66,7 @@ def ours(model):
 def test_the_page_s_commands_have_the_outcomes_of_our_runner(model, ours, tmp_path, samples):
     model.requests.clear()
     more = f"-T episodes={PER_TASK} -T max_steps={MAX_STEPS}"
+
     run_page(
         "Inspect",
         tmp_path,
@@ -73,20 +74,30 @@ def test_the_page_s_commands_have_the_outcomes_of_our_runner(model, ours, tmp_pa
         OPENAI_BASE_URL=f"{model.url}/v1",
         OPENAI_API_KEY="none",
     )
+
     (path,) = (tmp_path / "logs").glob("*.eval")
     log = read_eval_log(str(path))
-    scores = [next(iter(one.scores.values())) for one in log.samples]
-    records = [one.metadata["record"] for one in scores]
-    found = [(one["task"], one["episode"], one["outcome"] == "success", one["steps"])
-             for one in records]  # fmt: skip
+    successes = 0
+    found = []
+    for sample in log.samples:
+        (score,) = sample.scores.values()
+        record = score.metadata["record"]
+        assert record["options"]["setting"] == SETTING
+        assert record["usage"]["input_tokens"] == TOKENS[0]
+        is_success = record["outcome"] == "success"
+        found.append((record["task"], record["episode"], is_success, record["steps"]))
+        successes += score.value
+        check_not_told(model, SETTING, str(record["seed"]))
     assert sorted(found) == sorted(ours)
-    assert {one["options"]["setting"] for one in records} == {SETTING}
-    assert {one["usage"]["input_tokens"] for one in records} == {TOKENS[0]}
-    assert sum(one.value for one in scores) == sum(success for _, _, success, _ in ours)
-    assert any("accuracy" in one.metrics for one in log.results.scores)
-    told = "\n".join(map(words_of, model.requests))
+    assert successes == sum(is_success for _, _, is_success, _ in ours)
+    assert any("accuracy" in score.metrics for score in log.results.scores)
     assert len(model.requests) == EPISODES
-    for secret in (SETTING, *(str(one["seed"]) for one in records)):
+
+
+def check_not_told(model, *secrets):
+    """Check that no request to the model had these words."""
+    told = "\n".join(map(words_of, model.requests))
+    for secret in secrets:
         assert secret not in told
 
 

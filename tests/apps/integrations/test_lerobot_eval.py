@@ -30,7 +30,7 @@ if MANY:
 @pytest.fixture(scope="session")
 def ours(checkpoint):
     """Outcomes of our own runner with the same checkpoint."""
-    return [one[:3] for one in own_outcomes(f"lerobot://{checkpoint}")]
+    return [outcome[:3] for outcome in own_outcomes(f"lerobot://{checkpoint}")]
 
 
 @pytest.mark.parametrize(("batch", "use_async"), BATCHES)
@@ -52,11 +52,12 @@ def test_the_page_s_commands_have_the_outcomes_of_our_runner(
     )
     told = json.loads((tmp_path / "runs" / "lerobot" / "eval_info.json").read_text())
     found = [
-        (one["task_group"], episode, success)
-        for one in told["per_task"]
-        for episode, success in enumerate(one["metrics"]["successes"])  # of the seeds from 1000 on
+        (task["task_group"], episode, success)
+        for task in told["per_task"]
+        for episode, success in enumerate(task["metrics"]["successes"])  # of the seeds from 1000 on
     ]
     expected = [(f"{task}-{SETTING}-test", *verdict) for task, *verdict in ours]
+
     assert sorted(found) == sorted(expected)
 
 

@@ -45,8 +45,13 @@ def test_the_page_s_program_has_the_outcomes_of_our_runner(
     (program,) = blocks("LeRobot 0.4", "python")
     (tmp_path / "play_hub.py").write_text(replaced(program, values))
     run_page("LeRobot 0.4", tmp_path, {}, HF_HUB_CACHE=str(hub), HF_HUB_OFFLINE="1")
-    found = [(one["task"], one["episode"], one["success"]) for one in read_verdicts(tmp_path)]
-    assert sorted(found) == sorted(one[:3] for one in ours)
+
+    found = [
+        (verdict["task"], verdict["episode"], verdict["success"])
+        for verdict in read_verdicts(tmp_path)
+    ]
+
+    assert sorted(found) == sorted(outcome[:3] for outcome in ours)
 
 
 def options():

@@ -26,18 +26,22 @@ def reset(**options):
 def test_the_video_comes_first_and_the_end_is_repeated():
     env, first, info = reset(video=True)
     assert set(first) == {"pixels", "agent_pos"}
+
     hold = np.append(first["agent_pos"][:7], 1.0)
-    played = [(first, 0.0, False, False, info)]
-    while played[-1][4]["is_video_demo"]:
-        played.append(env.step(hold))
-    *video, turn = (one["pixels"]["front"] for one, *_ in played)
-    later = [env.step(hold) for _ in range(3)]
-    assert [one[2:4] for one in later] == [(False, False), (False, True), (False, True)]
-    assert env.reset() == (later[1][0], later[1][4])
+    pictures = [first["pixels"]["front"]]
+    while info["is_video_demo"]:
+        observation, *_, info = env.step(hold)
+        pictures.append(observation["pixels"]["front"])
+    *video, turn = pictures
+    later, end, after_it = (env.step(hold) for _ in range(3))
+
+    assert later[2:4] == (False, False)
+    assert end[2:4] == after_it[2:4] == (False, True)
+    assert env.reset() == (end[0], end[4])
 
     _, info = roboirg.make("VideoUnmask", episode=1, cameras=("front",)).reset()
     shown = info["demonstration"]["front_rgb"]
-    assert np.array_equal(video, [scaled_square(one, SIZE) for one in shown])
+    assert np.array_equal(video, [scaled_square(picture, SIZE) for picture in shown])
     _, seen, info = reset()
     assert np.array_equal(seen["pixels"]["front"], turn)
     assert not info["is_video_demo"]
@@ -49,6 +53,7 @@ def test_an_action_that_is_none_ends_the_episode_until_a_reset_is_meant():
     assert ended[1:] == (0.0, True, False, {"is_success": False, "is_video_demo": False})
     assert env.step(np.zeros(8)) is ended
     assert env.task == instruct(get_episode("VideoUnmask", "test", 1)).text
+
     env.reset(options={NEW_ROLLOUT: True})
     assert env.step(HOME_ACTION) is not ended
 
@@ -59,8 +64,11 @@ def test_batches_report_the_end_where_lerobot_looks_for_it():
     env.reset(seed=[1000, 1001])
     actions = np.tile(HOME_ACTION, (2, 1)).astype(np.float32)
     *_, truncated, infos = env.step(actions)
+
     assert truncated.all()
     assert infos["final_info"]["is_success"].tolist() == [False, False]
+
     texts = [instruct(get_episode("StopCube", "test", index)).text for index in (0, 1)]
     assert list(env.call("task_description")) == texts
+
     env.close()

@@ -62,8 +62,12 @@ def folder(tmp_path_factory):
 
 def test_the_page_s_commands_have_equal_outcomes(folder):
     told = json.loads((folder / "runs" / "eval" / "eval_info.json").read_text())
-    (theirs,) = [one["metrics"]["successes"] for one in told["per_task"]]
-    ours = sorted((one.episode, one.outcome) for one in read_records(folder / "runs" / "act"))
+    (theirs,) = [task["metrics"]["successes"] for task in told["per_task"]]
+
+    ours = sorted(
+        (record.episode, record.outcome) for record in read_records(folder / "runs" / "act")
+    )
+
     assert ours == [(index, "success" if won else "failure") for index, won in enumerate(theirs)]
     assert len(ours) == 2
 
@@ -89,13 +93,14 @@ def lerobot_s_actions(place, episode):
 def our_actions(place, episode):
     """Return the actions that lerobot:// executes in an episode, and how many at a time."""
     policy = make_policy(f"lerobot://{place}", 0)
-    rows, act = [], policy.act
+    rows = []
+    act = policy.act
     options = {"cameras": ("front",), "demonstration_frames": "none", "max_steps": STEPS}
     env = make(TASK, episode=episode, **options)
     policy.act = lambda seen: rows.append(act(seen)) or rows[-1]
     play(env, policy)
     env.close()
-    return np.concatenate(rows)[:STEPS], [len(one) for one in rows]
+    return np.concatenate(rows)[:STEPS], [len(row) for row in rows]
 
 
 @pytest.fixture
@@ -117,7 +122,9 @@ def test_actions_are_those_of_lerobot_s_loop(folder, kind, at_a_time, monkeypatc
     place = folder / "outputs" / kind / LAST if at_a_time else request.getfixturevalue(kind)
     draw_the_same(get_policy_class(kind if at_a_time else "act"), monkeypatch)
     expected = lerobot_s_actions(place, 1)
+
     found, counts = our_actions(place, 1)
+
     assert np.abs(found - expected).max() == 0
     assert np.ptp(found[:, :7], axis=0).max() > 0
     assert counts == (at_a_time or [1] * STEPS)

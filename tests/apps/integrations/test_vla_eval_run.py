@@ -61,7 +61,11 @@ def serving(table, log, batch):
 def write_configuration(path, port):
     """Write our configuration with one of its entries and fewer episodes."""
     content = yaml.safe_load((ROOT / "integrations/vla_eval/roboirg.yaml").read_text())
-    (entry,) = [one for one in content["benchmarks"] if one["params"]["setting"] == SETTING]
+    (entry,) = [
+        benchmark
+        for benchmark in content["benchmarks"]
+        if benchmark["params"]["setting"] == SETTING
+    ]
     entry["params"] |= {"tasks": list(PLAYED), "max_steps": MAX_STEPS, "meshes": MESHES}
     if not SENDS_ALL:
         entry["params"] |= {"send_wrist_image": False, "send_video_history": False}
@@ -93,27 +97,32 @@ def test_the_page_s_commands_have_the_outcomes_of_our_runner(table, ours, tmp_pa
         rows = database.execute(
             "SELECT task_name, context, status, steps FROM episode_results"
         ).fetchall()
+
     found = [
         (task, json.loads(context)["episode_idx"], status == "success", steps)
         for task, context, status, steps in rows
     ]
+
     assert sorted(found) == sorted(ours)
     check_that_nothing_is_told(log)
 
 
 def check_that_nothing_is_told(log):
     told = [json.loads(line) for line in log.read_text().splitlines()]
+
     starts = [content for kind, content in told if kind == "start"]
     assert len(starts) == EPISODES
-    assert all(one["task"] == {"name": "RoboIRGBench"} for one in starts)
+    assert all(start["task"] == {"name": "RoboIRGBench"} for start in starts)
+
     words = json.dumps([content for kind, content in told if kind != "observation"])
     for secret in (SETTING, *PLAYED, "goal", "seed", "episode_idx"):
         assert secret not in words
+
     later = ["images", "states", "task_description"]
     first = ["episode_restart", *later, "video_history", "wrist_video_history"]
     shown = [content for kind, content in told if kind == "observation"]
     assert (first in shown) == SENDS_ALL
-    assert all(one in (first, later) for one in shown)
+    assert all(fields in (first, later) for fields in shown)
 
 
 def test_the_page_names_the_version_that_is_played():

@@ -22,9 +22,11 @@ all = ["Press the button when the cube reaches the target {visit}."]
 
 @pytest.mark.usefixtures("in_this_process")
 def test_instructions_in_words_from_outside(tmp_path):
-    file, out = tmp_path / "test.toml", tmp_path / "rows.jsonl"
+    file = tmp_path / "test.toml"
+    out = tmp_path / "rows.jsonl"
     file.write_text(WORDINGS)
     assert "Press the button when" in call("show", "StopCube", "0", "--words", "--wordings", file)
+
     words = plan_file(wordings=str(file), forms="implicit")
     call("export", "instructions", "--out", out, "--plan", words)
     rows = [json.loads(line) for line in out.read_text().splitlines()]
@@ -39,19 +41,24 @@ def test_the_same_bytes_every_time_and_only_what_is_asked_for(tmp_path):
     files = [tmp_path / "one.jsonl", tmp_path / "two.jsonl"]
     plan = plan_file(stages=[1, 2, 3, 5], distractor="competing", frame="camera", forms="implicit")
     words = ("--tasks", "ButtonUnmask,StopCube", "--split", "val", "--plan", plan)
+    settings = ("--settings", "spatial,direct,contextual")
+
     for file in files:
-        settings = ("--settings", "spatial,direct,contextual")
         call("export", "instructions", "--out", file, *words, *settings)
+
     assert files[0].read_bytes() == files[1].read_bytes()
     assert sorted(tmp_path.iterdir()) == files
+
     rows = [json.loads(line) for line in files[0].read_text().splitlines()]
     said = {(row["task"], row["setting"]) for row in rows}
     assert len(said) == 5
     assert ("StopCube", "spatial") not in said
     assert {row["split"] for row in rows} == {"val"}
     assert {row["frame"] for row in rows} == {None, "camera"}
+
     contextual = next(row for row in rows if row["setting"] == "contextual")
-    assert [turn["stage"] for turn in contextual["turns"]][1:3] == ["reinforcement", "distractor"]
+    stages = [turn["stage"] for turn in contextual["turns"]]
+    assert stages[1:3] == ["reinforcement", "distractor"]
     assert contextual["distractor"] == "competing"
 
 
@@ -95,28 +102,51 @@ def test_an_author_sees_texts_and_the_broken_rule_in_each_task(tmp_path, snapsho
     )
     words = ["language", "check-scenarios", str(file), "--seeds", "0"]
     result = CliRunner().invoke(cli.app, words)
+
     assert isinstance(result.exception, RoboIRGError)
     assert f"{result.stdout}{result.exception}" == snapshot
+
     result = CliRunner().invoke(cli.app, [*words, "--scenario", "fear"])
     assert str(result.exception) == "There is no scenario 'fear'; known: far. Did you mean 'far'?"
 
 
-@pytest.mark.usefixtures("in_this_process")
-def test_raters_get_the_texts_of_the_key_in_other_orders_and_their_table(tmp_path):
-    out, tasks = tmp_path / "rating", "PickXtimes,SwingXtimes"  # which share frames
+@pytest.fixture
+def rating(tmp_path, in_this_process):
+    """A folder with sheets for raters, of two tasks that share frames."""
+    out = tmp_path / "rating"
     settings = ("--settings", "direct,reasoning")
-    call("language", "sample", "--out", out, "--tasks", tasks, *settings)
-    read = [list(csv.reader(path.open())) for path in sorted(out.glob("sheet-*.csv"))]
-    key = list(csv.DictReader((out / "key.csv").open()))
-    for rows in read:
-        assert {row[0]: row[1] for row in rows[1:]} == {row["number"]: row["text"] for row in key}
-    assert len({tuple(row[0] for row in rows) for rows in read}) == len(read) == 3
-    frames = {(row["setting"], row["frame"]) for row in key}
+    call("language", "sample", "--out", out, "--tasks", "PickXtimes,SwingXtimes", *settings)
+    return out
+
+
+def read_key(rating):
+    """Return the rows of the key by their numbers."""
+    with (rating / "key.csv").open() as file:
+        return {row["number"]: row for row in csv.DictReader(file)}
+
+
+def test_raters_get_the_texts_of_the_key_in_other_orders(rating):
+    key = read_key(rating)
+    frames = {(row["setting"], row["frame"]) for row in key.values()}
     assert len(frames) == len(key)
-    by_number = {row["number"]: row for row in key}
-    ratings = dict.fromkeys(by_number, 4.0)
-    for row in rate_words.rows(by_number, [ratings, ratings]):
+
+    orders = set()
+    for path in rating.glob("sheet-*.csv"):
+        _, *rows = csv.reader(path.open())
+        assert {row[0]: row[1] for row in rows} == {name: row["text"] for name, row in key.items()}
+        orders.add(tuple(row[0] for row in rows))
+    assert len(orders) == len(list(rating.glob("sheet-*.csv"))) == 3
+
+
+def test_raters_table_has_intervals_around_equal_ratings(rating):
+    key = read_key(rating)
+    ratings = dict.fromkeys(key, 4.0)
+
+    for row in rate_words.rows(key, [ratings, ratings]):
         low, high = re.search(r"\| 4.0 \| (.*?) to (.*?) \|", row).groups()
         assert float(low) < 4.0 < float(high), "frames that are all alike leave room for others"
+
+
+def test_an_empty_rating_is_refused_with_its_number(rating):
     with pytest.raises(SystemExit, match=r"rates text \d+ ''; it must be a number"):
-        rate_words.read_ratings(out / "sheet-1.csv", by_number)
+        rate_words.read_ratings(rating / "sheet-1.csv", read_key(rating))

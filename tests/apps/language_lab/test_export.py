@@ -20,26 +20,29 @@ from roboirg.tasks.splits.splits import get_episode
 def rows():
     """Four episodes of each task in all settings and forms."""
     episodes = [get_episode(task, "test", index) for task in TASKS for index in range(4)]
-    return tuple(row(*one) for one in instructions(episodes, plain_settings(), FORMS))
+    return tuple(row(*said) for said in instructions(episodes, plain_settings(), FORMS))
 
 
 def test_ids_are_unique_and_say_what_the_row_is(snapshot):
-    assert len({one["id"] for one in rows()}) == len(rows())
+    assert len({line["id"] for line in rows()}) == len(rows())
+
     episode = get_episode("SwingXtimes", "val", 3)
     wanted = ("contextual", "spatial", "direct-rival", "grounded")
     options = InstructionOptions(stages=(1, 2, 3, 5), distractor="competing", distractors=2)
-    assert [row(*one) for one in instructions([episode], wanted, FORMS[:1], options)] == snapshot
+    assert [row(*said) for said in instructions([episode], wanted, FORMS[:1], options)] == snapshot
 
 
 def test_spans_count_in_the_whole_prompt():
-    for one in rows():
-        text, turns = one["text"], one["turns"]
+    for line in rows():
+        text = line["text"]
+        turns = line["turns"]
         assert " ".join(turn["text"] for turn in turns) == text
-        assert (turns[-1]["stage"], turns[-1]["text"]) == ("command", one["command"])
+        assert (turns[-1]["stage"], turns[-1]["text"]) == ("command", line["command"])
         for turn in turns:
             assert text[turn["start"] :].startswith(turn["text"])
-        for mention in one["mentions"]:
-            start, end = mention["start"], mention["end"]
+        for mention in line["mentions"]:
+            start = mention["start"]
+            end = mention["end"]
             assert text[start:end] == mention["text"] != ""
             turn = turns[mention["turn"]]
             assert turn["start"] <= start < end <= turn["start"] + len(turn["text"])
@@ -65,7 +68,7 @@ def test_parquet_has_its_types_where_columns_are_empty():
     pytest.importorskip("pyarrow")
     from pyarrow import parquet
 
-    few = [one for one in rows() if one["setting"] == "explicit"]
+    few = [line for line in rows() if line["setting"] == "explicit"]
     schema = parquet.read_schema(io.BytesIO(instruction_export.encode(few, "parquet")))
     assert str(schema.field("landmark_classes").type) == "list<element: int64>"
     assert str(schema.field("pattern").type) == "string"
@@ -76,5 +79,6 @@ def test_without_pyarrow_one_sentence_says_what_to_do(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
     monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
     instruction_export.format_of(Path("rows.jsonl"))
+
     with pytest.raises(MissingDependencyError, match=r"\[export\]"):
         instruction_export.format_of(Path("rows.parquet"))

@@ -33,6 +33,7 @@ def test_expressions_are_counted_once_per_scene():
     assert {"it", "them", "that", "former", "latter", "first", "second"} <= set(counts["direct"])
     assert {"that", "each", "other"} <= set(counts["reasoning"])
     assert {"it", "that", "there"} == set(counts["spatial"])
+
     order = corpus_statistics.expression_order(counts)
     assert set(order) == {name for by_class in counts.values() for name in by_class}
     assert order.index("it") < order.index("former") < order.index("there")

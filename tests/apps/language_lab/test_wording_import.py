@@ -53,14 +53,18 @@ def test_each_goal_has_the_sentence_of_the_source_and_each_setting_stays(task):
 
 
 def test_the_command_writes_a_file_that_is_read_again(one_task, tmp_path):
-    clone, out = make_clone(tmp_path / "clone"), tmp_path / "out.toml"
+    clone = make_clone(tmp_path / "clone")
+    out = tmp_path / "out.toml"
     words = ["language", "import-robomme", str(clone), "--out", str(out)]
     call = CliRunner().invoke(cli.app, [*words, "--name", "stand-in"])
+
     assert call.exit_code == 0
+
     found = read_wordings(out)
     lines = ("VideoRepick: 3 sentences", f"Wrote {found.identity}: {out}")
     assert call.stdout.splitlines() == [*lines]
     assert re.fullmatch("stand-in@[0-9a-f]{8}", found.identity)
+
     # Only RoboMME's sentences may have its name, and a bad name is refused before the work.
     out.unlink()
     for more, complaint in (([], "give it another name"), (["--name", "a b"], "the name 'a b'")):
@@ -89,6 +93,7 @@ def test_a_sentence_that_cannot_be_used_is_named(one_task, tmp_path, body, compl
     clone = make_clone(tmp_path)
     file = clone / robomme_import.FILE
     file.write_text(f"def get_language_goal(self, env):\n    return {body}\n")
+
     with pytest.raises(InvalidValueError, match=complaint):
         robomme_import.import_robomme(clone, "stand-in")
 
@@ -97,8 +102,11 @@ def test_only_one_file_is_loaded_and_nothing_is_left_behind(one_task, tmp_path, 
     monkeypatch.setattr(sys, "dont_write_bytecode", False)
     clone = make_clone(tmp_path)
     (clone / "src/robomme/__init__.py").write_text("raise SystemExit")
-    before, modules = list(sys.path), set(sys.modules)
+    before = list(sys.path)
+    modules = set(sys.modules)
+
     robomme_import.import_robomme(clone, "stand-in")
+
     assert sys.path == before
     assert not [name for name in set(sys.modules) - modules if "robomme" in name]
     assert not list(clone.rglob("__pycache__"))

@@ -10,7 +10,8 @@ class Failing:
     """Holds still; `fail` is called in the phase `when`, at call number `at` of it."""
 
     cameras = ()
-    when, at = "act", 1
+    when = "act"
+    at = 1
 
     def __init__(self, seed=0):
         self.calls = 0
@@ -47,7 +48,8 @@ class Failing:
 class Posing(Failing):
     """Moves the tool, and raises after some answers."""
 
-    actions, at = "ee_pose", 3
+    actions = "ee_pose"
+    at = 3
 
     def act(self, observation):
         self._maybe("act")

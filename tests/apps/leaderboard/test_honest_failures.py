@@ -24,21 +24,24 @@ def play(folder, names, executor, **options):
 
 def test_runs_of_policies_that_fail_in_this_process_hold(tmp_path):
     assert failing_policies.Failing
+
     play(tmp_path, IN_PROCESS, InProcess(), policy_process="shared")
-    records = {one.policy.partition(":")[2]: one for one in read_records(tmp_path)}
+    records = {record.policy.partition(":")[2]: record for record in read_records(tmp_path)}
     assert len(records) == len(IN_PROCESS) >= 20
-    assert {one.outcome for one in records.values()} == {"error", "failure"}
+    assert {record.outcome for record in records.values()} == {"error", "failure"}
     assert records["Raises_act_1"].action_log is not None
     assert (records["Posing"].outcome, records["Posing"].steps) == ("error", 2)
+
     found = verify_run(tmp_path, workers=1)
     assert found.holds, found
-    assert found.errors == sum(one.outcome == "error" for one in records.values())
+    assert found.errors == sum(record.outcome == "error" for record in records.values())
 
 
 @pytest.mark.slow
 def test_runs_of_policies_whose_process_ends_hold(tmp_path):
     play(tmp_path, HOSTED, LocalProcesses(1), policy_timeout_s=30.0)
     records = read_records(tmp_path)
-    assert {one.error for one in records} == {"policy", "infrastructure", "timeout"}
+    assert {record.error for record in records} == {"policy", "infrastructure", "timeout"}
+
     found = verify_run(tmp_path)
     assert found.holds, found

@@ -182,10 +182,12 @@ REFUSED_COURSES = {
         *itertools.product(REFUSED_COURSES, (read_records, merge)),
     ],
 )
-def test_records_are_refused(name, reader, run):
+def test_records_that_are_none_are_refused_by_the_name_of_their_file(name, reader, run):
     change, says = {**REFUSED_RECORDS, **REFUSED_COURSES}[name]
     change(run)
+
     message = refusal(reader, run)
+
     assert re.search(says, message)
     assert RECORDS_FILE in message
 
@@ -204,10 +206,12 @@ def test_a_damaged_run_is_merged_with_a_warning_but_neither_packed_nor_verified(
 ):
     DAMAGED_LINES[name](run)
     assert "has 1 damaged line, the first is line 1" in refusal(reader, run)
+
     merged = merge(run)
     (warning,) = caplog.messages
     assert f"{run / RECORDS_FILE} has 1 damaged line, the first is line 1" in warning
     assert len(read_records(merged)) == 1
+
     reader(merged)
 
 
@@ -224,7 +228,8 @@ LEADING_OUT = ("logs", "logs/*.txt", "actions", "actions/*/*.npz", "videos", "vi
 
 def lead_out(run, name):
     """Put a link to a file or folder outside in the place of a file or folder."""
-    path, outside = next(run.glob(name), run / name), run.parent / "secret.txt"
+    path = next(run.glob(name), run / name)
+    outside = run.parent / "secret.txt"
     path.parent.mkdir(exist_ok=True)
     if path.is_dir():
         outside = path.rename(run.parent / "outside")
@@ -232,11 +237,12 @@ def lead_out(run, name):
     path.symlink_to(outside)
 
 
-@pytest.mark.parametrize("reader", [pack, merge], ids=lambda one: one.__name__)
+@pytest.mark.parametrize("reader", [pack, merge], ids=lambda reader: reader.__name__)
 @pytest.mark.parametrize("name", LEADING_OUT)
 def test_links_that_lead_out_are_not_followed(name, reader, run):
     lead_out(run, name)
     assert "link leads elsewhere" in refusal(reader, run)
+
     written = [path for path in run.parent.rglob("*") if path.is_file() and not path.is_symlink()]
     secret = run.parent / "secret.txt"
     assert [path for path in written if path.read_bytes() == secret.read_bytes()] == [secret]
@@ -252,6 +258,7 @@ def test_the_page_follows_no_circle_of_links(run):
     video = next(run.glob("videos/*.mp4"))
     video.unlink()
     video.symlink_to(video.name)
+
     assert "link leads elsewhere" in refusal(report, run)
 
 
@@ -269,8 +276,10 @@ def test_a_run_too_large_for_a_pack_is_refused_before_it_is_read(run):
 def test_hidden_files_and_pipes_are_not_packed(run):
     (run / "logs" / ".DS_Store").touch()
     os.mkfifo(run / "logs" / "pipe.txt")
+
     with opened_run(pack(run)) as folder:
         names = {path.name for path in (folder / "logs").iterdir()}
+
     assert names == {path.name for path in (run / "logs").iterdir()} - {".DS_Store", "pipe.txt"}
 
 
@@ -325,7 +334,9 @@ def test_plan_files_are_refused(name, tmp_path):
     content, says = PLAN_FILES[name]
     path = tmp_path / "plan.yaml"
     path.write_text(content)
+
     message = refusal(lambda path: read_plan_file(str(path)), path)
+
     assert says in message
     assert "plan.yaml" in message
 
@@ -364,7 +375,8 @@ def _headers_with(offset, value):
     return build
 
 
-ENCRYPTED, UNKNOWN_METHOD = _headers_with(6, 1), _headers_with(8, 99)
+ENCRYPTED = _headers_with(6, 1)
+UNKNOWN_METHOD = _headers_with(8, 99)
 
 ACTION_FILES = {
     "10**12 rows": _rows("(1000000000000, 8)"),
@@ -383,6 +395,7 @@ def test_action_files_are_refused(name, run):
     digest = line_of(run)["action_log"]
     path = action_path(run, digest)
     path.write_bytes(ACTION_FILES[name](path.read_bytes()))
+
     assert "is not an action log" in refusal(lambda folder: read_actions(folder, digest), run)
     assert fit(verify(run)).count("is not an action log") == 2  # both records name it
 
@@ -446,11 +459,13 @@ PACKS = {
 
 
 @pytest.mark.parametrize("name", PACKS)
-def test_packs_are_refused(name, run):
+def test_a_pack_that_is_none_is_refused_and_leaves_nothing_behind(name, run):
     build, says = PACKS[name]
     path = pack(run)
     path.write_bytes(build(path.read_bytes()))
+
     before = sorted(run.parent.rglob("*"))
+
     assert says in refusal(read_pack, path)
     assert sorted(run.parent.rglob("*")) == before
 
@@ -459,7 +474,9 @@ def test_a_warning_about_a_pack_names_the_pack(run, caplog):
     path = pack(run)
     records = (run / RECORDS_FILE).read_bytes() + b"damaged\n"
     path.write_bytes(_with({RECORDS_FILE: records})(path.read_bytes()))
+
     read_pack(path)
+
     assert f"{path.name}/{RECORDS_FILE} has 1 damaged line" in caplog.text
 
 
@@ -485,7 +502,9 @@ def test_wording_files_are_refused(name, tmp_path):
     content, says = WORDING_FILES[name]
     path = tmp_path / "words.toml"
     path.write_text(content)
+
     message = refusal(read_wordings, path)
+
     assert says in message
     assert "words.toml" in message
 

@@ -17,6 +17,7 @@ def test_the_same_run_comes_out(run, tmp_path):
     assert (manifest.records, manifest.policies) == (2, ("oracle", "random"))
     with zipfile.ZipFile(tmp_path / "a.zip") as archive:
         assert json.loads(archive.read(MANIFEST)) == manifest.model_dump(mode="json")
+
     with opened_run(tmp_path / "a.zip") as folder:
         assert read_records(folder) == read_records(run)
         kept = {path.suffix for path in folder.rglob("*") if path.is_file()}
@@ -33,6 +34,7 @@ def test_the_same_run_gives_the_same_bytes(run, tmp_path, monkeypatch):
     for name, order in (("a.zip", 1), ("b.zip", -1)):
         monkeypatch.setattr(Path, "rglob", lambda *own, by=order: sorted(found(*own))[::by])
         pack_run(run, tmp_path / name, videos=True)
+
     assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
     with opened_run(tmp_path / "a.zip") as folder:
         assert (folder / "videos").is_dir()

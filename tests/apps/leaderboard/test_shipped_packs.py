@@ -33,9 +33,11 @@ def test_the_commands_of_the_page_make_a_pack_that_holds(tmp_path):
         assert done.exit_code == 0, done.output
     path = tmp_path / "scripted.roboirg.zip"
     done = CliRunner().invoke(app, ["leaderboard", "verify", str(path)])
+
     assert done.output.endswith("Everything holds.\n")
+
     with opened_run(path) as folder:
-        outcomes = {one.policy: one.outcome for one in read_results(folder)}
+        outcomes = {result.policy: result.outcome for result in read_results(folder)}
     assert (outcomes["listener"], outcomes["previous-goal"]) == ("success", "failure")
 
 
@@ -43,8 +45,9 @@ def test_the_commands_of_the_page_make_a_pack_that_holds(tmp_path):
 def test_a_shipped_pack_holds_where_it_is_played_again(pack):
     """On a processor of another maker, one episode in ten moves differently."""
     assert pack.stat().st_size <= MOST_BYTES
+
     with opened_run(pack) as folder:
         found = verify_run(folder, sample=0.003)
-    here = [one for one in found.checks if not one.elsewhere]
+    here = [check for check in found.checks if not check.elsewhere]
     assert (here, found.missing) == ([], ())
     assert not any("words" in note for note in found.notes), "pack it anew: docs/verification.md"

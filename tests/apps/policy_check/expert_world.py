@@ -12,7 +12,8 @@ from roboirg.apps.policy_check.expert_episode import ExpertEpisode, ExpertMoment
 from roboirg.core.actions import JOINT_HIGH, JOINT_LOW
 from roboirg.core.policy_needs import PolicyNeeds
 
-MOMENTS, ROWS = 20, 16
+MOMENTS = 20
+ROWS = 16
 REST = np.array([0.0, 0.2, 0.0, -2.1, 0.0, 2.4, 0.8])
 TEXT = "Take the red cube and press the button."
 PICTURE = np.zeros((256, 256, 3), np.uint8)
@@ -29,7 +30,8 @@ def expert_motion(joints):
 
 @cache
 def expert_episode():
-    joints, moments = REST.copy(), []
+    joints = REST.copy()
+    moments = []
     for number in range(MOMENTS):
         gripper = 1.0 if number % 10 < 5 else -1.0
         path = path_from(joints, expert_motion(joints))
@@ -50,9 +52,9 @@ def expert_episode():
 def record(policy, rows):
     """Stand in for the simulator: the same episode for every policy, cut to its chunks."""
     whole = expert_episode()
-    moments = [one._replace(actions=one.actions[:rows]) for one in whole.moments]
+    moments = [moment._replace(actions=moment.actions[:rows]) for moment in whole.moments]
     if PolicyNeeds.of(policy).observe_every:
-        shown = [{**one.observation, "history": (one.observation,)} for one in moments]
+        shown = [{**moment.observation, "history": (moment.observation,)} for moment in moments]
         moments = [m._replace(observation=o) for m, o in zip(moments, shown, strict=True)]
     return whole._replace(moments=moments)
 

@@ -32,12 +32,13 @@ def recorded():
 def test_a_recorded_episode_is_what_the_expert_did():
     moments = recorded().moments
     assert len(moments) > 8
-    for one, after in itertools.pairwise(moments):
-        assert 1 <= len(one.actions) <= MAX_ROWS
+    for moment, after in itertools.pairwise(moments):
+        assert 1 <= len(moment.actions) <= MAX_ROWS
         # The arm follows its targets.
-        assert np.abs(one.actions[-1, :7] - after.still).max() < 0.1
-        assert one.observation["front_rgb"].shape == (256, 256, 3)
-    grips = {float(one.actions[0, -1]) for one in moments}
+        assert np.abs(moment.actions[-1, :7] - after.still).max() < 0.1
+        assert moment.observation["front_rgb"].shape == (256, 256, 3)
+
+    grips = {float(moment.actions[0, -1]) for moment in moments}
     assert grips == {-1.0, 1.0}
 
 
@@ -52,7 +53,7 @@ class Posing:
 
     def act(self, observation):
         here = observation["end_effector"]
-        nearest = min(recorded_poses(), key=lambda one: np.abs(one.still - here).sum())
+        nearest = min(recorded_poses(), key=lambda moment: np.abs(moment.still - here).sum())
         rows = nearest.actions + 1e-6 * self.words
         rows[:, :6] += here - nearest.still
         return rows
@@ -64,18 +65,19 @@ def recorded_poses():
 
 
 def test_poses_of_the_expert_are_those_after_each_step():
-    for one, after in itertools.pairwise(recorded_poses()):
-        assert one.actions.shape in {(rows, 7) for rows in range(1, 9)}
-        assert np.allclose(one.actions[-1, :6], after.still)
+    for moment, after in itertools.pairwise(recorded_poses()):
+        assert moment.actions.shape in {(rows, 7) for rows in range(1, 9)}
+        assert np.allclose(moment.actions[-1, :6], after.still)
 
 
 def test_a_policy_that_does_what_the_expert_does_fits():
     episode = ExpertEpisode("Go on.", {}, recorded_poses())
     (told,) = [
-        one
-        for one in check_policy(Posing(), record_expert=lambda *_: episode)
-        if one.check == "expert"
+        finding
+        for finding in check_policy(Posing(), record_expert=lambda *_: episode)
+        if finding.check == "expert"
     ]
+
     assert told.verdict == "pass"
     assert " m from what it did" in told.message
 
@@ -85,9 +87,13 @@ def test_without_a_renderer_nothing_is_compared(monkeypatch):
         raise RenderDeviceError("no device")
 
     monkeypatch.setattr("roboirg.envs.factory.make", refuse)
+
     (told,) = [
-        one for one in check_policy("random", record_expert=record_expert) if one.check == "expert"
+        finding
+        for finding in check_policy("random", record_expert=record_expert)
+        if finding.check == "expert"
     ]
+
     assert told[:2] == ("expert", "note")
     assert told.message.startswith("Not compared: no device (test_expert_episode.py, line")
-    assert "pass" in {one.verdict for one in check_policy("random")}
+    assert "pass" in {finding.verdict for finding in check_policy("random")}

@@ -51,7 +51,7 @@ class GripperFromZero(Honest):
 
 def results_of(kind, **options):
     found = check_policy(f"{kind.__module__}:{kind.__name__}", record_expert=record, **options)
-    assert all(one.message.endswith(".") for one in found)
+    assert all(finding.message.endswith(".") for finding in found)
     return found
 
 
@@ -60,25 +60,29 @@ def results_of(kind, **options):
 )
 def test_a_planted_mistake_is_found_by_name(kind, check, words, verdict):
     results = results_of(kind)
-    found = [one for one in results if one.check == check]
-    assert [one.verdict for one in found] == [verdict]
+    found = [finding for finding in results if finding.check == check]
+
+    assert [finding.verdict for finding in found] == [verdict]
     assert words in found[0].message
     # And taken for no other.
-    assert {one.check for one in results if one.verdict in ("fail", "warn")} <= {check}
+    assert {finding.check for finding in results if finding.verdict in ("fail", "warn")} <= {check}
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("kind", HONEST, ids=lambda kind: kind.__name__)
 def test_nothing_is_found_in_honest_policies(kind, seed):
-    assert {one.verdict for one in results_of(kind, seed=seed)} <= {"pass", "note"}
+    assert {finding.verdict for finding in results_of(kind, seed=seed)} <= {"pass", "note"}
 
 
 def test_the_expert_s_error_is_told():
-    (told,) = [one for one in results_of(Honest) if one.check == "expert"]
+    (told,) = [finding for finding in results_of(Honest) if finding.check == "expert"]
     assert told.verdict == "pass"
     assert told.message == (
         "At 20 moments of an expert's episode the answers are 0.000207 rad from what it did; "
         "holding still would be 0.0499."
     )
-    (told,) = [one for one in results_of(expert_world.Untrained) if one.check == "expert"]
+
+    (told,) = [
+        finding for finding in results_of(expert_world.Untrained) if finding.check == "expert"
+    ]
     assert told.verdict == "note"

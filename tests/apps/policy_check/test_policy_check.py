@@ -85,7 +85,8 @@ class Growing(Sound):
 
 
 class Waypoints(Sound):
-    actions, depth = "waypoint", True
+    actions = "waypoint"
+    depth = True
 
     def act(self, observation):
         return super().act(observation)[:, :7]
@@ -186,7 +187,9 @@ def test_what_cannot_be_tried_is_told(spec, words):
 def test_made_up_videos_have_the_pictures_that_a_policy_wants(frames, count):
     needs = PolicyNeeds(cameras=("front",), demonstration_frames=frames)
     episode = SyntheticEpisodes(needs).episode("Go.", 10)
+
     video = episode.demonstration
+
     assert len(video["joint_positions"]) == 10
     assert (len(video["front_rgb"]) if "front_rgb" in video else None) == count
     assert "wrist_rgb" not in {*video, *episode.first}
@@ -198,12 +201,14 @@ def test_made_up_observations_have_depth_matrices_and_a_history_that_ends_in_the
     studio = SyntheticEpisodes(needs)
     episode = studio.episode("Go.", 0)
     later = studio.after(episode, 16)
+
     for seen in (episode.first, later):
         for camera in CAMERAS:
             assert seen[f"{camera}_depth"].shape == (256, 256, 1)
             assert seen[f"{camera}_extrinsic"].shape == (3, 4)
             assert seen[f"{camera}_intrinsic"].shape == (3, 3)
     assert len(later["history"]) == 4
+
     now = later["history"][-1]
     assert all(np.array_equal(now[name], later[name]) for name in now)
 
@@ -220,7 +225,9 @@ def test_the_command_prints_a_table_and_an_exit_code(name, code, tmp_path, monke
     monkeypatch.setenv("COLUMNS", "200")
     app = typer.Typer()
     app.command()(command)
+
     result = CliRunner().invoke(app, [f"my_policy:{name}", "--no-expert"])
+
     assert result.exit_code == code, result.output
     assert ("9 checks, none failed." if code == 0 else "1 of 4 checks failed.") in result.output
     assert "Actions joint_angle" in result.output
@@ -229,8 +236,10 @@ def test_the_command_prints_a_table_and_an_exit_code(name, code, tmp_path, monke
 def test_warnings_and_failures_are_counted(capsys, snapshot):
     kinds = ("pass", "warn", "note", "fail", "warn")
     results = [CheckResult(f"check {kind}", kind, "[x].") for kind in kinds]
+
     for end in (5, 3, 1):
         print_check_results(results[:end], Console(width=80))
+
     assert capsys.readouterr().out == snapshot
 
 

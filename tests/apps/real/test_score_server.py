@@ -61,8 +61,10 @@ def test_only_pages_of_this_server_are_answered(served):
     trial = served.plan.trials[0]
     port = served.port
     assert served.socket.getsockname()[0] == "127.0.0.1"
+
     form = form_of(served, trial, "success")
-    here, elsewhere = f"http://127.0.0.1:{port}", "http://evil.example"
+    here = f"http://127.0.0.1:{port}"
+    elsewhere = "http://evil.example"
     refused = [
         ask(served, "/?key=wrong", key=""),
         ask(served, f"/?key={served.key}", host="evil.example"),
@@ -71,11 +73,13 @@ def test_only_pages_of_this_server_are_answered(served):
         ask(served, "/score", form, host=f"evil.example:{port}"),
         ask(served, "/score", form, origin=elsewhere),
     ]
+
     assert {status for status, _, _ in refused} == {403}
     assert not any(served.key in f"{headers}{text}" for _, headers, text in refused)
     assert not (served.folder / "records.jsonl").exists()
     assert ask(served, "/score", form, origin=here)[0] == 303
     assert len(read_records(served.folder)) == 1
+
     status, headers, _ = ask(served, "/")
     assert status == 200
     assert headers["Referrer-Policy"] == "same-origin"
@@ -98,7 +102,9 @@ def test_a_page_that_is_out_of_date_scores_nothing(served):
     trial = served.plan.trials[0]
     form = form_of(served, trial, "success")
     ask(served, "/score", form)
+
     _, headers, _ = ask(served, "/score", {**form, "choice": "dropped"})
+
     assert headers["Location"].startswith(f"/?trial={trial.name}&message={trial.name}+has+changed")
     assert served.read_trial_log().newest(trial.name).outcome == "success"
 
@@ -108,12 +114,15 @@ def test_what_an_operator_types_is_text(served):
     note = "<script>alert(1)</script> \"quoted\" & 'so'"
     form = form_of(served, trial, "success", note=note.replace(" ", " \n"), video="../secret.mp4")
     assert "+has+no+file+" in ask(served, "/score", form)[1]["Location"]
+
     record = served.read_trial_log().newest(trial.name)
     assert trial_metadata(record)["note"] == note
     assert record.video is None
+
     _, _, page = ask(served, f"/?trial={trial.name}&message=<b>x</b>")
     assert "<script>alert" not in page
     assert "<b>x</b>" not in page
+
     # The record has the path of a video inside the folder.
     (served.folder / "films").mkdir()
     (served.folder / "films" / "a.mp4").write_bytes(b"film")
@@ -124,6 +133,7 @@ def test_what_an_operator_types_is_text(served):
 def test_a_kill_between_two_clicks_costs_nothing(small):
     plan, folder = small
     command = [sys.executable, "-u", "-c", CLI, "score", str(folder), "--operator", "ann"]
+
     for number, trial in enumerate(plan.trials[:2]):
         process = subprocess.Popen(command, text=True, stdout=subprocess.PIPE)
         try:
@@ -138,6 +148,7 @@ def test_a_kill_between_two_clicks_costs_nothing(small):
         finally:
             process.kill()
             process.wait(timeout=600)
+
     assert [record.outcome for record in read_records(folder)] == ["success"] * 2
 
 
@@ -159,16 +170,21 @@ def test_notes_and_corrections_by_keyboard(browser, served, wait_s):
     page.keyboard.press("n")
     page.keyboard.type("1 s u v: keys in a field are letters")
     page.keyboard.press("Enter")
+
     assert not (served.folder / "records.jsonl").exists()
+
     press(page, "s")
     record = served.read_trial_log().newest(first.name)
     assert trial_metadata(record)["note"] == "1 s u v: keys in a field are letters"
+
     # Back, and another verdict: the correction counts.
     press(page, "ArrowLeft")
     assert first.name in page.inner_text("h1")
     assert page.locator("button[aria-pressed=true]").count() == 1
+
     press(page, "1")
     assert served.read_trial_log().newest(first.name).attribution.failure == "wrong_place"
+
     page.close()
 
 
@@ -185,9 +201,11 @@ def test_the_page_fits_narrow_screens_and_says_what_it_shows(browser, served, wa
         assert button.bounding_box()["height"] >= 40
     for field in page.locator("input[type=text]").all():
         assert field.evaluate("field => field.labels.length") == 1
+
     # By tabs alone too.
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.tagName") == "BUTTON"
+
     page.close()
 
 
@@ -198,7 +216,9 @@ def test_the_page_says_what_is_meant_and_what_was_scored(small, snapshot):
     pages = [render_trial(trial_log, plan.trials[0], nonce="n")]
     for trial, choice in zip(plan.trials, ("misplaced", "success", "void"), strict=False):
         trial_log.score(trial, choice, operator="ann", note=f"note on {choice}", video="a.mp4")
-    pages += [render_trial(trial_log, one, nonce="n", message="Stored") for one in plan.trials]
+    pages += [render_trial(trial_log, trial, nonce="n", message="Stored") for trial in plan.trials]
+
     hidden = re.compile(r"(?s)<(style|script|svg)\b.*?</\1>")
+
     assert [hidden.sub("", page) for page in pages] == snapshot
     assert not re.search("listener|forgetful", "".join(pages))

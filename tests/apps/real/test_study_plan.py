@@ -45,15 +45,16 @@ studies = st.fixed_dictionaries(
 
 
 def spread(counts, everything):
-    return max(counts[one] for one in everything) - min(counts[one] for one in everything)
+    return max(counts[cell] for cell in everything) - min(counts[cell] for cell in everything)
 
 
 def arrangement_counts(episodes):
     """Count arrangements and their factors."""
     arrangements = [read_arrangement(episode) for episode in episodes]
-    factors = ("color", "left", "repeats", "side")
-    counts = {name: Counter(getattr(one, name) for one in arrangements) for name in factors}
-    return {"arrangement": Counter(arrangements), **counts}
+    counts = {"arrangement": Counter(arrangements)}
+    for name in ("color", "left", "repeats", "side"):
+        counts[name] = Counter(getattr(arrangement, name) for arrangement in arrangements)
+    return counts
 
 
 def check_balance(task, episodes):
@@ -61,7 +62,7 @@ def check_balance(task, episodes):
     orders = counterbalanced_order(task)
     assert spread(found["arrangement"], orders) <= 1
     for factor in ("color", "left", "repeats"):
-        assert spread(found[factor], {getattr(one, factor) for one in orders}) <= 1, factor
+        assert spread(found[factor], {getattr(order, factor) for order in orders}) <= 1, factor
     assert spread(found["side"], ("left", "right")) <= 2
 
 
@@ -72,6 +73,7 @@ def test_plans_are_balanced_and_a_seed_changes_the_order_and_nothing_else(study,
     check_arrangements(plan)
     check_blocks(plan)
     assert make_study(**study) == plan
+
     again = make_study(**{**study, "seed": seed})
     assert {(t.name, t.job) for t in again.trials} == {(t.name, t.job) for t in plan.trials}
     assert len({t.name for t in plan.trials}) == len(plan.trials) == len(again.trials)
@@ -90,25 +92,34 @@ def check_arrangements(plan):
         check_balance(task, met.values())
         for (name, _, _), other in conditions.items():
             assert name != task or other.keys() == met.keys()
-    for task in {one.task for one in plan.demonstrations}:
-        chosen = [one.episode for one in plan.demonstrations if one.task == task]
-        assert len({one.index for one in chosen}) == len(chosen)
+    for task in {demonstration.task for demonstration in plan.demonstrations}:
+        chosen = [
+            demonstration.episode
+            for demonstration in plan.demonstrations
+            if demonstration.task == task
+        ]
+        assert len({episode.index for episode in chosen}) == len(chosen)
         check_balance(task, chosen)
 
 
 def check_blocks(plan):
     """Every block has every condition once, on one arrangement."""
     blocks = [list(trials) for _, trials in groupby(plan.trials, key=lambda trial: trial.block)]
-    conditions = Counter((t.job.setting, t.job.policy) for t in blocks[0])
+    conditions = conditions_of(blocks[0])
     assert set(conditions.values()) == {1}
     for number, trials in enumerate(blocks, 1):
         assert {trial.block for trial in trials} == {number}
         assert len({(trial.job.task, trial.job.episode) for trial in trials}) == 1
-        assert Counter((t.job.setting, t.job.policy) for t in trials) == conditions
-    tasks = len({trial.job.task for trial in plan.trials})
-    turns = [trials[0].job.task for trials in blocks]
-    for start in range(0, len(turns), tasks):
-        assert len(set(turns[start : start + tasks])) == tasks
+        assert conditions_of(trials) == conditions
+
+    tasks = [trials[0].job.task for trials in blocks]
+    in_turn = len(set(tasks))
+    for start in range(0, len(tasks), in_turn):
+        assert len(set(tasks[start : start + in_turn])) == in_turn
+
+
+def conditions_of(trials):
+    return Counter((trial.job.setting, trial.job.policy) for trial in trials)
 
 
 def test_no_condition_is_early_or_late_on_average():
@@ -119,6 +130,7 @@ def test_no_condition_is_early_or_late_on_average():
         for _, trials in groupby(plan.trials, key=lambda trial: trial.block):
             job = next(trials).job
             first[job.setting, job.policy] += 1
+
     assert len(first) == 10
     assert all(50 <= count <= 110 for count in first.values()), first
 
@@ -161,6 +173,7 @@ def test_a_plan_is_read_as_it_was_written_and_not_overwritten(tmp_path):
         write_study(make_study(("a",), tasks=TASKS, trials=1, demonstrations=2), tmp_path)
     with pytest.raises(InvalidValueError, match="There is no plan in"):
         read_study(tmp_path / "elsewhere")
+
     (tmp_path / "plan.json").write_text('{"policies": ["oracle"]}')
     with pytest.raises(InvalidValueError, match="is not the plan of a real-robot study"):
         read_study(tmp_path)
@@ -175,6 +188,7 @@ def test_the_plans_for_the_twin_have_the_trials_and_no_others(study):
         for twin in plan.twin_plans.values()
         for job in twin.jobs()
     ]
+
     assert len(played) == len(plan.trials)
     assert set(played) == {trial.identity for trial in plan.trials}
 
@@ -193,15 +207,19 @@ def test_the_drawing_has_the_robot_s_left_on_the_left(task, snapshot):
 def test_the_sheet_has_its_texts_and_drawings_in_their_places(snapshot):
     plan = make_study("ab", tasks=TASKS, trials=1, demonstrations=2)
     page = sheet_text(plan)
-    for one in (*plan.trials, *plan.demonstrations):
-        page = page.replace(draw_svg(one.episode.scene), f"[drawing of {one.name}]")
+
+    for trial in (*plan.trials, *plan.demonstrations):
+        page = page.replace(draw_svg(trial.episode.scene), f"[drawing of {trial.name}]")
+
     assert page == snapshot
 
 
 def test_a_turned_box_is_drawn_counter_clockwise():
     scene = get_episode("PutInBox", "val", 0).scene
-    (box, *_) = (one for one in scene.objects if one.kind == "box")
+    (box, *_) = (thing for thing in scene.objects if thing.kind == "box")
+
     turned = replace(box, yaw=0.5)
+
     assert "rotate(-28.6)" in draw_svg(replace(scene, objects=(turned,)))
 
 
@@ -212,15 +230,23 @@ def test_a_turned_box_is_drawn_counter_clockwise():
 def test_operators_choose_among_the_failures_of_the_task(task, wrong):
     for trial in make_study(("a",), tasks=(task,), trials=8, demonstrations=0).trials:
         choices = failure_choices(trial.episode)
-        assert {one.failure for one in choices if one.attribution().kind == "grounding"} == wrong
-        assert [one.failure for one in choices if one.attribution().kind != "grounding"] == [
+        grounding = set()
+        others = []
+        for choice in choices:
+            if choice.attribution().kind == "grounding":
+                grounding.add(choice.failure)
+            else:
+                others.append(choice.failure)
+
+        assert grounding == wrong
+        assert others == [
             "missed_grasp", "dropped", "misplaced", "out_of_time", "stopped", "no_attempt",
         ]  # fmt: skip
-        assert len({one.key for one in choices}) == len(choices)
+        assert len({choice.key for choice in choices}) == len(choices)
         meant = str(trial.episode.goal["color"])
-        for one in choices:
-            if one.failure in ("wrong_place", "wrong_object"):
-                assert meant not in one.words
+        for choice in choices:
+            if choice.failure in ("wrong_place", "wrong_object"):
+                assert meant not in choice.words
 
 
 def test_sides_follow_from_colors():

@@ -16,18 +16,24 @@ def test_run_plays_the_trials_of_a_study(tmp_path):
         assert done.exit_code == 0, done.output
         return done.output
 
-    study, twin = tmp_path / "study", tmp_path / "study" / "twin"
+    study = tmp_path / "study"
+    twin = tmp_path / "study" / "twin"
     said = ("--settings", "reasoning", "--trials", 1, "--demonstrations", 2)
     printed = call("real", "plan", "--policy", "mine=listener", *said, "--out", study)
+
     assert {path.name for path in study.iterdir()} == {
         "plan.json", "trials.csv", "demonstrations.csv", "sheet.html",
         "twin-PutInBox.yaml", "twin-PickByCount.yaml",
     }  # fmt: skip
     assert str(study / "twin-PickByCount.yaml") in printed
+
     for task in ("PutInBox", "PickByCount"):
         call("run", "--plan", study / f"twin-{task}.yaml", "--workers", 0, "--out", twin)
     records = read_records(twin)
-    assert {one.identity for one in records} == {one.identity for one in read_study(study).trials}
-    assert [one.outcome for one in records] == ["success"] * 2
+    assert {record.identity for record in records} == {
+        record.identity for record in read_study(study).trials
+    }
+    assert [record.outcome for record in records] == ["success"] * 2
+
     table = call("tables", twin, "--which", "real", "--format", "csv")
     assert table.count("mine (privileged) (twin)") == 3  # two tasks and their average

@@ -23,7 +23,9 @@ def test_a_score_is_a_record_like_any_other(small):
     trial_log.score(second, choices[0].key, operator="ann")
     trial_log.score(third, "dropped", operator="ann", note="slipped")
     found = {record.identity: record for record in read_records(folder)}
+
     assert len(found) == 3
+
     record = found[first.identity]
     assert (record.outcome, record.attribution, record.events) == ("success", None, ())
     assert record.robot == "a robot"
@@ -31,7 +33,9 @@ def test_a_score_is_a_record_like_any_other(small):
         "operator": "ann", "note": "shaky", "trial": first.name,
         "plan": plan.fingerprint,
     }  # fmt: skip
-    wrong, dropped = found[second.identity], found[third.identity]
+
+    wrong = found[second.identity]
+    dropped = found[third.identity]
     assert (wrong.outcome, wrong.cause) == ("failure", wrong.attribution.sentence)
     assert (wrong.attribution.kind, wrong.attribution.failure) == ("grounding", "wrong_place")
     assert (dropped.attribution.kind, dropped.attribution.step) == ("execution", None)
@@ -42,14 +46,17 @@ def test_a_score_is_a_record_like_any_other(small):
 def test_the_newest_score_counts_and_all_stay_in_the_file(small):
     plan, folder = small
     trial = plan.trials[0]
+    film = "a.mp4"  # the operator names the video once
     for number, choice in enumerate(("success", "misplaced", "void", "success"), 1):
-        # The operator names the video once.
-        film, note = "a.mp4" * (number == 1), f"note {number}"
+        note = f"note {number}"
         read(plan, folder).score(trial, choice, operator="ann", note=note, video=film)
+        film = ""
         now = read(plan, folder)
         assert now.state(trial.name) == ("void" if choice == "void" else "scored")
         assert now.revision(trial.name) == number
+
     (newest,) = read_records(folder)
+
     assert (newest.outcome, newest.cause, newest.attribution) == ("success", None, None)
     assert (newest.error, newest.video) == (None, "a.mp4")
     assert trial_metadata(newest)["note"] == "note 4"
@@ -62,7 +69,9 @@ def test_trials_come_in_order_and_void_is_a_verdict(small):
     for trial in plan.trials:
         assert trial_log.next_to_score() == trial
         trial_log.score(trial, "void", operator="ann", note="the lamp fell")
+
     last = read(plan, folder)
+
     assert last.next_to_score() is None
     assert _select_trial(last, "") == plan.trials[-1]
     assert last.state(plan.trials[0].name) == "void"
@@ -72,8 +81,10 @@ def test_trials_come_in_order_and_void_is_a_verdict(small):
 def test_what_simulation_played_is_no_score(small):
     plan, folder = small
     record = make_record(plan.trials[0].job, "success")
+
     with RecordStore(folder) as store:
         store.append(record)
+
     assert read(plan, folder).state(plan.trials[0].name) == "open"
 
 

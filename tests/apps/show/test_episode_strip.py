@@ -49,6 +49,7 @@ def test_every_picture_is_there_once_and_in_order_of_time_in_rows_of_four():
     figure = drawn(8)
     values = [axes.images[0].get_array()[0, 0, 0] for axes in figure.axes]
     assert values == list(range(10, 18))
+
     places = [axes.get_position() for axes in figure.axes]
     assert places == sorted(places, key=lambda place: (-round(place.y0, 6), place.x0))
     assert [round(place.y0, 6) for place in places].count(round(places[0].y0, 6)) == 4
@@ -62,22 +63,26 @@ def test_no_word_leaves_the_strip_and_none_is_drawn_over_another(caption):
         assert box.x0 >= 0
         assert box.x1 <= figure.bbox.x1
         assert box.y0 >= 0
-        assert not [one for one in boxes[:number] if one.padded(-2).overlaps(box.padded(-2))]
+        assert not [other for other in boxes[:number] if other.padded(-2).overlaps(box.padded(-2))]
 
 
 def test_what_is_said_is_above_the_pictures_in_its_setting_s_color():
     found = {text.get_text(): text for text in drawn(3).texts}
     assert {"A title", "explicit", "Lift it.", "direct", "0.0 s, video", "0.5 s"} <= set(found)
+
     colors = [found[text].get_color() for text in ("direct", "0.0 s, video", "0.5 s")]
     assert colors == ["#0072B2", "#E69F00", "#8a8a8a"]
-    sides = [one.get_text() for one in drawn(3).axes[0].texts]
+
+    sides = [text.get_text() for text in drawn(3).axes[0].texts]
     assert sides == ["robot's right", "robot's left"]  # the front camera faces the robot
+
     on_dark = {text.get_text(): text for text in drawn(3, style=DARK_STYLE).texts}
     assert on_dark["explicit"].get_color() == DARK_STYLE["text.color"]  # black would not be seen
 
 
 def test_the_remarkable_is_chosen_first_and_fillers_only_fill_up():
     assert choose_moments([0, 4, 4, 4, 0]) == (0, 1, 2, 3, 4)
+
     filled = choose_moments([0, *[4] * 20, 1, 0])
     assert len(filled) == MIN_MOMENTS
     assert {0, 21, 22} <= set(filled)
@@ -96,6 +101,7 @@ def test_motions_are_described_and_like_ones_merged():
         Glow("m", over, 20),
         Vanish("cube", Fact("binned", "cube", "bin")),
     )
+
     assert describe_motions(Scene((), motions)) == [
         "a, b: away until step 32",
         "c: away from step 64 until step 164, then under a",
@@ -123,19 +129,29 @@ def test_the_video_is_described_by_its_stages_and_facts():
 def test_a_playthrough_shows_the_start_each_stage_and_the_end(snapshot):
     played = play_through(get_episode("VideoUnmask", "test", 3))
     assert (played.verdict, played.moments[-1].step) == ("success", played.steps)
-    assert [(one.step, one.caption, one.is_demonstration) for one in played.moments] == snapshot
-    assert all(one.picture.shape == (256, 256, 3) for one in played.moments)
-    assert len({one.picture.tobytes() for one in played.moments}) > 2
+    assert [
+        (moment.step, moment.caption, moment.is_demonstration) for moment in played.moments
+    ] == snapshot
+    assert all(moment.picture.shape == (256, 256, 3) for moment in played.moments)
+    assert len({moment.picture.tobytes() for moment in played.moments}) > 2
 
 
 def test_what_moves_by_itself_is_remarkable_while_it_does():
     episode = get_episode("ButtonUnmaskSwap", "test", 3)
     key_events = KeyEvents(episode.scene.motions)
-    captions = {step: key_events.at(step, 0) for step in range(300)}
-    assert str(captions[33]).endswith("container 3 appear")
-    swaps = [step for step, words in captions.items() if words and "change places" in words]
+
+    captions = [str(key_events.at(step, 0)) for step in range(300)]
+
+    assert captions[33].endswith("container 3 appear")
+    swaps = [step for step, caption in enumerate(captions) if "change places" in caption]
     count = sum(isinstance(motion, Swap) for motion in episode.scene.motions)
     assert swaps == [90, 140, 190][:count]
 
-    late = KeyEvents([Swap("a", "b", 50, 50, 0.1, stage=2), Away("c", 10, 60, under="a")])
-    assert [step for step in range(200) if late.at(step, 2 if step >= 80 else 0)] == [156]
+
+def test_motions_of_a_stage_are_remarkable_from_then_on():
+    key_events = KeyEvents([Swap("a", "b", 50, 50, 0.1, stage=2), Away("c", 10, 60, under="a")])
+
+    before = [step for step in range(80) if key_events.at(step, 0)]
+    after = [step for step in range(80, 200) if key_events.at(step, 2)]
+
+    assert (before, after) == ([], [156])

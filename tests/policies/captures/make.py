@@ -13,7 +13,9 @@ from openpi_client.msgpack_numpy import packb
 from wire_episode import INSTRUCTION, moment, video
 
 demonstration = video(3)
-now, later, latest = moment(3), moment(4), moment(5)
+now = moment(3)
+later = moment(4)
+latest = moment(5)
 
 
 def state(joints, gripper):
