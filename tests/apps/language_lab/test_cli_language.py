@@ -2,7 +2,6 @@
 
 import csv
 import json
-import re
 
 import pytest
 import rate_words
@@ -115,8 +114,9 @@ def test_raters_get_the_texts_of_the_key_in_other_orders_and_their_table(tmp_pat
     assert len(frames) == len(key)
     by_number = {row["number"]: row for row in key}
     ratings = dict.fromkeys(by_number, 4.0)
-    for row in rate_words.rows(by_number, [ratings, ratings]):
-        low, high = re.search(r"\| 4.0 \| (.*?) to (.*?) \|", row).groups()
+    for _, _, rated, interval, _ in rate_words.rows(by_number, [ratings, ratings]):
+        low, high = interval.split(" to ")
+        assert rated == "4.0"
         assert float(low) < 4.0 < float(high), "frames that are all alike leave room for others"
     with pytest.raises(SystemExit, match=r"rates text \d+ ''; it must be a number"):
         rate_words.read_ratings(out / "sheet-1.csv", by_number)
