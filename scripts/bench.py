@@ -25,7 +25,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, help="JSON file for the results")
     options = parser.parse_args()
     keep_freed_memory()
-    measures = [one for one in all_measures() if options.only in one.name]
+    measures = [measure for measure in all_measures() if options.only in measure.name]
     if not measures or options.rounds < 1:
         parser.error(f"no row has {options.only!r} in its name, or there is no round")
     rows = run_measures(measures, options.rounds, partial(print, file=sys.stderr))

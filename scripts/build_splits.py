@@ -38,12 +38,12 @@ def build_splits(
     count = worker_count(workers)
     found: list[seed_selection.SelectedSeed] = []
     with progress_bars() as report:
-        for one in seed_selection.find_seeds(slots, count):
-            found.append(one)
-            report("episodes", len(found), len(slots), one.slot.key)
-    for one in found:
-        for seed, reason, cause in one.rejections:
-            typer.echo(f"{one.slot.key}: seed {seed} is rejected, {reason}: {cause}", err=True)
+        for selected in seed_selection.find_seeds(slots, count):
+            found.append(selected)
+            report("episodes", len(found), len(slots), selected.slot.key)
+    for slot, rejections in found:
+        for seed, reason, cause in rejections:
+            typer.echo(f"{slot.key}: seed {seed} is rejected, {reason}: {cause}", err=True)
     text = splits.splits_text(seed_selection.merge_splits(names, found, splits.shipped_splits()))
     if out is None:
         typer.echo(text, nl=False)

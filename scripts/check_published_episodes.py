@@ -11,20 +11,22 @@ with 1 if the oracle fails in an episode. The test split takes 3 minutes with tw
 
 from __future__ import annotations
 
-import argparse
 import functools
 import math
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated, NamedTuple
 
 import numpy as np
+import typer
 from convert_robomme_episodes import Row, body_name, read_rows
 from rich.console import Console
 from rich.table import Table
 
-from roboirg.core.episode import Episode, Split
+from roboirg.core.episode import Episode, SceneObject, Split
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.motions import Shuttle, Swap
 from roboirg.core.observations import Demonstration
@@ -45,13 +47,31 @@ SITE = "goal_site"
 """Invisible, and under the table in RoboMME."""
 JOINT_LIMIT = 1e-6
 """rad."""
-BODY_LIMITS = (1e-4, 5e-3)
-"""m."""
+FINE_LIMIT = 1e-4
+COARSE_LIMIT = 5e-3
+"""Of the distance of a body, m."""
 TABLE_REACH = 3.0
 """m; what is farther away is out of the world."""
 
 Slot = tuple[str, Split, int]
 """Task, split and index of an episode."""
+
+
+class VideoLength(NamedTuple):
+    """Frames and control steps of a video."""
+
+    frames: int
+    steps: int
+
+
+NO_VIDEO = VideoLength(0, 0)
+
+
+class SwapPair(NamedTuple):
+    """The two objects that change places here, and those that do in RoboMME."""
+
+    ours: tuple[str, str]
+    theirs: tuple[str, str]
 
 
 @dataclass
@@ -64,8 +84,9 @@ class Comparison:
         failure: why the oracle fails; None if it succeeds.
         joints: largest difference of a joint after the video, rad; infinite if there is no video.
         bodies: distance of each body from its place there, m.
-        lengths: frames and control steps of the video, ours and theirs.
-        swaps: for each swap whose partner RoboMME's data name, the two objects of ours and theirs.
+        our_length: of the video.
+        their_length: of RoboMME's.
+        swaps: those whose partners RoboMME's data name.
     """
 
     moves: bool
@@ -73,8 +94,9 @@ class Comparison:
     failure: str | None = None
     joints: float = math.inf
     bodies: Mapping[str, float] = field(default_factory=dict)
-    lengths: tuple[tuple[int, int], tuple[int, int]] = ((0, 0), (0, 0))
-    swaps: Sequence[tuple[tuple[str, str], tuple[str, str]]] = ()
+    our_length: VideoLength = NO_VIDEO
+    their_length: VideoLength = NO_VIDEO
+    swaps: Sequence[SwapPair] = ()
 
     @property
     def farthest(self) -> float:
@@ -92,21 +114,25 @@ class ComparingOracle(OraclePolicy):
 
     def __init__(self, row: Row, result: Comparison) -> None:
         super().__init__()
-        self._row, self._result = row, result
+        self._row = row
+        self._result = result
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Compare, then plan as the oracle."""
-        env, row, result = self.env, self._row, self._result
-        frames, steps = len(demonstration["joint_positions"]) + 1, env.session.world.elapsed
-        result.lengths = (frames, steps), (row["frames"], row["elapsed"])
-        result.joints = _joint_difference(env, row)
-        result.bodies = dict(_distances(env, row, _our_names(env.episode, row)))
+        row = self._row
+        result = self._result
+        frames = len(demonstration["joint_positions"]) + 1
+        result.our_length = VideoLength(frames, self.env.session.world.elapsed)
+        result.their_length = VideoLength(row["frames"], row["elapsed"])
+        result.joints = _joint_difference(self.env, row)
+        result.bodies = dict(_distances(self.env, row, _our_names(self.env.episode, row)))
         super().reset(instruction, demonstration)
 
 
 def compare(slot: Slot) -> Comparison:
     """Play an episode with the oracle and compare it with RoboMME's."""
-    episode, row = get_episode(*slot), _rows()[slot]
+    episode = get_episode(*slot)
+    row = _rows()[slot]
     moves = any(stage.primitive.kind == "pick_cube" for stage in episode.demonstration)
     result = Comparison(moves, episode.recorded)
     result.swaps = tuple(_swaps(episode, row, _our_names(episode, row)))
@@ -127,13 +153,15 @@ def _rows() -> Mapping[Slot, Row]:
 
 def _our_names(episode: Episode, row: Row) -> dict[str, str]:
     """Return our name of each body of RoboMME's: the object that starts at its place."""
-    return {
-        name: min(
-            episode.scene.objects, key=lambda item: math.dist(item.position, _place(body))
-        ).name
-        for name, body in row["start"].items()
-        if name not in (ROBOT, SITE)
-    }
+    names = {}
+    for name, body in row["start"].items():
+        if name not in (ROBOT, SITE):
+            names[name] = _nearest(episode.scene.objects, _place(body)).name
+    return names
+
+
+def _nearest(objects: Sequence[SceneObject], place: Sequence[float]) -> SceneObject:
+    return min(objects, key=lambda item: math.dist(item.position, place))
 
 
 def _place(body: Mapping[str, Sequence[float]] | Sequence[float]) -> Sequence[float]:
@@ -155,98 +183,121 @@ def _distances(env: RoboIRGEnv, row: Row, names: Mapping[str, str]) -> Iterator[
             if isinstance(motion, Shuttle) and motion.subject == ours:
                 # RoboMME moves it at the end of a step, after the picture; here the next one does.
                 here = shuttle_position(motion, env.session.world.elapsed)
-        if max(math.hypot(*place[:2]), math.hypot(here.x, here.y)) < TABLE_REACH:
+        is_here = math.hypot(here.x, here.y) < TABLE_REACH
+        is_there = math.hypot(*place[:2]) < TABLE_REACH
+        if is_here and is_there:
             yield ours, math.dist(place, here)
-        elif min(math.hypot(*place[:2]), math.hypot(here.x, here.y)) < TABLE_REACH:
+        elif is_here or is_there:
             yield ours, math.inf
 
 
-def _swaps(
-    episode: Episode, row: Row, names: Mapping[str, str]
-) -> Iterator[tuple[tuple[str, str], tuple[str, str]]]:
-    ours = [motion for motion in episode.scene.motions if isinstance(motion, Swap)]
+def _swaps(episode: Episode, row: Row, names: Mapping[str, str]) -> Iterator[SwapPair]:
+    swaps = [motion for motion in episode.scene.motions if isinstance(motion, Swap)]
     facts = row["facts"]
     theirs = [pair[:2] for pair in facts.get("swap_schedule", ())]
     if "swap_target_a" in facts:
         theirs = [[facts["swap_target_a"], facts["swap_target_b"]]]
-    for swap, (first, second) in zip(ours, theirs, strict=True):
+    for swap, (first, second) in zip(swaps, theirs, strict=True):
         if second is not None:
-            yield (swap.first, swap.second), (names[body_name(first)], names[body_name(second)])
+            pair = (names[body_name(first)], names[body_name(second)])
+            yield SwapPair((swap.first, swap.second), pair)
 
 
 # --- what is printed --------------------------------------------------------------------------
 
 
-def exceptions(one: Comparison) -> Iterator[str]:
+def exceptions(comparison: Comparison) -> Iterator[str]:
     """Yield what is not as in RoboMME, or not as it should be."""
-    if one.failure is not None:
-        yield f"the oracle fails: {one.failure}"
-    if one.moves and not one.recorded:
+    if comparison.failure is not None:
+        yield f"the oracle fails: {comparison.failure}"
+    if comparison.moves and not comparison.recorded:
         yield "the video is planned, as no recording completes it"
-    if one.bodies and one.joints > JOINT_LIMIT:
-        yield f"joints differ by up to {one.joints:.1e} rad"
-    far = {name: away for name, away in one.bodies.items() if away > BODY_LIMITS[0]}
+    if comparison.bodies and comparison.joints > JOINT_LIMIT:
+        yield f"joints differ by up to {comparison.joints:.1e} rad"
+    far = []
+    for name, distance in comparison.bodies.items():
+        if distance > FINE_LIMIT:
+            far.append(f"{1e3 * distance:.2f} mm ({name})")
     if far:
-        yield "off by " + ", ".join(f"{1e3 * away:.2f} mm ({name})" for name, away in far.items())
-    if one.lengths[0] != one.lengths[1]:
-        yield "frames and control steps are {} and {}, there {} and {}".format(
-            *(number for pair in one.lengths for number in pair)
+        yield f"off by {', '.join(far)}"
+    here = comparison.our_length
+    there = comparison.their_length
+    if here != there:
+        yield (
+            f"frames and control steps are {here.frames} and {here.steps}, "
+            f"there {there.frames} and {there.steps}"
         )
-    for ours, theirs in one.swaps:
+    for ours, theirs in comparison.swaps:
         if ours != theirs:
-            yield f"{ours[0]} swaps with {ours[1]}, there {theirs[0]} with {theirs[1]}"
+            yield f"{' swaps with '.join(ours)}, there {' with '.join(theirs)}"
 
 
-COLUMNS: Mapping[str, Callable[[Comparison], bool]] = {
-    "solved": lambda one: one.failure is None,
-    f"joints within {JOINT_LIMIT:g} rad": lambda one: one.joints <= JOINT_LIMIT,
-    "bodies within 0.1 mm": lambda one: one.farthest <= BODY_LIMITS[0],
-    "within 5 mm": lambda one: one.farthest <= BODY_LIMITS[1],
-    "frames, steps equal": lambda one: one.lengths[0] == one.lengths[1],
-}
+COLUMNS = (
+    "task",
+    "episodes",
+    "solved",
+    f"joints within {JOINT_LIMIT:g} rad",
+    "bodies within 0.1 mm",
+    "within 5 mm",
+    "frames, steps equal",
+    "swap partners",
+)
 
 
 def print_table(found: Mapping[Slot, Comparison], console: Console) -> None:
     """Print counts by task, for all, and for the episodes in whose videos the arm moves."""
+    groups: dict[str, list[Comparison]] = defaultdict(list)
+    for (task, _, _), comparison in found.items():
+        groups[task].append(comparison)
+    groups["all"] = list(found.values())
+    moving = [comparison for comparison in found.values() if comparison.moves]
+    if moving:
+        groups["video with moving arm"] = moving
     table = Table(box=None)
-    for name in ("task", "episodes", *COLUMNS, "swap partners"):
+    for name in COLUMNS:
         table.add_column(name, justify="left" if name == "task" else "right")
-    for task in dict.fromkeys(slot[0] for slot in found):
-        _add_row(table, task, [one for slot, one in found.items() if slot[0] == task])
-    _add_row(table, "all", list(found.values()))
-    _add_row(table, "video with moving arm", [one for one in found.values() if one.moves])
+    for name, group in groups.items():
+        table.add_row(name, *_cells(group))
     console.print(table)
 
 
-def _add_row(table: Table, name: str, group: Sequence[Comparison]) -> None:
-    if group:
-        counts = [str(sum(map(holds, group))) for holds in COLUMNS.values()]
-        pairs = [pair for one in group for pair in one.swaps]
-        equal = sum(ours == theirs for ours, theirs in pairs)
-        table.add_row(name, str(len(group)), *counts, f"{equal} of {len(pairs)}" if pairs else "")
+def _cells(group: Sequence[Comparison]) -> Iterator[str]:
+    """Yield what `COLUMNS` say of some episodes."""
+    yield str(len(group))
+    yield str(sum(comparison.failure is None for comparison in group))
+    yield str(sum(comparison.joints <= JOINT_LIMIT for comparison in group))
+    yield str(sum(comparison.farthest <= FINE_LIMIT for comparison in group))
+    yield str(sum(comparison.farthest <= COARSE_LIMIT for comparison in group))
+    yield str(sum(comparison.our_length == comparison.their_length for comparison in group))
+    swaps = 0
+    equal = 0
+    for comparison in group:
+        swaps += len(comparison.swaps)
+        equal += sum(ours == theirs for ours, theirs in comparison.swaps)
+    yield f"{equal} of {swaps}" if swaps else ""
 
 
-def main() -> int:
-    """Compare the episodes; returns 1 if the oracle fails in one of them."""
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--split", default="test", help="train, val, test or all")
-    parser.add_argument("--tasks", default="all", help="names or suites, separated by commas")
-    parser.add_argument("--workers", type=int, default=2, help="processes")
-    options = parser.parse_args()
-    episodes = split_episodes(
-        find_tasks(parse_names("task", options.tasks)), parse_splits(options.split)
-    )
-    slots: list[Slot] = [(one.task, one.split, one.index) for one in episodes]
-    slots = [slot for slot in slots if published_episode(*slot)]
-    found = dict(parallel_map(compare, slots, options.workers))
-    found = {slot: found[slot] for slot in slots}
+def main(
+    split: Annotated[str, typer.Option(help="train, val, test or all")] = "test",
+    tasks: Annotated[str, typer.Option(help="names or suites, separated by commas")] = "all",
+    workers: Annotated[int, typer.Option(help="processes")] = 2,
+) -> None:
+    """Compare the episodes; ends with 1 if the oracle fails in one of them."""
+    names = find_tasks(parse_names("task", tasks))
+    slots: list[Slot] = []
+    for episode in split_episodes(names, parse_splits(split)):
+        if published_episode(episode.task, episode.split, episode.index):
+            slots.append((episode.task, episode.split, episode.index))
+    compared = dict(parallel_map(compare, slots, workers))
+    found = {slot: compared[slot] for slot in slots}
     console = Console(width=150)
     print_table(found, console)
-    for (task, split, index), one in found.items():
-        for text in exceptions(one):
-            console.print(f"{task}/{split}/{index}: {text}.", highlight=False)
-    return int(any(one.failure is not None for one in found.values()))
+    for (task, of_split, index), comparison in found.items():
+        for text in exceptions(comparison):
+            console.print(f"{task}/{of_split}/{index}: {text}.", highlight=False)
+    if any(comparison.failure is not None for comparison in found.values()):
+        sys.exit(1)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)

@@ -10,16 +10,17 @@ copy.
 
 from __future__ import annotations
 
-import argparse
 import gzip
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from roboirg.core import object_sizes
 from roboirg.core.conditions import Fact
@@ -41,39 +42,35 @@ COLOR_OF_RGB: dict[tuple[float, ...], Color] = {
 }
 
 
-def main() -> None:
-    """Write the data file."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument(
-        "folder", type=Path, help="with train.jsonl.gz, val.jsonl.gz, test.jsonl.gz"
-    )
-    parser.add_argument("--out", type=Path, required=True)
-    arguments = parser.parse_args()
-    text = "".join(f"{line}\n" for line in converted_lines(arguments.folder))
-    arguments.out.write_bytes(gzip.compress(text.encode(), 9, mtime=0))
-    write_recordings(arguments.folder, arguments.out.parent / FOLDER)
-    print(hashlib.sha256(text.encode()).hexdigest(), len(text), arguments.out.stat().st_size)
+def main(folder: Path, out: Annotated[Path, typer.Option()]) -> None:
+    """Write the data file from a folder with train.jsonl.gz, val.jsonl.gz and test.jsonl.gz."""
+    text = "".join(f"{line}\n" for line in converted_lines(folder))
+    out.write_bytes(gzip.compress(text.encode(), 9, mtime=0))
+    write_recordings(folder, out.parent / FOLDER)
+    print(hashlib.sha256(text.encode()).hexdigest(), len(text), out.stat().st_size)
 
 
 def write_recordings(folder: Path, out: Path) -> None:
     """Write the recorded actions of each task and split, without the step at home at their end."""
     out.mkdir(exist_ok=True)
-    arrays: dict[tuple[str, str], dict[str, Any]] = {}
+    arrays: dict[tuple[str, str], dict[str, Any]] = defaultdict(dict)
     for row in read_rows(folder):
-        key = task, split, index = row["task"], row["dataset"], row["episode"]
+        task = row["task"]
+        split = row["dataset"]
+        index = row["episode"]
         source = folder / f"{split}-{task}.npz"
-        if "error" in row or key in INCOMPLETE or not source.exists():
+        if "error" in row or (task, split, index) in INCOMPLETE or not source.exists():
             continue
         with np.load(source) as recorded:
-            actions, current = recorded[f"actions_{index}"], recorded[f"stage_{index}"]
+            actions = recorded[f"actions_{index}"]
+            current = recorded[f"stage_{index}"]
         unseen = row["elapsed"] - row["frames"]
         last = sum(stage["demonstration"] for stage in row["stages"]) - 1
         # The judge's stage runs ahead of the hand's: the arm is still on its way home.
         stages = np.minimum(current, last - 1).astype(np.uint8)[:-1]
         stages[len(stages) - unseen :] = last
-        arrays.setdefault((task, split), {}).update(
-            {f"actions_{index}": actions[:-1], f"stages_{index}": stages}
-        )
+        arrays[task, split][f"actions_{index}"] = actions[:-1]
+        arrays[task, split][f"stages_{index}"] = stages
     for (task, split), content in arrays.items():
         np.savez_compressed(out / f"{task}-{split}.npz", **content)
 
@@ -103,10 +100,16 @@ def read_rows(folder: Path) -> Iterator[Row]:
             yield from map(json.loads, file)
 
 
-def body_name(reference: object) -> str:
+def body_name(reference: str | Sequence[str]) -> str:
     """Return ``cube_red_0`` for ``<cube_red_0>``, also in a list of one."""
-    text = reference[0] if isinstance(reference, list) else reference
-    return str(text).strip("<>")
+    if not isinstance(reference, str):
+        reference = reference[0]
+    return reference.strip("<>")
+
+
+def body_names(references: Iterable[str | Sequence[str]]) -> list[str]:
+    """Return the name in each of some references."""
+    return [body_name(reference) for reference in references]
 
 
 # --- one function for each kind of body ------------------------------------------------------
@@ -137,14 +140,13 @@ def make_target(row: Row, source: str, name: str, radius: float, **look: Any) ->
     return SceneObject(name, "target", Point(x, y, height), radius=radius, **look)
 
 
-def colored_cubes(row: Row) -> tuple[SceneObject, ...]:
+def colored_cubes(row: Row) -> list[SceneObject]:
     """Return the cubes of a table with at most one of each color, ``cube_red`` and so on."""
-    sources = [body_name(one) for one in row["facts"]["all_cubes"]]
-    return tuple(
-        make_cube(row, source, f"cube_{color}", color)
-        for source in sources
-        for color in [color_in(source)]
-    )
+    cubes = []
+    for source in body_names(row["facts"]["all_cubes"]):
+        color = color_in(source)
+        cubes.append(make_cube(row, source, f"cube_{color}", color))
+    return cubes
 
 
 def color_in(source: str) -> Color:
@@ -158,12 +160,9 @@ def color_in(source: str) -> Color:
 def pick_x_times(row: Row) -> tuple[Scene, Goal]:
     """Button, cubes, target."""
     facts = row["facts"]
-    objects = (
-        make_button(row),
-        *colored_cubes(row),
-        make_target(row, "target", "target", 0.04),
-    )
-    return Scene(objects), Goal.of(color=facts["target_color_name"], repeats=facts["num_repeats"])
+    target = make_target(row, "target", "target", 0.04)
+    scene = Scene((make_button(row), *colored_cubes(row), target))
+    return scene, Goal.of(color=facts["target_color_name"], repeats=facts["num_repeats"])
 
 
 def convert_stop_cube(row: Row) -> tuple[Scene, Goal]:
@@ -177,10 +176,8 @@ def convert_stop_cube(row: Row) -> tuple[Scene, Goal]:
         height=stop_cube.HEIGHT,
         thickness=stop_cube.TARGET_THICKNESS,
     )
-    begin, end = (
-        Point(round(x, 7), round(y, 7), stop_cube.HEIGHT)
-        for x, y in (facts["start_pos_xy"], facts["end_pos_xy"])
-    )
+    begin = shuttle_end(facts["start_pos_xy"])
+    end = shuttle_end(facts["end_pos_xy"])
     red, green, blue = row["colors"]["target_cube"]
     yaw = upright_yaw(row["start"]["target_cube"])
     shuttle = SceneObject("shuttle", "shuttle", begin, yaw, rgb=(red, green, blue))
@@ -192,25 +189,25 @@ def convert_stop_cube(row: Row) -> tuple[Scene, Goal]:
         stop_cube.PASSES,
         stopped_by=Fact("pressed", "button"),
     )
-    return (
-        Scene((make_button(row), target, shuttle), motions=(run,)),
-        Goal.of(visit=facts["stop_time"]),
-    )
+    scene = Scene((make_button(row), target, shuttle), motions=(run,))
+    return scene, Goal.of(visit=facts["stop_time"])
+
+
+def shuttle_end(place: Sequence[float]) -> Point:
+    """Return where the run of StopCube's cube begins or ends."""
+    x, y = place
+    return Point(round(x, 7), round(y, 7), stop_cube.HEIGHT)
 
 
 def convert_swing_x_times(row: Row) -> tuple[Scene, Goal]:
     """Button, cubes, and a target on either side with the disc that lights up over it."""
     facts = row["facts"]
-    targets = tuple(
-        make_target(
-            row,
-            body_name(facts[f"target_{side}"]),
-            f"target_{side}",
-            swing_x_times.TARGET_RADIUS,
-            rgb=swing_x_times.TARGET_RGB,
-        )
-        for side in swing_x_times.SIDES
-    )
+    targets = []
+    for side in swing_x_times.SIDES:
+        source = body_name(facts[f"target_{side}"])
+        name = f"target_{side}"
+        radius = swing_x_times.TARGET_RADIUS
+        targets.append(make_target(row, source, name, radius, rgb=swing_x_times.TARGET_RGB))
     color = facts["target_color_name"]
     scene = swing_x_times.make_scene(make_button(row), colored_cubes(row), targets, f"cube_{color}")
     return scene, Goal.of(color=color, repeats=facts["num_repeats"])
@@ -220,36 +217,39 @@ def convert_bin_fill(row: Row) -> tuple[Scene, Goal]:
     """Button, bin and cubes, numbered within their color in the order of creation."""
     facts = row["facts"]
     body = row["start"]["board_with_hole"]
-    bin_ = SceneObject(
-        "bin", "bin", Point(body[0], body[1], object_sizes.BIN_HEIGHT / 2), upright_yaw(body)
-    )
+    position = Point(body[0], body[1], object_sizes.BIN_HEIGHT / 2)
+    bin_ = SceneObject("bin", "bin", position, upright_yaw(body))
     cubes: list[SceneObject] = []
-    for source in (body_name(one) for one in facts["all_cubes"]):
+    for source in body_names(facts["all_cubes"]):
         color = color_in(source)
-        number = sum(cube.color == color for cube in cubes)
-        cubes.append(make_cube(row, source, f"cube_{color}_{number}", color))
-    counts = {color: facts[f"{color}_cubes_target_number"] for color in bin_fill.GOAL_ORDER}
-    named = tuple(color for color in bin_fill.GOAL_ORDER if counts[color])
-    goal = Goal.of(colors=named, counts=tuple(counts[color] for color in named))
+        cubes.append(make_cube(row, source, numbered_name(color, cubes), color))
+    counts = {}
+    for color in bin_fill.GOAL_ORDER:
+        count = facts[f"{color}_cubes_target_number"]
+        if count:
+            counts[color] = count
+    goal = Goal.of(colors=tuple(counts), counts=tuple(counts.values()))
     motions = bin_fill.plan_motions(cubes, late=facts["dynamic"])
     order = tuple(color for color, _ in facts["binfill_language_sequence"])
     return Scene((make_button(row), bin_, *cubes), motions, color_order=order), goal
 
 
+def numbered_name(color: Color, cubes: Sequence[SceneObject]) -> str:
+    """Return the name of another cube of a color, ``cube_red_0`` for the first red one."""
+    number = sum(cube.color == color for cube in cubes)
+    return f"cube_{color}_{number}"
+
+
 def unmask_scene(row: Row, *buttons: SceneObject) -> tuple[Scene, Goal]:
     """Containers, three of which hide a cube: container i hides the color i."""
-    facts = row["facts"]
     containers = make_containers(row)
-    colors: list[Color] = facts["color_names"]
-    cubes = tuple(
-        unmask.hidden_cube(color, container)
-        for color, container in zip(colors, containers, strict=False)
-    )
-    picks = sum(
-        str(stage["segment"]).startswith("<bin_")
-        for stage in row["stages"]
-        if not stage["demonstration"]
-    )
+    colors: list[Color] = row["facts"]["color_names"]
+    cubes = []
+    for color, container in zip(colors, containers, strict=False):
+        cubes.append(unmask.hidden_cube(color, container))
+    picks = 0
+    for stage in row["stages"]:
+        picks += not stage["demonstration"] and str(stage["segment"]).startswith("<bin_")
     scene = Scene((*buttons, *containers, *cubes), motions=unmask.appearing(containers))
     return scene, Goal.of(colors=tuple(colors[:picks]))
 
@@ -258,30 +258,30 @@ def unmask_swap_scene(row: Row, *buttons: SceneObject) -> tuple[Scene, Goal]:
     """Containers that change places, three of which hide a cube."""
     facts = row["facts"]
     containers = make_containers(row)
-    by_source = {
-        body_name(one): container
-        for one, container in zip(facts["spawned_bins"], containers, strict=True)
-    }
-    covers = {
-        color_in(body_name(cube)): by_source[body_name(cover)]
-        for cube, cover in facts["cube_bin_pairs"]
-    }
+    sources = body_names(facts["spawned_bins"])
+    by_source = dict(zip(sources, containers, strict=True))
+    covers = {}
+    for cube, cover in facts["cube_bin_pairs"]:
+        covers[color_in(body_name(cube))] = by_source[body_name(cover)]
     colors: list[Color] = facts["color_names"]
-    cubes = tuple(unmask.hidden_cube(color, covers[color]) for color in colors)
-    initiators = tuple(
-        by_source[body_name(facts[f"swap_pair{number}_idx1"])].name
-        for number in range(1, facts["swap_times"] + 1)
-    )
-    scene = Scene(
-        (*buttons, *containers, *cubes), unmask_swap.plan_motions(containers, cubes, initiators)
-    )
+    cubes = [unmask.hidden_cube(color, covers[color]) for color in colors]
+    initiators = tuple(by_source[source].name for source in swap_initiators(row))
+    motions = unmask_swap.plan_motions(containers, cubes, initiators)
+    scene = Scene((*buttons, *containers, *cubes), motions)
     return scene, Goal.of(colors=tuple(colors[: facts["pick_times"]]))
+
+
+def swap_initiators(row: Row) -> list[str]:
+    """Return the body that begins each swap."""
+    facts = row["facts"]
+    numbers = range(1, facts["swap_times"] + 1)
+    return body_names(facts[f"swap_pair{number}_idx1"] for number in numbers)
 
 
 def make_containers(row: Row) -> tuple[SceneObject, ...]:
     """Return the containers in the order of creation; their quaternions are yaw · (0, 1, 0, 0)."""
     found = []
-    for number, source in enumerate(body_name(one) for one in row["facts"]["spawned_bins"]):
+    for number, source in enumerate(body_names(row["facts"]["spawned_bins"])):
         body = row["start"][source]
         yaw = 2.0 * math.atan2(body[5], body[4])
         position = Point(body[0], body[1], object_sizes.CONTAINER_HEIGHT)
@@ -309,21 +309,16 @@ def convert_video_repick(row: Row) -> tuple[Scene, Goal]:
     facts = row["facts"]
     names: dict[str, str] = {}
     cubes: list[SceneObject] = []
-    for source in (body_name(one) for one in facts["spawned_cubes"]):
+    for source in body_names(facts["spawned_cubes"]):
         color = COLOR_OF_RGB[tuple(row["colors"][source])]
-        number = sum(cube.color == color for cube in cubes)
-        names[source] = f"cube_{color}_{number}"
+        names[source] = numbered_name(color, cubes)
         cubes.append(make_cube(row, source, names[source], color))
     target = names[body_name(facts["target_cube_1"])]
-    initiators = tuple(
-        names[body_name(facts[f"swap_pair{number}_idx1"])]
-        for number in range(1, facts["swap_times"] + 1)
-    )
+    initiators = tuple(names[source] for source in swap_initiators(row))
     # RoboMME looks for the nearest cube once the first one has been put down, millimeters away.
-    partners = [
-        None if second is None else names[body_name(second)]
-        for _, second, *_ in facts.get("swap_schedule", ())
-    ]
+    partners: list[str | None] = []
+    for _, second, *_ in facts.get("swap_schedule", ()):
+        partners.append(None if second is None else names[body_name(second)])
     scene = video_repick.make_scene(make_button(row), cubes, target, initiators, partners)
     return scene, Goal.of(repeats=facts["num_repeats"])
 
@@ -333,18 +328,24 @@ def place_scene(row: Row, site_radius: float) -> tuple[Scene, str]:
     facts = row["facts"]
     x, y, *_ = row["start"]["goal_site"]
     site = SceneObject("site", "site", Point(x, y, object_sizes.TARGET_HEIGHT), radius=site_radius)
-    discs = tuple(
-        make_target(row, body_name(one), f"target_{number}", video_place.TARGET_RADIUS)
-        for number, one in enumerate(facts["targets"])
-    )
+    discs = []
+    for number, source in enumerate(body_names(facts["targets"])):
+        discs.append(make_target(row, source, f"target_{number}", video_place.TARGET_RADIUS))
     color = facts["target_color_name"]
     past = tuple(past_of(row, f"cube_{color}"))
     swaps: tuple[Motion, ...] = ()
     if "swap_target_a" in facts:
-        first, second = (body_name(facts[f"swap_target_{one}"]) for one in "ab")
-        others = tuple(disc.name for disc in discs if disc.name not in (first, second))
-        swaps = (video_place.plan_swap(first, second, others, past),)
-    return Scene((site, make_button(row), *colored_cubes(row), *discs), swaps, past), color
+        swaps = (swap_of(row, [disc.name for disc in discs], past),)
+    objects = (site, make_button(row), *colored_cubes(row), *discs)
+    return Scene(objects, swaps, past), color
+
+
+def swap_of(row: Row, discs: Sequence[str], past: tuple[Fact, ...]) -> Motion:
+    """Return the exchange of two discs after what the video shows."""
+    first = body_name(row["facts"]["swap_target_a"])
+    second = body_name(row["facts"]["swap_target_b"])
+    others = tuple(disc for disc in discs if disc not in (first, second))
+    return video_place.plan_swap(first, second, others, past)
 
 
 def past_of(row: Row, cube: str) -> Iterator[Fact]:
@@ -387,4 +388,4 @@ CONVERTERS: dict[str, Callable[[Row], tuple[Scene, Goal]]] = {
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -12,7 +12,9 @@ import typer.main
 
 from roboirg.main import app
 
-MOST_ENTRIES, MOST_COMMANDS, MOST_PARAMETERS = 19, 30, 150
+MOST_ENTRIES = 19
+MOST_COMMANDS = 30
+MOST_PARAMETERS = 150
 """What a reader can find their way in: entries of ``roboirg --help``, commands in all, options and
 arguments in all."""
 
@@ -37,7 +39,8 @@ def entries() -> int:
 def _walk(command: Any, words: tuple[str, ...]) -> Iterator[CommandCount]:  # noqa: ANN401
     group = getattr(command, "commands", {})
     if not group or not words:
-        names = tuple(one.opts[0] for one in command.params if one.name != "help")
+        parameters = [parameter for parameter in command.params if parameter.name != "help"]
+        names = tuple(parameter.opts[0] for parameter in parameters)
         yield CommandCount(" ".join(words), names)
     for name, inner in sorted(group.items()):
         yield from _walk(inner, (*words, name))
@@ -45,9 +48,10 @@ def _walk(command: Any, words: tuple[str, ...]) -> Iterator[CommandCount]:  # no
 
 if __name__ == "__main__":
     found = commands()
-    for one in found:
-        print(f"{len(one.parameters):3} {one.words or 'roboirg'}: {' '.join(one.parameters)}")
-    total = sum(len(one.parameters) for one in found)
+    total = 0
+    for words, parameters in found:
+        print(f"{len(parameters):3} {words or 'roboirg'}: {' '.join(parameters)}")
+        total += len(parameters)
     print(f"{entries()} entries at the top (at most {MOST_ENTRIES})")
     print(f"{len(found) - 1} commands (at most {MOST_COMMANDS})")
     print(f"{total} options and arguments (at most {MOST_PARAMETERS})")

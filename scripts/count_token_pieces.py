@@ -46,7 +46,8 @@ def texts() -> Iterator[str]:
     """Yield instructions of random scenes in both pools, with all settings, forms and options."""
     for task in every_task():
         for index in range(EPISODES):
-            episode, pool = get_episode(task, "random", index), POOLS[index % len(POOLS)]
+            episode = get_episode(task, "random", index)
+            pool = POOLS[index % len(POOLS)]
             for options in expressible_options(episode, pool):
                 yield instruct_with(episode, options).text
 
@@ -80,22 +81,28 @@ def _words_of(scenario: Scenario) -> set[str]:
 
 def _spellings(text: Text, person: tuple[str, ...]) -> tuple[str, str]:
     """Return what a sentence says of one thing, and of several."""
-    one = many = ""
+    one = ""
+    many = ""
     for part in text:
         if isinstance(part, Slot):
             name = part.name.partition(".")[0]
             if name in PERSON:
                 value = person[PERSON.index(name)]
-                one, many = one + value, many + value
+                one += value
+                many += value
             elif part.form and part.form not in FORMS:
-                one, many = one + part.form, many + plural(part.form)
+                one += part.form
+                many += plural(part.form)
         elif isinstance(part, Agreement):
-            one, many = one + part.one, many + part.many
+            one += part.one
+            many += part.many
         elif isinstance(part, Pointer):
             inner_one, inner_many = _spellings(part.parts, person)
-            one, many = one + inner_one, many + inner_many
+            one += inner_one
+            many += inner_many
         else:
-            one, many = one + part.text, many + part.text
+            one += part.text
+            many += part.text
     return one, many
 
 
@@ -106,7 +113,9 @@ def main() -> None:
     by_count: dict[str, list[str]] = {}
     for word in sorted(words):
         # A mark is written without a space before it.
-        count = len(encode(word)) if word[0].isalnum() else 1
+        count = 1
+        if word[0].isalnum():
+            count = len(encode(word))
         by_count.setdefault(str(count), []).append(word)
     write_atomically(TABLE, json.dumps(dict(sorted(by_count.items())), indent=0) + "\n")
     print(f"{len(words)} words: {TABLE}")

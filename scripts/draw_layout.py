@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import ast
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from html import escape
-from pathlib import Path
 
 import layout
 
@@ -18,27 +17,33 @@ FILE = layout.ROOT / "docs" / "images" / "layout.svg"
 GROUND = ("core", "util")
 FACE = ("roboirg", "__main__")
 """What only hands on: the package's own file, and ``python -m roboirg``."""
-WIDTH, MARGIN, GAP = 1000, 20, 24
-HEADER, LINE, PADDING, BETWEEN = 24, 15, 8, 34
+WIDTH = 1000
+MARGIN = 20
+GAP = 24
+HEADER = 24
+LINE = 15
+PADDING = 8
+BETWEEN = 34
 CHARACTER = 6.1
 """Width of a character of the small text, in pixels."""
 
 
 def arrows_above_ground() -> dict[str, set[str]]:
     """Return the rooms that each room imports, without the ground and what only hands on."""
-    return {
-        room: set(others) - set(GROUND)
-        for room, others in layout.arrows().items()
-        if room not in (*GROUND, *FACE)
-    }
+    graph = {}
+    for room, others in layout.arrows().items():
+        if room not in (*GROUND, *FACE):
+            graph[room] = set(others) - set(GROUND)
+    return graph
 
 
 def rooms_by_floor() -> list[list[str]]:
     """Return the rooms of each floor, the ground first; all of the ground stand on one floor."""
     floors: dict[int, list[str]] = defaultdict(list)
     for room, floor in layout.floors(arrows_above_ground()).items():
-        floors[floor + 1].append(room)
-    return [list(GROUND), *(sorted(floors[number]) for number in sorted(floors))]
+        floors[floor].append(room)
+    above = [sorted(floors[number]) for number in sorted(floors)]
+    return [list(GROUND), *above]
 
 
 def in_order(rooms: list[str], above: dict[str, float]) -> list[str]:
@@ -50,8 +55,11 @@ def in_order(rooms: list[str], above: dict[str, float]) -> list[str]:
     """
 
     def middle(room: str) -> float:
-        places = [above[one] for one, other in drawn_arrows() if other == room and one in above]
-        return sum(places) / len(places) if places else WIDTH / 2
+        importers = [source for source, target in drawn_arrows() if target == room]
+        places = [above[source] for source in importers if source in above]
+        if not places:
+            return WIDTH / 2
+        return sum(places) / len(places)
 
     return sorted(rooms, key=middle)
 
@@ -60,12 +68,18 @@ def drawn_arrows() -> Iterator[tuple[str, str]]:
     """Yield the arrows to draw: without those that a longer way implies."""
     graph = arrows_above_ground()
 
-    def reached(room: str) -> set[str]:
-        return graph[room] | {far for other in graph[room] for far in reached(other)}
+    def reached(rooms: Iterable[str]) -> set[str]:
+        found = set(rooms)
+        for room in rooms:
+            found |= reached(graph[room])
+        return found
 
     for room, others in graph.items():
-        implied = {far for other in others for far in reached(other)}
-        yield from ((room, other) for other in sorted(others - implied))
+        implied = set()
+        for other in others:
+            implied |= reached(graph[other])
+        for other in sorted(others - implied):
+            yield room, other
 
 
 def folders_of(room: str) -> list[str]:
@@ -101,11 +115,21 @@ class Box:
     """A room in the picture; positions in pixels from the upper left corner."""
 
     def __init__(self, room: str, left: float, width: float) -> None:
-        self.room, self.left, self.width = room, left, width
-        self.top = self.height = 0.0
+        self.room = room
+        self.left = left
+        self.width = width
+        self.top = 0.0
+        self.height = 0.0
         inner = width - 2 * PADDING
         self.summary = wrapped(summary_of(room), inner)
-        self.folders = wrapped("  ".join(folders_of(room)), inner) if folders_of(room) else []
+        self.folders: list[str] = []
+        if folders_of(room):
+            self.folders = wrapped("  ".join(folders_of(room)), inner)
+
+    @property
+    def middle(self) -> float:
+        """Where arrows meet it, from the left."""
+        return self.left + self.width / 2
 
     @property
     def needed(self) -> float:
@@ -114,16 +138,22 @@ class Box:
 
     def draw(self) -> Iterator[str]:
         """Yield the lines of its picture."""
-        left, top = self.left, self.top
         yield (
-            f'<rect x="{left:.0f}" y="{top:.0f}" width="{self.width:.0f}" '
+            f'<rect x="{self.left:.0f}" y="{self.top:.0f}" width="{self.width:.0f}" '
             f'height="{self.height:.0f}" rx="4" class="room"/>'
         )
-        suffix = "/" if (layout.PACKAGE / self.room).is_dir() else ".py"
-        yield _text(left + PADDING, top + 17, f"{self.room}{suffix}", "name")
-        for number, line in enumerate((*self.summary, *self.folders)):
-            kind = "summary" if number < len(self.summary) else "folders"
-            yield _text(left + PADDING, top + HEADER + LINE * number + 10, line, kind)
+        suffix = ".py"
+        if (layout.PACKAGE / self.room).is_dir():
+            suffix = "/"
+        left = self.left + PADDING
+        yield _text(left, self.top + 17, f"{self.room}{suffix}", "name")
+        top = self.top + HEADER + 10
+        for line in self.summary:
+            yield _text(left, top, line, "summary")
+            top += LINE
+        for line in self.folders:
+            yield _text(left, top, line, "folders")
+            top += LINE
 
 
 def _text(left: float, top: float, words: str, kind: str) -> str:
@@ -152,14 +182,17 @@ def place_boxes() -> tuple[list[Box], float]:
     top = float(MARGIN)
     for rooms in reversed(rooms_by_floor()):
         width = (WIDTH - 2 * MARGIN - GAP * (len(rooms) - 1)) / len(rooms)
-        above = {box.room: box.left + box.width / 2 for box in boxes}
-        floor = [
-            Box(room, MARGIN + number * (width + GAP), width)
-            for number, room in enumerate(in_order(rooms, above))
-        ]
+        above = {box.room: box.middle for box in boxes}
+        floor = []
+        left = float(MARGIN)
+        for room in in_order(rooms, above):
+            floor.append(Box(room, left, width))
+            left += width + GAP
+        height = max(box.needed for box in floor)
         for box in floor:
-            box.top, box.height = top, max(one.needed for one in floor)
-        top += floor[0].height + BETWEEN
+            box.top = top
+            box.height = height
+        top += height + BETWEEN
         boxes += floor
     return boxes, top - BETWEEN + MARGIN
 
@@ -175,8 +208,10 @@ def picture() -> str:
         f'<rect width="{WIDTH}" height="{height:.0f}" fill="#ffffff"/>',
     ]
     for source, target in drawn_arrows():
-        above, below = place[source], place[target]
-        start, end = above.left + above.width / 2, below.left + below.width / 2
+        above = place[source]
+        below = place[target]
+        start = above.middle
+        end = below.middle
         start += (end - start) * min(0.35, above.width / 4 / max(1.0, abs(end - start)))
         foot = above.top + above.height
         lines.append(
@@ -188,10 +223,5 @@ def picture() -> str:
     return "\n".join([*lines, "</svg>", ""])
 
 
-def main(file: Path = FILE) -> None:
-    """Write the picture."""
-    file.write_text(picture(), encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    FILE.write_text(picture(), encoding="utf-8")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from written_parts import with_part
+from written_parts import table, with_part
 
 from roboirg.core.episode import Episode
 from roboirg.core.instruction_options import InstructionOptions
@@ -61,26 +61,23 @@ def walk() -> dict[str, Instruction]:
 
 
 def _texts_of_walk() -> str:
-    lines = ["| setting | what is said |", "| --- | --- |"]
+    rows = []
     for name, said in walk().items():
         turns = marked_turns(said)
         if name == "contextual":
             turns = [f"({number}) {turn}" for number, turn in enumerate(turns, start=1)]
-        lines.append(f"| `{name}` | {' '.join(turns)} |")
-    return "\n".join(lines)
+        rows.append((f"`{name}`", " ".join(turns)))
+    return table(("setting", "what is said"), rows)
 
 
 def _meanings_of_walk() -> str:
     task, index = WALK
     episode = get_episode(task, "test", index)
-    lines = [
-        "| setting | introduced | points back | operation | value |",
-        "| --- | --- | --- | --- | --- |",
-    ]
+    rows = []
     for name, said in walk().items():
-        rows = [" | ".join(cells) for cells in _meanings(said, episode)]
-        lines += [f"| `{name}` | {row} |" for row in rows]
-    return "\n".join(lines)
+        for cells in _meanings(said, episode):
+            rows.append((f"`{name}`", *cells))
+    return table(("setting", "introduced", "points back", "operation", "value"), rows)
 
 
 def _meanings(said: Instruction, episode: Episode) -> Iterator[tuple[str, str, str, str]]:
@@ -91,7 +88,9 @@ def _meanings(said: Instruction, episode: Episode) -> Iterator[tuple[str, str, s
         if field in said.meaning.settled:
             continue
         operands = [_operand(operand) for operand in term.operands]
-        operation = f"{term.operation} {term.rank}" if term.rank else term.operation
+        operation = str(term.operation)
+        if term.rank:
+            operation = f"{operation} {term.rank}"
         values = field_values(said.meaning, field, episode)
         value = ", ".join(sorted(map(str, values)))
         yield ", ".join(operands), ", ".join(_pointers(said)), operation, value
@@ -104,30 +103,29 @@ def _operand(operand: str | int | Described) -> str:
 def _pointers(said: Instruction) -> Iterator[str]:
     """Yield the words of the command that point back, each once."""
     last = len(said.utterances) - 1
-    words = [
-        said.span(mention)
-        for mention in said.mentions
-        if mention.utterance == last and mention.role == "anaphor"
-    ]
-    yield from dict.fromkeys(f"*{word}*" for word in words)
+    words: dict[str, None] = {}
+    for mention in said.mentions:
+        if mention.utterance == last and mention.role == "anaphor":
+            words[f"*{said.span(mention)}*"] = None
+    yield from words
 
 
 def _rivals() -> str:
-    lines = ["| remark | what is said | meant |", "| --- | --- | --- |"]
+    rows = []
     for remark, task in RIVALS.items():
         episode = _first_with(task, "direct-rival", "rival_reference", remark)
         said = instruct(episode, "direct-rival")
-        values = [value for *_, value in _meanings(said, episode)]
-        lines.append(f"| `{remark}` | {marked(said)} | {', '.join(values)} |")
-    return "\n".join(lines)
+        values = [value for _, _, _, value in _meanings(said, episode)]
+        rows.append((f"`{remark}`", marked(said), ", ".join(values)))
+    return table(("remark", "what is said", "meant"), rows)
 
 
 def _seen() -> str:
-    lines = ["| kind | task | what is said |", "| --- | --- | --- |"]
+    rows = []
     for kind, task in SEEN:
         said = instruct(_first_with(task, "grounded", "pattern", kind), "grounded")
-        lines.append(f"| {kind} | {task} | {marked(said)} |")
-    return "\n".join(lines)
+        rows.append((kind, task, marked(said)))
+    return table(("kind", "task", "what is said"), rows)
 
 
 def _first_with(task: str, setting: str, note: str, wanted: str) -> Episode:
@@ -153,8 +151,8 @@ def marked_turns(instruction: Instruction) -> list[str]:
         for mention in reversed(instruction.mentions):
             if mention.utterance == number:
                 sign = _sign(mention)
-                span = f"{sign}{text[mention.start : mention.end]}{sign}"
-                text = f"{text[: mention.start]}{span}{text[mention.end :]}"
+                span = text[mention.start : mention.end]
+                text = f"{text[: mention.start]}{sign}{span}{sign}{text[mention.end :]}"
         turns.append(text)
     return turns
 

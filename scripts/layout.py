@@ -8,9 +8,11 @@ import each other in a circle. `scripts/draw_layout.py` draws the rooms.
 from __future__ import annotations
 
 import ast
+import itertools
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,7 +33,7 @@ class Import(NamedTuple):
 def module_name(path: Path) -> str:
     """Return the dotted name of a file of the package."""
     parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
-    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+    return ".".join(parts).removesuffix(".__init__")
 
 
 @cache
@@ -48,7 +50,7 @@ def tree(path: Path) -> ast.Module:
 
 def imported_names(path: Path) -> Iterator[str]:
     """Yield the dotted name of all that a file imports, inside functions, too."""
-    package = module_name(path.parent / "__init__.py")
+    package = module_name(path.parent)
     for node in ast.walk(tree(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -57,7 +59,7 @@ def imported_names(path: Path) -> Iterator[str]:
             if node.level:
                 parts = package.split(".")
                 parent = parts[: len(parts) - node.level + 1]
-                base = ".".join([*parent, *filter(None, [base])])
+                base = ".".join([*parent, base]).rstrip(".")
             for alias in node.names:
                 name = f"{base}.{alias.name}"
                 yield name if name in modules() else base
@@ -66,12 +68,11 @@ def imported_names(path: Path) -> Iterator[str]:
 @cache
 def imports() -> tuple[Import, ...]:
     """Return every import of one file of the package by another one, each once."""
-    found = {
-        Import(source, target): None
-        for source, path in modules().items()
-        for target in imported_names(path)
-        if target in modules() and target != source
-    }
+    found: dict[Import, None] = {}
+    for source, path in modules().items():
+        for target in imported_names(path):
+            if target in modules() and target != source:
+                found[Import(source, target)] = None
     return tuple(found)
 
 
@@ -84,69 +85,49 @@ def room_of(module: str) -> str:
 def arrows() -> Mapping[str, Mapping[str, Import]]:
     """Return the rooms that each room imports, with an example of such an import."""
     found: dict[str, dict[str, Import]] = {room_of(module): {} for module in modules()}
-    for one in imports():
-        source, target = room_of(one.source), room_of(one.target)
+    for item in imports():
+        source = room_of(item.source)
+        target = room_of(item.target)
         if source != target:
-            found[source].setdefault(target, one)
+            found[source].setdefault(target, item)
     return found
 
 
 def circles(graph: Graph) -> list[list[str]]:
-    """Return the groups of nodes that reach each other (Tarjan's algorithm)."""
-    number: dict[str, int] = {}
-    lowest: dict[str, int] = {}
-    stack: list[str] = []
-    found: list[list[str]] = []
-
-    def visit(node: str) -> None:
-        number[node] = lowest[node] = len(number)
-        stack.append(node)
-        for other in graph.get(node, ()):
-            if other not in number:
-                visit(other)
-            if other in stack:
-                lowest[node] = min(lowest[node], lowest[other])
-        if lowest[node] == number[node]:
-            group = stack[stack.index(node) :]
-            del stack[stack.index(node) :]
-            if len(group) > 1:
-                found.append(sorted(group))
-
-    for node in graph:
-        if node not in number:
-            visit(node)
-    return found
+    """Return a circle of nodes that reach each other, if there is any."""
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return [error.args[1]]
+    return []
 
 
 def file_circles() -> list[list[str]]:
-    """Return the groups of files that import each other in a circle."""
+    """Return a circle of files that import each other, if there is any."""
     graph: dict[str, list[str]] = defaultdict(list)
-    for one in imports():
-        graph[one.source].append(one.target)
+    for item in imports():
+        graph[item.source].append(item.target)
     return circles(graph)
 
 
 def imports_back_up() -> list[str]:
-    """Return the imports inside a room that close a circle between its folders and files."""
+    """Return imports inside a room that close a circle between its folders and files."""
     folders = [name for name, path in modules().items() if path.name == "__init__.py"]
     found: list[str] = []
     for folder in folders:
         if folder == PACKAGE.name:
             continue
-        inside = [one for one in imports() if _within(one.source, folder)]
-        graph: dict[str, dict[str, list[Import]]] = defaultdict(lambda: defaultdict(list))
-        for one in inside:
-            if _within(one.target, folder):
-                source, target = _child(one.source, folder), _child(one.target, folder)
+        graph: dict[str, dict[str, Import]] = defaultdict(dict)
+        for item in imports():
+            if _within(item.source, folder) and _within(item.target, folder):
+                source = _child(item.source, folder)
+                target = _child(item.target, folder)
                 if source != target:
-                    graph[source][target].append(one)
-        for group in circles(graph):
-            found += [
-                f"{folder}: {one.source} imports {one.target}"
-                for source in group
-                for target in group
-                for one in graph[source].get(target, ())
-            ]
+                    graph[source][target] = item
+        for circle in circles(graph):
+            for target, source in itertools.pairwise(circle):
+                item = graph[source][target]
+                found.append(f"{folder}: {item.source} imports {item.target}")
     return found
 
 
@@ -161,33 +142,24 @@ def _child(module: str, folder: str) -> str:
 
 def importers_of_applications() -> set[str]:
     """Return the modules outside the applications that import one of them."""
-    return {
-        one.source
-        for one in imports()
-        if _within(one.target, APPS) and not _within(one.source, APPS)
-    }
+    of_applications = [item.source for item in imports() if _within(item.target, APPS)]
+    return {module for module in of_applications if not _within(module, APPS)}
 
 
 def imports_between_applications() -> list[Import]:
     """Return the imports of one application by another."""
-    return [
-        one
-        for one in imports()
-        if _within(one.source, APPS)
-        and _within(one.target, APPS)
-        and _child(one.source, APPS) != _child(one.target, APPS)
-    ]
+    found = []
+    for item in imports():
+        is_inside = _within(item.source, APPS) and _within(item.target, APPS)
+        if is_inside and _child(item.source, APPS) != _child(item.target, APPS):
+            found.append(item)
+    return found
 
 
 def floors(graph: Graph) -> dict[str, int]:
     """Return the floor of each node: above all that it reaches; 0 for what imports nothing."""
     found: dict[str, int] = {}
-
-    def floor(node: str) -> int:
-        if node not in found:
-            found[node] = 1 + max((floor(other) for other in graph.get(node, ())), default=-1)
-        return found[node]
-
-    for node in graph:
-        floor(node)
+    for node in TopologicalSorter(graph).static_order():
+        below = [found[other] for other in graph.get(node, ())]
+        found[node] = 1 + max(below, default=-1)
     return found

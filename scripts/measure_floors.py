@@ -9,12 +9,12 @@ Tasks without words are left out.
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from written_parts import with_part
+import typer
+from written_parts import table, with_part
 
 from roboirg.analysis.measures import measured_floors as stored
 from roboirg.analysis.measures.measured_floors import FloorKey, Floors
@@ -41,115 +41,135 @@ PAGE = Path(__file__).parent.parent / "docs" / "floors.md"
 SCENES = 400
 """Random scenes of each task that are tested."""
 
+_BY_SETTING = """\
+Language version {version}, percent of the slots that count, on random scenes (in brackets: on the \
+test split), all tasks together:
+
+{table}
+
+Over chance: points above the larger of chance and majority, with 95 % intervals, \
+Bonferroni-adjusted for {rows}."""
+
+_BY_TASK = """\
+Text-only by task, on random scenes, with the larger of chance and majority in brackets:
+
+{table}"""
+
 
 def measure(tasks: Sequence[str], scenes: int, learning: int) -> list[ShortcutRow]:
     """Return the rows of all settings of some tasks, on random scenes and on the test split."""
 
     def groups_of(told: InstructedEpisode) -> Iterator[tuple[Group, Sequence[str]]]:
         episode, instruction = told
-        slots, split, setting = counted_slots(told), episode.split, instruction.setting
+        slots = counted_slots(told)
+        whole = FloorKey(episode.split, instruction.setting)
+        of_task = whole._replace(task=episode.task)
         if slots:
-            yield FloorKey(split, setting), slots
-            yield FloorKey(split, setting, episode.task), slots
+            yield whole, slots
+            yield of_task, slots
         for slot in slots:
-            yield FloorKey(split, setting, episode.task, slot), (slot,)
+            yield of_task._replace(slot=slot), (slot,)
 
-    names = tuple(name for name, one in all_settings().items() if one.implicit)
+    def place(row: ShortcutRow) -> tuple[str, int, bool]:
+        key = FloorKey(*row.group)
+        return key.split, names.index(key.setting), bool(key.task)
+
+    names = [name for name, setting in all_settings().items() if setting.implicit]
     scored = score_texts(
         tasks, ("test",), names, InstructionOptions(), seeds=scenes, learning=learning
     )
-    rows = tabulate(scored, groups_of)
-    places = {name: place for place, name in enumerate(names)}
-    return sorted(rows, key=lambda row: (row.group[0], places[row.group[1]], bool(row.group[2])))
+    return sorted(tabulate(scored, groups_of), key=place)
 
 
 def file_text(rows: Sequence[ShortcutRow]) -> str:
     """Return the rows as a file that `measured_floors` reads."""
-    heads = (*FloorKey._fields, "texts", *stored.NAMES, *(f"{one} goals" for one in stored.NAMES))
-    lines: list[tuple[object, ...]] = [(*heads, "excess", "error")]
+    goal_heads = [f"{name} goals" for name in stored.NAMES]
+    heads = (*FloorKey._fields, "texts", *stored.NAMES, *goal_heads, "excess", "error")
+    lines: list[tuple[object, ...]] = [heads]
     for row in rows:
         shares = dict(row.shares)
-        best = max(SURFACE_RULES, key=lambda name: shares[name].slots or 0)
+        best = max(SURFACE_RULES, key=lambda name: _slots(row, name))
         shares["rules"] = shares[best]
-        numbers = [
-            *(shares[name].slots for name in stored.NAMES),
-            *(shares[name].goals for name in stored.NAMES),
-            *(row.excess or ()),
-        ]
-        lines.append((*row.group, row.count, *(f"{number:.4f}" for number in numbers)))
+        floors = [shares[name] for name in stored.NAMES]
+        numbers = [floor.slots for floor in floors]
+        numbers += [floor.goals for floor in floors]
+        numbers += row.excess or ()
+        cells = [f"{number:.4f}" for number in numbers]
+        lines.append((*row.group, row.count, *cells))
     return csv_lines(lines)
 
 
 def tables(floors: Floors) -> str:
     """Return the tables of the documentation."""
-    return "\n\n".join((_by_setting(floors), _by_task(floors), _claims(floors)))
+    return "\n\n".join([_by_setting(floors), _by_task(floors), _claims(floors)])
 
 
 def _by_setting(floors: Floors) -> str:
     keys = [key for key in floors if key == FloorKey(stored.RANDOM, key.setting)]
-    lines = [
-        (
-            f"Language version {LANGUAGE_VERSION}, percent of the slots that count, on random "
-            "scenes (in brackets: on the test split), all tasks together:"
-        ),
-        "",
-        f"| setting | texts | {' | '.join(stored.NAMES)} | text-only over chance |",
-        f"| --- | ---: |{' ---: |' * (len(stored.NAMES) + 1)}",
-    ]
+    rows = []
     for key in keys:
-        one, test = floors[key], floors[key._replace(split=stored.TEST)]
-        cells = (f"{_percent(one, name)} ({_percent(test, name)})" for name in stored.NAMES)
-        excess = excess_text(one.excess, len(keys))
-        lines.append(f"| `{key.setting}` | {one.count:,} | {' | '.join(cells)} | {excess} |")
-    note = (
-        "Over chance: points above the larger of chance and majority, with 95 % intervals, "
-        f"Bonferroni-adjusted for {counted(len(keys), 'row')}."
+        floor = floors[key]
+        test = floors[key._replace(split=stored.TEST)]
+        cells = [f"{_percent(floor, name)} ({_percent(test, name)})" for name in stored.NAMES]
+        excess = excess_text(floor.excess, len(keys))
+        rows.append((f"`{key.setting}`", f"{floor.count:,}", *cells, excess))
+    numbers = ("texts", *stored.NAMES, "text-only over chance")
+    return _BY_SETTING.format(
+        version=LANGUAGE_VERSION,
+        table=table(("setting", *numbers), rows, numbers),
+        rows=counted(len(keys), "row"),
     )
-    return "\n".join([*lines, "", note])
 
 
 def _by_task(floors: Floors) -> str:
     settings = list(dict.fromkeys(key.setting for key in floors))
-    lines = [
-        "Text-only by task, on random scenes, with the larger of chance and majority in brackets:",
-        "",
-        f"| task | {' | '.join(f'`{name}`' for name in settings)} |",
-        f"| --- |{' ---: |' * len(settings)}",
-    ]
+    rows = []
     for task in all_tasks():
-        cells = []
-        for setting in settings:
-            one = floors.get(FloorKey(stored.RANDOM, setting, task))
-            if one is None:
-                cells.append("–")
-                continue
-            least = max(("chance", "majority"), key=lambda name: one.shares[name].slots or 0)
-            cells.append(f"{_percent(one, 'text-only')} ({_percent(one, least)})")
-        lines.append(f"| {task} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        cells = [_cell(floors.get(FloorKey(stored.RANDOM, name, task))) for name in settings]
+        rows.append((task, *cells))
+    numbers = [f"`{name}`" for name in settings]
+    return _BY_TASK.format(table=table(("task", *numbers), rows, numbers))
+
+
+def _cell(floor: ShortcutRow | None) -> str:
+    """Return what the words alone give away, and in brackets what needs no words."""
+    if floor is None:
+        return "–"
+    least = "chance"
+    if _slots(floor, "majority") > _slots(floor, "chance"):
+        least = "majority"
+    return f"{_percent(floor, 'text-only')} ({_percent(floor, least)})"
 
 
 def _percent(row: ShortcutRow, name: str) -> str:
-    return f"{100 * (row.shares[name].slots or 0):.0f}"
+    return f"{100 * _slots(row, name):.0f}"
+
+
+def _slots(row: ShortcutRow, name: str) -> float:
+    """Return the share of slots of a floor, which has some in every stored row."""
+    return row.shares[name].slots or 0
 
 
 def _claims(floors: Floors) -> str:
     """Return which settings count for the headline, and in how many slots they exceed chance."""
     counting = stored.settings_at_chance(floors)
-    names = ", ".join(f"`{name}`" for name in counting)
-    tested = {key: one for key, one in floors.items() if key.slot and key.setting in counting}
+    tested = [key for key in floors if key.slot and key.setting in counting]
     above = []
-    for key, one in tested.items():
-        if one.excess and one.excess.interval(len(tested))[0] > MARGIN:
+    for key in tested:
+        excess = floors[key].excess
+        if excess and excess.interval(len(tested))[0] > MARGIN:
             where = f"{key.task} {key.slot} in `{key.setting}`, {key.split}"
-            above.append(f"{where}: {excess_text(one.excess, len(tested))}")
-    listed = f": {'; '.join(above)}" if above else ""
-    exceed = f"{len(above) or 'none'} {'exceeds' if len(above) < 2 else 'exceed'}"  # noqa: PLR2004
+            above.append(f"{where}: {excess_text(excess, len(tested))}")
+    exceed = "none exceeds this threshold"
+    if above:
+        verb = "exceeds" if len(above) == 1 else "exceed"
+        exceed = f"{len(above)} {verb} this threshold: {'; '.join(above)}"
+    names = ", ".join(f"`{name}`" for name in counting)
     return (
         f"Words alone are at most {100 * MARGIN:.0f} points above chance in "
         f"{names or 'no setting'}, over all tasks. After Bonferroni adjustment for the "
         f"{counted(len(tested), 'slot')} of their tasks, on random scenes and on the test split, "
-        f"{exceed} this threshold{listed}."
+        f"{exceed}."
     )
 
 
@@ -159,16 +179,11 @@ def page_text() -> str:
     return with_part(PAGE.read_text(encoding="utf-8"), "floors", tables(floors))
 
 
-def main() -> None:
-    """Measure, and write both files."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", type=int, default=SCENES)
-    parser.add_argument("--learning", type=int, default=LEARNING_SCENES)
-    parser.add_argument("--tables", action="store_true")
-    given = parser.parse_args()
-    if not given.tables:
+def main(scenes: int = SCENES, learning: int = LEARNING_SCENES, *, tables: bool = False) -> None:
+    """Measure, and write the file and the page; with --tables only the page."""
+    if not tables:
         begin = time.perf_counter()
-        rows = measure(tuple(all_tasks()), given.scenes, given.learning)
+        rows = measure(tuple(all_tasks()), scenes, learning)
         file = Path(stored.__file__).with_name(stored.floors_name(LANGUAGE_VERSION))
         file.write_text(file_text(rows), encoding="utf-8")
         stored.measured_floors.cache_clear()
@@ -177,4 +192,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -12,13 +12,13 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import NamedTuple
 
 import sapien
-from written_parts import with_part
+from written_parts import table, with_part
 
 from roboirg.simulation.model_files import find_model_files
 
@@ -79,7 +79,8 @@ mount --bind "$PLACE/dev" /dev
 """
 NOBODY = "setpriv --reuid 4242 --regid 4242 --clear-groups env -u HOME"
 UNKNOWN = "! getent passwd 4242 && as sh -c 'test -z \"$HOME\" && ! test -w /root'"
-PROXY, SOCKS = "http://127.0.0.1:9", "socks5://127.0.0.1:9"
+PROXY = "http://127.0.0.1:9"
+SOCKS = "socks5://127.0.0.1:9"
 
 
 class Machine(NamedTuple):
@@ -241,16 +242,21 @@ def play(machine: Machine, asked: int, place: Path) -> tuple[str, list[str]]:
 
 def outcome_of(records: Path, printed: str) -> str:
     """Return ``plays`` if all policies have an episode and the oracle's succeeded, else why not."""
-    lines = records.read_text("utf-8").splitlines() if records.is_file() else []
-    ends = {record["policy"]: record["outcome"] for record in map(json.loads, lines)}
-    others = [ends[name] != "error" for name in OTHERS if name in ends]
-    if ends.get("oracle") == "success" and len(others) == len(OTHERS) and all(others):
+    ends = {}
+    if records.is_file():
+        for line in records.read_text("utf-8").splitlines():
+            record = json.loads(line)
+            ends[record["policy"]] = record["outcome"]
+    others = [ends.get(name, "error") != "error" for name in OTHERS]
+    if ends.get("oracle") == "success" and all(others):
         return "plays"
     said = [line for line in printed.splitlines() if line.startswith("roboirg: ")]
-    return said[-1].removeprefix("roboirg: ") if said else f"{ends}: {printed[-300:]}"
+    if said:
+        return said[-1].removeprefix("roboirg: ")
+    return f"{ends}: {printed[-300:]}"
 
 
-def rows(machines: list[Machine]) -> Iterator[str]:
+def rows(machines: Sequence[Machine]) -> Iterator[tuple[str, str, str]]:
     """Play on each machine and yield its row of the table."""
     model = ThreadingHTTPServer(("127.0.0.1", 0), Answer)
     threading.Thread(target=model.serve_forever, daemon=True).start()
@@ -260,16 +266,19 @@ def rows(machines: list[Machine]) -> Iterator[str]:
             Path(parent).chmod(0o755)
             happened, lines = play(machine, model.server_port, Path(parent) / machine.place)
         usual = usual or lines
-        named = [" ".join(line.split()) for line in lines if line not in usual]
-        named = [line for line in named if not line.startswith(("ok test", "->", "1 of", "2 of"))]
+        named = []
+        for line in lines:
+            words = " ".join(line.split())
+            if line not in usual and not words.startswith(("ok test", "->", "1 of", "2 of")):
+                named.append(words)
         print(machine.name, happened, *lines, sep="\n", file=sys.stderr)
-        yield f"| {machine.name} | {happened} | {'<br>'.join(named) or 'as usual'} |"
+        yield machine.name, happened, "<br>".join(named) or "as usual"
 
 
 if __name__ == "__main__":
-    chosen = [one for one in MACHINES if one.name in sys.argv[1:]] or list(MACHINES)
-    table = "\n".join(("| machine | a run | `doctor` |", "| --- | --- | --- |", *rows(chosen)))
-    print(table)
-    if len(chosen) == len(MACHINES):
+    chosen = [machine for machine in MACHINES if machine.name in sys.argv[1:]]
+    found = table(("machine", "a run", "`doctor`"), rows(chosen or MACHINES))
+    print(found)
+    if not chosen:
         page = PAGE.read_text(encoding="utf-8")
-        PAGE.write_text(with_part(page, "odd machines", table), encoding="utf-8")
+        PAGE.write_text(with_part(page, "odd machines", found), encoding="utf-8")

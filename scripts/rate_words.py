@@ -7,20 +7,22 @@ rates worst; and how well the raters agree. ``roboirg language sample`` writes k
 
 from __future__ import annotations
 
-import argparse
 import csv
-import itertools
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+import typer
+from written_parts import table
 
 from roboirg.stats.intervals import without_spread
 
 DRAWS = 10_000
-LOWEST, HIGHEST = 1, 5
-HEAD = "| words | texts | rated | 95 % interval | worst frame |\n| --- | ---: | ---: | --- | --- |"
+LOWEST = 1
+HIGHEST = 5
+NUMBERS = ("texts", "rated")
+HEADS = ("words", *NUMBERS, "95 % interval", "worst frame")
 
 
 def read_key(path: Path) -> dict[str, dict[str, str]]:
@@ -34,7 +36,8 @@ def read_ratings(path: Path, known: Mapping[str, object]) -> dict[str, float]:
     found: dict[str, float] = {}
     with path.open(newline="", encoding="utf-8") as file:
         for row in csv.DictReader(file):
-            number, rating = row["number"], row["rating"].strip()
+            number = row["number"]
+            rating = row["rating"].strip()
             if number not in known:
                 raise SystemExit(f"{path} rates text {number!r}, which the key does not have.")
             try:
@@ -56,9 +59,10 @@ def interval(means: Sequence[float]) -> tuple[float, float]:
 
     If all frames have the same mean, as many others may have any as for shares of 0 or 1.
     """
-    mean, scale = float(np.mean(means)), HIGHEST - LOWEST
     if np.ptp(means) == 0:
-        low, high = without_spread((mean - LOWEST) / scale, len(means))
+        scale = HIGHEST - LOWEST
+        share = (float(np.mean(means)) - LOWEST) / scale
+        low, high = without_spread(share, len(means))
         return LOWEST + scale * low, LOWEST + scale * high
     rng = np.random.default_rng(0)
     drawn = rng.choice(np.asarray(means), size=(DRAWS, len(means))).mean(axis=1)
@@ -66,44 +70,53 @@ def interval(means: Sequence[float]) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def rows(key: Mapping[str, Mapping[str, str]], sheets: Sequence[Mapping[str, float]]) -> list[str]:
-    """Return a row for each setting."""
-    groups: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
-    for number, row in key.items():
-        frame = f"{row['task']}: {row['frame']}" if row["frame"] else f"text {number}"
-        groups[row["setting"]][frame] += [sheet[number] for sheet in sheets]
-    found = []
-    for setting, frames in sorted(groups.items()):
+def rows(
+    key: Mapping[str, Mapping[str, str]], sheets: Sequence[Mapping[str, float]]
+) -> list[tuple[object, ...]]:
+    """Return the cells of each setting."""
+    found: list[tuple[object, ...]] = []
+    for setting, frames in sorted(by_frame(key, sheets).items()):
         means = {frame: float(np.mean(ratings)) for frame, ratings in frames.items()}
+        rated = float(np.mean(list(means.values())))
         low, high = interval(list(means.values()))
-        worst = min(means, key=lambda frame: means[frame])
-        found.append(
-            f"| {setting} | {len(means)} | {np.mean(list(means.values())):.1f} | {low:.1f} to "
-            f"{high:.1f} | {means[worst]:.1f} ({worst}) |"
-        )
+        worst = min(means, key=means.__getitem__)
+        shown = f"{means[worst]:.1f} ({worst})"
+        found.append((setting, len(means), f"{rated:.1f}", f"{low:.1f} to {high:.1f}", shown))
+    return found
+
+
+def by_frame(
+    key: Mapping[str, Mapping[str, str]], sheets: Sequence[Mapping[str, float]]
+) -> dict[str, dict[str, list[float]]]:
+    """Return all ratings by setting and frame; a text without a frame stands alone."""
+    found: dict[str, dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
+    for number, text in key.items():
+        frame = f"text {number}"
+        if text["frame"]:
+            frame = f"{text['task']}: {text['frame']}"
+        found[text["setting"]][frame] += [sheet[number] for sheet in sheets]
     return found
 
 
 def agreement(sheets: Sequence[Mapping[str, float]]) -> str:
     """Return the mean correlation of two raters."""
+    if len(sheets) == 1:
+        return "One rater."
     numbers = list(sheets[0])
-    pairs = [
-        np.corrcoef([one[at] for at in numbers], [other[at] for at in numbers])[0, 1]
-        for one, other in itertools.combinations(sheets, 2)
-    ]
-    return f"Mean correlation of two raters: {np.mean(pairs):.2f}." if pairs else "One rater."
+    ratings = []
+    for sheet in sheets:
+        ratings.append([sheet[number] for number in numbers])
+    correlations = np.corrcoef(ratings)
+    pairs = np.triu_indices(len(sheets), k=1)
+    return f"Mean correlation of two raters: {np.mean(correlations[pairs]):.2f}."
 
 
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("key", type=Path)
-    parser.add_argument("sheets", type=Path, nargs="+")
-    given = parser.parse_args()
-    key = read_key(given.key)
-    sheets = [read_ratings(path, key) for path in given.sheets]
-    print(HEAD, *rows(key, sheets), "", agreement(sheets), sep="\n")
+def main(key: Path, sheets: list[Path]) -> None:
+    """Print the table of a key and of the sheets that raters filled in."""
+    known = read_key(key)
+    ratings = [read_ratings(path, known) for path in sheets]
+    print(table(HEADS, rows(known, ratings), NUMBERS), "", agreement(ratings), sep="\n")
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

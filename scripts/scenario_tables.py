@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from typing import cast
 
 import pandas as pd
+from written_parts import table
 
 from roboirg.apps.language_lab.corpus_statistics import expression_counts, expression_order
 from roboirg.apps.language_lab.scenarios.scenario_check import check_scenarios, our_scenarios
@@ -27,7 +28,7 @@ from roboirg.language.variants import instructions
 from roboirg.shortcuts.command_chance import goals_of_command, is_right
 from roboirg.tasks.splits.splits import split_episodes
 
-TEST, TRAIN = ("test",), TRAINING_SPLITS
+TEST = ("test",)
 DASH = "–"
 
 _PAGE = """\
@@ -122,14 +123,14 @@ def scenario_part() -> str:
 def _told(splits: tuple[str, ...]) -> pd.DataFrame:
     """Return a row for each implicit text of some splits."""
     settings = [name for name, setting in all_settings().items() if setting.implicit]
-    options = InstructionOptions()
+    episodes = split_episodes([*written_words()], splits)
     rows = []
-    for episode, said in instructions(
-        split_episodes([*written_words()], splits), settings, ["implicit"], options
-    ):
+    for episode, said in instructions(episodes, settings, ["implicit"], InstructionOptions()):
         goals = goals_of_command(said, episode)
         classes = cast("list[int]", said.metadata.get("landmark_classes") or [])
-        places = [PlaceClass(number).name.lower().replace("_", " ") for number in classes]
+        place = None
+        if classes:
+            place = PlaceClass(classes[0]).name.lower().replace("_", " ")
         rows.append(
             {
                 "task": said.task,
@@ -138,7 +139,7 @@ def _told(splits: tuple[str, ...]) -> pd.DataFrame:
                 "text": said.text,
                 "tokens": count_tokens(said.text),
                 "alone": all(is_right(goal, episode) for goal in goals),
-                "place": places[0] if places else None,
+                "place": place,
                 "said": said,
             }
         )
@@ -155,14 +156,13 @@ def _expressions(said: Sequence[Instruction]) -> str:
 def _quotations(told: pd.DataFrame) -> str:
     """Return in which tasks each expression of the paper is said."""
     tasks: dict[str, set[str]] = {}
-    for row in pointer_table():
-        if row.quote:
-            is_said = told.text.str.contains(_spoken(row.words), regex=True)
-            tasks.setdefault(row.quote, set()).update(told.task[is_said])
-    said = {
-        quote: ", ".join(task for task in written_words() if task in own)
-        for quote, own in tasks.items()
-    }
+    for pointer in pointer_table():
+        if pointer.quote:
+            is_said = told.text.str.contains(_spoken(pointer.words), regex=True)
+            tasks.setdefault(pointer.quote, set()).update(told.task[is_said])
+    said = {}
+    for quote, saying in tasks.items():
+        said[quote] = ", ".join(task for task in written_words() if task in saying)
     return _table(pd.DataFrame({"tasks": said}).rename_axis("example"))
 
 
@@ -212,10 +212,11 @@ def _missing() -> Iterator[str]:
 
 def _words(told: pd.DataFrame) -> str:
     """Return the vocabulary of each task, and what of it training does not have."""
-    learned = _told(TRAIN)
+    learned = _told(TRAINING_SPLITS)
     rows = {}
     for task in written_words():
-        test, train = (_vocabulary(part[part.task == task].text) for part in (told, learned))
+        test = _vocabulary(told[told.task == task].text)
+        train = _vocabulary(learned[learned.task == task].text)
         new = sorted(set(test) - set(train))
         rows[task] = {
             "words": test.nunique(),
@@ -231,27 +232,20 @@ def _vocabulary(texts: pd.Series[str]) -> pd.Series[str]:
 
 def _shared(told: pd.DataFrame) -> str:
     """Return how many frames, blanked sentences and texts are in both pools, over all tasks."""
-    test, train = (sentences_of(our_scenarios(), pool) for pool in ("test", "train"))
-    frames = [name for name in test if name.startswith("frame ")]
-    texts, known = set(told.text), set(_told(TRAIN).text)
+    test = sentences_of(our_scenarios(), "test")
+    train = sentences_of(our_scenarios(), "train")
+    frames = {name for name in test if name.startswith("frame ")}
+    sentences = test.difference(frames)
+    texts = set(told.text)
     shares = {
-        "frames": (len(frames), len(train.intersection(frames))),
-        "sentences with their slots blanked": (
-            len(test) - len(frames),
-            len(train.intersection(test.difference(frames))),
-        ),
-        "texts": (len(texts), len(texts & known)),
+        "frames": (len(frames), len(frames & train)),
+        "sentences with their slots blanked": (len(sentences), len(sentences & train)),
+        "texts": (len(texts), len(texts.intersection(_told(TRAINING_SPLITS).text))),
     }
     return _table(pd.DataFrame(shares, index=["of test", "in training, too"]).T.rename_axis("what"))
 
 
 def _table(frame: pd.DataFrame) -> str:
     """Return a table in Markdown; its index has the rows' names."""
-    lines = [
-        f"| {frame.index.name} | {' | '.join(map(str, frame.columns))} |",
-        f"| --- {'| ---: ' * len(frame.columns)}|",
-    ]
-    for row in frame.itertuples():
-        name, *cells = [DASH if pd.isna(cell) else str(cell) for cell in row]
-        lines.append(f"| {name} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+    named = frame.astype(object).fillna(DASH).reset_index()
+    return table(list(named.columns), named.itertuples(index=False), list(frame.columns))

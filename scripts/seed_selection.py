@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
@@ -84,13 +85,12 @@ def episode_slots(
     tasks: Sequence[str], splits: Sequence[Split] = SPLITS
 ) -> tuple[EpisodeSlot, ...]:
     """Return a slot for every sampled episode of the tasks' splits, in order."""
-    return tuple(
-        EpisodeSlot(task, split, index)
-        for task in tasks
-        for split in splits
-        for index in range(SIZES[split])
-        if published_episode(task, split, index) is None
-    )
+    slots = []
+    for task, split in itertools.product(tasks, splits):
+        for index in range(SIZES[split]):
+            if published_episode(task, split, index) is None:
+                slots.append(EpisodeSlot(task, split, index))
+    return tuple(slots)
 
 
 def check_words(slot: EpisodeSlot, seed: int) -> Rejection | None:
@@ -107,16 +107,20 @@ def check_words(slot: EpisodeSlot, seed: int) -> Rejection | None:
             reason = all_settings()[name].refusal(request)
             if reason is not None:
                 causes.append(f"{name}: {reason}")
-    return Rejection(seed, "not expressible", "; ".join(causes)) if causes else None
+    if causes:
+        return Rejection(seed, "not expressible", "; ".join(causes))
+    return None
 
 
 def check_seed(slot: EpisodeSlot, seed: int) -> Rejection | None:
     """Return why the scene, the language or the oracle rejects a seed."""
     rejection = check_words(slot, seed)
-    if rejection is None:
-        failure = oracle_failure(_episode(slot, seed))
-        rejection = None if failure is None else Rejection(seed, "oracle failed", failure)
-    return rejection
+    if rejection is not None:
+        return rejection
+    failure = oracle_failure(_episode(slot, seed))
+    if failure is not None:
+        return Rejection(seed, "oracle failed", failure)
+    return None
 
 
 def oracle_failure(episode: Episode) -> str | None:
@@ -126,7 +130,9 @@ def oracle_failure(episode: Episode) -> str | None:
         info = play(env, make_policy("oracle", 0))
     except MotionPlanningError as error:
         return str(error)
-    return None if info["status"] == "success" else str(info["cause"] or info["status"])
+    if info["status"] == "success":
+        return None
+    return str(info["cause"] or info["status"])
 
 
 def find_seed(slot: EpisodeSlot, check: SeedCheck = check_seed) -> SelectedSeed:
@@ -178,9 +184,12 @@ def check_kept_splits(
     kept = [split for split in SPLITS if split not in splits]
     for slot in episode_slots(tasks, kept):
         entry = known.get(slot.task)
-        passed_over = entry.passed_over.get(slot_key(slot.split, slot.index), 0) if entry else 0
-        first = slot_seed(get_task(slot.task), slot.split, slot.index)
-        if entry is None or check_words(slot, first + passed_over) is not None:
+        is_valid = False
+        if entry is not None:
+            passed_over = entry.passed_over.get(slot_key(slot.split, slot.index), 0)
+            first = slot_seed(get_task(slot.task), slot.split, slot.index)
+            is_valid = check_words(slot, first + passed_over) is None
+        if not is_valid:
             raise InvalidValueError(
                 f"Episode {slot.key} cannot be kept, because it is not valid; build all splits of "
                 f"{slot.task}."
@@ -197,15 +206,18 @@ def merge_splits(
         found: the seeds selected for their sampled episodes; others keep the known ones.
         known: the splits shipped before.
     """
-    splits = {task: known[task] for task in every_task() if task in known}
+    rejected = {selected.slot: len(selected.rejections) for selected in found}
+    splits = dict(known)
     for task in tasks:
-        old = known[task].passed_over if task in known else {}
-        new = {one.slot: len(one.rejections) for one in found}
-        counts: dict[str, int] = {}
+        old: Mapping[str, int] = {}
+        if task in known:
+            old = known[task].passed_over
+        passed_over: dict[str, int] = {}
         for slot in episode_slots([task]):
             key = slot_key(slot.split, slot.index)
-            counts[key] = new.get(slot, old.get(key, 0))
-        passed_over = {key: count for key, count in counts.items() if count}
+            count = rejected.get(slot, old.get(key, 0))
+            if count:
+                passed_over[key] = count
         splits[task] = TaskSplits(fingerprint_of(task, passed_over), passed_over)
     return {task: splits[task] for task in every_task() if task in splits}
 

@@ -40,11 +40,10 @@ def command_lines() -> Iterator[str]:
     """Yield the lines of the reference of all commands, from their help."""
     yield "# Command line\n\nThe help of each command, as `roboirg COMMAND --help` prints it.\n"
     yield from _help_of(typer.main.get_command(app), "roboirg")
-    yield from (
-        "## Keys of a plan\n",
-        "| key | meaning | default |\n| --- | --- | --- |",
-        *(f"| `{one.name}` | {_cell(one.help)} | {_default(one)} |" for one in plan_options()),
-    )
+    yield "## Keys of a plan\n"
+    yield "| key | meaning | default |\n| --- | --- | --- |"
+    for option in plan_options():
+        yield f"| `{option.name}` | {_cell(option.help)} | {_default(option)} |"
 
 
 def _help_of(command: Any, name: str) -> Iterator[str]:  # noqa: ANN401
@@ -58,13 +57,15 @@ def _help_of(command: Any, name: str) -> Iterator[str]:  # noqa: ANN401
     words = _cell(command.help, newline="\n\n")
     yield re.sub(r"^Example: (.+)$", r"Example: `\1`", words, flags=re.MULTILINE) + "\n"
     yield "| argument or option | meaning | default |\n| --- | --- | --- |"
-    for one in command.params:
-        if one.name == "help" or getattr(one, "hidden", False):
+    for parameter in command.params:
+        if parameter.name == "help" or getattr(parameter, "hidden", False):
             continue
-        names = [one.name.upper()] if one.param_type_name == "argument" else one.opts
-        marks = ", ".join(f"`{word}`" for word in (*names, *one.secondary_opts))
-        default = "required" if one.required else _default(one)
-        yield f"| {marks} | {_cell(one.help)} | {default} |"
+        names = [*parameter.opts, *parameter.secondary_opts]
+        if parameter.param_type_name == "argument":
+            names = [parameter.name.upper()]
+        marks = ", ".join(f"`{name}`" for name in names)
+        default = "required" if parameter.required else _default(parameter)
+        yield f"| {marks} | {_cell(parameter.help)} | {default} |"
     yield ""
 
 
@@ -72,10 +73,12 @@ def _default(parameter: Any) -> str:  # noqa: ANN401
     shown = getattr(parameter, "show_default", None)
     if isinstance(shown, str):
         return _cell(shown)
-    value = None if callable(parameter.default) else parameter.default
+    value = parameter.default
     if value is True:
         return f"`{parameter.opts[0]}`"
-    return "" if value in (None, False, (), []) else f"`{_cell(str(value))}`"
+    if callable(value) or value in (None, False, (), []):
+        return ""
+    return f"`{_cell(str(value))}`"
 
 
 def _cell(text: str | None, newline: str = " ") -> str:
@@ -86,8 +89,8 @@ def _cell(text: str | None, newline: str = " ") -> str:
 def on_page_markdown(markdown: str, page: object, **_: object) -> str:
     """Change links between files of the repository into links between pages of the site."""
     uri = page.file.src_uri  # type: ignore[attr-defined]
-    source = next((one for one, name in PAGES.items() if name == uri), f"docs/{uri}")
-    folder = (ROOT / source).parent
+    sources = {name: source for source, name in PAGES.items()}
+    folder = (ROOT / sources.get(uri, f"docs/{uri}")).parent
 
     def change(link: re.Match[str]) -> str:
         target = link.group(2)

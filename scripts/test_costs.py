@@ -10,14 +10,14 @@ ended. Seconds are the clock's: what workers did side by side counts for each.
 
 from __future__ import annotations
 
-import argparse
 from collections import defaultdict
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple
 from xml.etree import ElementTree as ET
 
+import typer
+
 By = Literal["folder", "file", "function", "item"]
-GROUPS: tuple[By, ...] = ("folder", "file", "function", "item")
 PROCESSOR = "./properties/property[@name='processor']"
 
 
@@ -38,27 +38,27 @@ class TimedTest(NamedTuple):
 
     def group(self, by: By) -> str:
         """Return the group to which it belongs."""
-        function = self.name.partition("[")[0]
-        groups: dict[By, str] = {
-            "folder": self.file.rpartition("/")[0],
-            "file": self.file,
-            "function": f"{self.file}::{function}",
-            "item": f"{self.file}::{self.name}",
-        }
-        return groups[by]
+        if by == "folder":
+            return self.file.rpartition("/")[0]
+        if by == "file":
+            return self.file
+        if by == "function":
+            return f"{self.file}::{self.name.partition('[')[0]}"
+        return f"{self.file}::{self.name}"
 
 
 def read_report(path: Path) -> list[TimedTest]:
     """Return the tests of a JUnit XML that pytest has written."""
-    return [
-        TimedTest(
-            case.get("classname", "").replace(".", "/"),
-            case.get("name", ""),
-            float(next((one.get("value", "") for one in case.iterfind(PROCESSOR)), "0")),
-            float(case.get("time", "0")),
-        )
-        for case in ET.parse(path).iterfind(".//testcase")  # noqa: S314 - our own
-    ]
+    tests = []
+    for case in ET.parse(path).iterfind(".//testcase"):  # noqa: S314 - our own
+        file = case.get("classname", "").replace(".", "/")
+        processor = case.find(PROCESSOR)
+        processor_s = 0.0
+        if processor is not None:
+            processor_s = float(processor.get("value", ""))
+        seconds = float(case.get("time", "0"))
+        tests.append(TimedTest(file, case.get("name", ""), processor_s, seconds))
+    return tests
 
 
 def table(tests: list[TimedTest], by: By, top: int) -> str:
@@ -66,34 +66,31 @@ def table(tests: list[TimedTest], by: By, top: int) -> str:
     groups: dict[str, list[TimedTest]] = defaultdict(list)
     for test in tests:
         groups[test.group(by)].append(test)
-    costs = [
-        (sum(one.processor_s for one in group), sum(one.seconds for one in group), len(group), name)
-        for name, group in [*groups.items(), ("all", tests)]
-    ]
-    rows = [*sorted(costs[:-1], reverse=True)[:top], costs[-1]]
-    return "\n".join(
-        ["  items  processor  seconds  group"]
-        + [
-            f"{items:7} {spent:10.1f} {seconds:8.1f}  {name}"
-            for spent, seconds, items, name in rows
-        ]
-    )
+    rows = sorted((_row(name, group) for name, group in groups.items()), reverse=True)
+    lines = ["  items  processor  seconds  group"]
+    for spent, seconds, items, name in [*rows[:top], _row("all", tests)]:
+        lines.append(f"{items:7} {spent:10.1f} {seconds:8.1f}  {name}")
+    return "\n".join(lines)
 
 
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("reports", type=Path, nargs="+", metavar="XML")
-    parser.add_argument("--by", choices=GROUPS, default="file", help="default: %(default)s")
-    parser.add_argument(
-        "--top", type=int, default=30, help="the number of groups; default: %(default)s"
-    )
-    options = parser.parse_args()
-    tests = [test for path in options.reports for test in read_report(path)]
-    print(table(tests, options.by, options.top))
+def _row(name: str, tests: list[TimedTest]) -> tuple[float, float, int, str]:
+    """Return the processor time and the seconds of some tests, their number, and their name."""
+    processor_s = sum(test.processor_s for test in tests)
+    seconds = sum(test.seconds for test in tests)
+    return processor_s, seconds, len(tests), name
+
+
+def main(
+    reports: list[Path],
+    by: By = "file",
+    top: Annotated[int, typer.Option(help="The number of groups.")] = 30,
+) -> None:
+    """Print the table of the tests in some reports."""
+    tests = []
+    for path in reports:
+        tests += read_report(path)
+    print(table(tests, by, top))
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -7,12 +7,12 @@ It also writes the examples on the pages of the settings.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from language_examples import harder_page, language_page, marked
 from scenario_tables import scenario_part
+from written_parts import table
 
 from roboirg.apps.language_lab.corpus_statistics import metadata_counts
 from roboirg.core.episode import Episode
@@ -46,6 +46,21 @@ expressions. An *antecedent* introduces a value, **an anaphor** points back at i
 stands at the end."""
 
 
+_PATTERNS_HEAD = """\
+## Reasoning patterns by task
+
+Episodes of the test split; a dash where no episode of the task allows the pattern."""
+
+_EXAMPLE = """\
+### {task}, {setting}
+
+Episode `{episode}`, {about}.
+
+| | |
+| --- | --- |
+{rows}"""
+
+
 def whole_page() -> str:
     """Return the page, in Markdown."""
     return f"{language_card()}\n{scenario_part()}\n"
@@ -53,17 +68,16 @@ def whole_page() -> str:
 
 def language_card() -> str:
     """Return the examples."""
-    parts = [
-        _INTRODUCTION.format(
-            version=LANGUAGE_VERSION, variants=sum(map(len, map(_variants, all_tasks().values())))
-        )
-    ]
-    for task in all_tasks().values():
-        parts.append(f"## {task.name}")
-        parts += [_example(task.name, setting) for setting in _variants(task)]
+    variants = [_variants(task) for task in all_tasks().values()]
+    count = sum(map(len, variants))
+    parts = [_INTRODUCTION.format(version=LANGUAGE_VERSION, variants=count)]
+    for task, settings in zip(all_tasks(), variants, strict=True):
+        parts.append(f"## {task}")
+        parts += [_example(task, setting) for setting in settings]
     parts.append(_patterns_by_task())
     parts.append("## Harder settings\n\nWith a rival, and grounded in what is seen.")
-    parts += [_harder_example(*one) for one in _harder_variants()]
+    for task in all_tasks():
+        parts += [_example(task, setting) for setting in _harder_variants(task)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -72,93 +86,81 @@ def _variants(task: Task) -> list[str]:
     return [name for name in plain_settings(task) if all_settings()[name].implicit]
 
 
+def _harder_variants(name: str) -> list[str]:
+    """Return the harder settings of a task that can express a test episode."""
+    names = []
+    for setting in settings_of(get_task(name)):
+        is_harder = all_settings()[setting].plain is not None
+        if is_harder and _has_example(name, setting):
+            names.append(setting)
+    return names
+
+
+def _has_example(task: str, setting: str) -> bool:
+    options = InstructionOptions(setting)
+    return any(find_refusal(episode, options) is None for episode in _episodes(task))
+
+
 def _patterns_by_task() -> str:
     """Return how many test episodes of each task have each reasoning pattern."""
-    counts = metadata_counts(_told("reasoning"), "pattern")
-    lines = [
-        "## Reasoning patterns by task",
-        "",
-        "Episodes of the test split; a dash where no episode of the task allows the pattern.",
-        "",
-        f"| task | {' | '.join(PATTERNS)} |",
-        f"| --- {'| --- ' * len(PATTERNS)}|",
-    ]
+    counts = metadata_counts(_reasoning(), "pattern")
+    rows = []
     for task in all_tasks():
-        cells = (str(counts[task].get(pattern) or "–") for pattern in PATTERNS)
-        lines.append(f"| {task} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        cells = [counts[task].get(pattern) or "–" for pattern in PATTERNS]
+        rows.append((task, *cells))
+    return f"{_PATTERNS_HEAD}\n\n{table(('task', *PATTERNS), rows)}"
 
 
-def _told(setting: str, form: str = "implicit") -> Iterator[Instruction]:
-    for task in all_tasks():
-        if setting in settings_of(get_task(task)):
-            episodes = (get_episode(task, SPLIT, index) for index in range(split_size(SPLIT)))
-            yield from (instruct(episode, setting, form) for episode in episodes)
+def _reasoning() -> Iterator[Instruction]:
+    for name, task in all_tasks().items():
+        if "reasoning" in settings_of(task):
+            for episode in _episodes(name):
+                yield instruct(episode, "reasoning")
+
+
+def _episodes(task: str) -> Iterator[Episode]:
+    """Yield the test episodes of a task."""
+    for index in range(split_size(SPLIT)):
+        yield get_episode(task, SPLIT, index)
 
 
 def example_episode(task: str, setting: str) -> Episode:
     """Return the setting's example, or the next episode that the setting can express."""
-    first = all_settings()[setting].example
-    episodes = (get_episode(get_task(task).name, SPLIT, index) for index in itertools.count(first))
     options = InstructionOptions(setting)
-    return next(episode for episode in episodes if find_refusal(episode, options) is None)
+    index = all_settings()[setting].example
+    while True:
+        episode = get_episode(task, SPLIT, index)
+        if find_refusal(episode, options) is None:
+            return episode
+        index += 1
 
 
 def _example(task: str, setting: str) -> str:
+    """Return the example of a variant; harder ones repeat no explicit command."""
     episode = example_episode(task, setting)
     implicit = instruct(episode, setting)
-    lines = [
-        f"### {task}, {setting}",
-        "",
-        f"Episode `{episode.key}`, {', '.join((episode.difficulty, *_about(implicit)))}.",
-        "",
-        "| | |",
-        "| --- | --- |",
-        f"| explicit | {marked(instruct(episode))} |",
-        f"| {setting} | {marked(implicit)} |",
-        f"| resolved | {marked(instruct(episode, setting, 'resolved'))} |",
-    ]
-    return "\n".join(lines)
-
-
-def _harder_variants() -> Iterator[tuple[str, str]]:
-    """Yield tasks with their harder settings."""
-    for task in all_tasks().values():
-        for setting in settings_of(task):
-            if all_settings()[setting].plain is not None and _has_example(task, setting):
-                yield task.name, setting
-
-
-def _has_example(task: Task, setting: str) -> bool:
-    options = InstructionOptions(setting)
-    episodes = (get_episode(task.name, SPLIT, index) for index in range(split_size(SPLIT)))
-    return any(find_refusal(episode, options) is None for episode in episodes)
-
-
-def _harder_example(task: str, setting: str) -> str:
-    episode = example_episode(task, setting)
-    implicit = instruct(episode, setting)
-    lines = [
-        f"### {task}, {setting}",
-        "",
-        f"Episode `{episode.key}`, {', '.join((episode.difficulty, *_about(implicit)))}.",
-        "",
-        "| | |",
-        "| --- | --- |",
-        f"| {setting} | {marked(implicit)} |",
-        f"| resolved | {marked(instruct(episode, setting, 'resolved'))} |",
-    ]
-    return "\n".join(lines)
+    rows = [(setting, marked(implicit))]
+    rows.append(("resolved", marked(instruct(episode, setting, "resolved"))))
+    if all_settings()[setting].plain is None:
+        rows.insert(0, ("explicit", marked(instruct(episode))))
+    return _EXAMPLE.format(
+        task=task,
+        setting=setting,
+        episode=episode.key,
+        about=", ".join([episode.difficulty, *_about(implicit)]),
+        rows="\n".join(f"| {name} | {text} |" for name, text in rows),
+    )
 
 
 def _about(instruction: Instruction) -> Iterator[str]:
-    """Yield the reasoning pattern and relation, if any."""
-    if instruction.metadata["pattern"] is not None:
-        yield str(instruction.metadata["pattern"])
-    if instruction.metadata["relation"] is not None:
-        yield f"*{instruction.metadata['relation']}*"
-    if instruction.metadata["rival_reference"] is not None:
-        yield f"{instruction.metadata['rival_reference']}"
+    """Yield the reasoning pattern and relation, and how a rival is referred to, if any."""
+    about = instruction.metadata
+    if about["pattern"] is not None:
+        yield str(about["pattern"])
+    if about["relation"] is not None:
+        yield f"*{about['relation']}*"
+    if about["rival_reference"] is not None:
+        yield str(about["rival_reference"])
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 import textwrap
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from written_parts import table
 
 from roboirg.analysis.published import (
     TRIALS,
@@ -37,25 +38,31 @@ from roboirg.stats.intervals import (
 
 PAGE = Path(__file__).parent.parent / "docs" / "published-figures.md"
 IMPLICIT = ("direct", "reasoning", "contextual", "spatial")
-DIRECT, REASONING, SPATIAL = "direct", "reasoning", "spatial"
+DIRECT = "direct"
+REASONING = "reasoning"
+SPATIAL = "spatial"
 CELL = math.prod(TRIALS["main"])
 """Trials of a cell of the main, planner and context tables."""
 
 
-def rows_of(table: RateTable) -> Mapping[tuple[str, str], PublishedRow]:
+def rows_of(kind: RateTable) -> Mapping[tuple[str, str], PublishedRow]:
     """Return the rows of a table by model and setting, or stages in the table of contexts."""
-    return {(row.model, _condition(table, row)): row for row in published_rows(table)}
+    rows = {}
+    for row in published_rows(kind):
+        condition = row.options.setting
+        if kind == "context":
+            condition = _stages_text(row.options.stages)
+        rows[row.model, condition] = row
+    return rows
 
 
-def _condition(table: RateTable, row: PublishedRow) -> str:
-    if table == "context":
-        return ",".join(map(str, row.options.stages))
-    return row.options.setting
+def _stages_text(stages: Sequence[int]) -> str:
+    return ",".join(map(str, stages))
 
 
-def models_of(table: RateTable) -> tuple[str, ...]:
+def models_of(kind: RateTable) -> tuple[str, ...]:
     """Return the models of a table, in its order."""
-    return tuple(dict.fromkeys(row.model for row in published_rows(table)))
+    return tuple(dict.fromkeys(row.model for row in published_rows(kind)))
 
 
 def defined_tasks(row: PublishedRow) -> tuple[str, ...]:
@@ -78,13 +85,15 @@ class Comparison(NamedTuple):
         first: mean of the first.
         second: mean of the second.
         interval: of the second less the first.
-        kept: the second as a share of the first, with its interval, percent.
+        kept: the second as a share of the first, percent.
+        kept_interval: of that share.
     """
 
     first: Decimal
     second: Decimal
     interval: Interval
-    kept: tuple[float, Interval]
+    kept: float
+    kept_interval: Interval
 
     @property
     def change(self) -> Decimal:
@@ -104,14 +113,17 @@ def compare(first: PublishedRow, second: PublishedRow, tasks: Collection[str]) -
     counts as an episode of its own.
     """
     rng = np.random.default_rng(SEED)
-    drawn = [100 * resampled_rates(_trials(row, tasks), rng)[:, 0] for row in (first, second)]
+    first_rates = 100 * resampled_rates(_trials(first, tasks), rng)[:, 0]
+    second_rates = 100 * resampled_rates(_trials(second, tasks), rng)[:, 0]
     sizes = [CELL] * len(tasks)
-    change = percentile_interval(drawn[1] - drawn[0], sizes)
-    kept = percentile_interval(100 * drawn[1] / drawn[0], sizes)
-    if change is None or kept is None:
+    change = percentile_interval(second_rates - first_rates, sizes)
+    kept_interval = percentile_interval(100 * second_rates / first_rates, sizes)
+    if change is None or kept_interval is None:
         raise ValueError("a cell has too few trials for an interval")
-    means = average(first, tasks), average(second, tasks)
-    return Comparison(*means, change, (100 * float(means[1] / means[0]), kept))
+    first_mean = average(first, tasks)
+    second_mean = average(second, tasks)
+    kept = 100 * float(second_mean / first_mean)
+    return Comparison(first_mean, second_mean, change, kept, kept_interval)
 
 
 def _trials(row: PublishedRow, tasks: Collection[str]) -> list[NDArray[np.int64]]:
@@ -120,81 +132,105 @@ def _trials(row: PublishedRow, tasks: Collection[str]) -> list[NDArray[np.int64]
     for task in tasks:
         rate = row.rates[task] or Fraction(0)
         won = round(Fraction(rate) * CELL / 100)
-        found.append(np.column_stack([np.arange(CELL) < won, np.ones(CELL)]).astype(np.int64))
+        successes = np.arange(CELL) < won
+        found.append(np.column_stack([successes, np.ones(CELL)]).astype(np.int64))
     return found
 
 
-def spatial_drops() -> dict[str, tuple[Decimal, Comparison]]:
-    """Return each model's spatial drop as printed, and the comparison on the same tasks."""
-    rows, found = rows_of("main"), {}
+def printed_drops() -> dict[str, Decimal]:
+    """Return each model's spatial drop as printed: its averages are over other tasks."""
+    rows = rows_of("main")
+    drops = {}
     for model in models_of("main"):
-        explicit, spatial = rows[model, EXPLICIT], rows[model, SPATIAL]
-        same = compare(explicit, spatial, defined_tasks(spatial))
-        found[model] = explicit.average - spatial.average, same
-    return found
+        drops[model] = rows[model, EXPLICIT].average - rows[model, SPATIAL].average
+    return drops
+
+
+def spatial_changes() -> dict[str, Comparison]:
+    """Return each model's spatial setting next to explicit, on the same tasks."""
+    changes = {}
+    for (model, setting), change in setting_changes().items():
+        if setting == SPATIAL:
+            changes[model] = change
+    return changes
 
 
 def lowest_settings(tasks: Collection[str] | None = None) -> dict[str, str]:
     """Return the implicit setting with the lowest average of each model, on some tasks."""
     rows = rows_of("main")
-    found = {}
+    lowest = {}
     for model in models_of("main"):
-        means = {
-            name: average(row, tasks or defined_tasks(row))
-            for name in IMPLICIT
-            if (row := rows[model, name])
-        }
-        found[model] = min(means, key=lambda name: means[name])
-    return found
+        means = {}
+        for setting in IMPLICIT:
+            row = rows[model, setting]
+            means[setting] = average(row, tasks or defined_tasks(row))
+        lowest[model] = min(IMPLICIT, key=means.__getitem__)
+    return lowest
 
 
 def shortest_context() -> list[tuple[str, str, Comparison]]:
-    """Return for each model and task the direct setting beside the shortest context."""
-    direct, staged = rows_of("main"), rows_of("context")
-    shortest = ",".join(map(str, staged_options()[0].stages))
-    return [
-        (model, task, compare(direct[model, DIRECT], staged[model, shortest], (task,)))
-        for model in models_of("context")
-        for task in published_tasks("context")
-    ]
+    """Return for each model and task the direct setting next to the shortest context."""
+    direct = rows_of("main")
+    staged = rows_of("context")
+    shortest = _stages_text(staged_options()[0].stages)
+    cells = []
+    for model in models_of("context"):
+        for task in published_tasks("context"):
+            change = compare(direct[model, DIRECT], staged[model, shortest], (task,))
+            cells.append((model, task, change))
+    return cells
 
 
-def context_steps() -> list[tuple[str, str, str, Comparison]]:
+class Step(NamedTuple):
+    """A model's average before and after one more stage; `before` and `after` are stages."""
+
+    model: str
+    before: str
+    after: str
+    change: Comparison
+
+
+def context_steps() -> list[Step]:
     """Return each model's average before and after every further stage."""
-    rows, tasks = rows_of("context"), published_tasks("context")
-    stages = [",".join(map(str, one.stages)) for one in staged_options()]
-    return [
-        (model, before, after, compare(rows[model, before], rows[model, after], tasks))
-        for model in models_of("context")
-        for before, after in itertools.pairwise(stages)
-    ]
+    rows = rows_of("context")
+    tasks = published_tasks("context")
+    stages = [_stages_text(options.stages) for options in staged_options()]
+    steps = []
+    for model in models_of("context"):
+        for before, after in itertools.pairwise(stages):
+            change = compare(rows[model, before], rows[model, after], tasks)
+            steps.append(Step(model, before, after, change))
+    return steps
 
 
 def setting_changes() -> dict[tuple[str, str], Comparison]:
-    """Return each implicit setting beside explicit, on the tasks that have it."""
+    """Return each implicit setting next to explicit, on the tasks that have it."""
     rows = rows_of("main")
-    return {
-        (model, name): compare(rows[model, EXPLICIT], row, defined_tasks(row))
-        for model in models_of("main")
-        for name in IMPLICIT
-        if (row := rows[model, name])
-    }
+    changes = {}
+    for model in models_of("main"):
+        for setting in IMPLICIT:
+            row = rows[model, setting]
+            changes[model, setting] = compare(rows[model, EXPLICIT], row, defined_tasks(row))
+    return changes
 
 
-def half_widths() -> list[tuple[Decimal, float]]:
-    """Return the rates of the main table with half the width of their intervals, points."""
-    rates = {rate for row in published_rows("main") for rate in row.rates.values() if rate}
-    found = []
-    for rate in sorted(rates):
-        low, high = wilson_interval(round(Fraction(rate) * CELL / 100), CELL)
-        found.append((rate, 50 * (high - low)))
-    return found
+def half_widths() -> list[float]:
+    """Return half the widths of the intervals of the main table's rates of 10 to 90 %, points."""
+    widths = []
+    for row in published_rows("main"):
+        for rate in row.rates.values():
+            if rate is not None and 10 <= rate <= 90:  # noqa: PLR2004 - percent
+                low, high = wilson_interval(round(Fraction(rate) * CELL / 100), CELL)
+                widths.append(50 * (high - low))
+    return widths
 
 
 def page() -> str:
     """Return the whole page, in Markdown."""
-    parts = (_spatial(), _starts(), _trend(), _hardest(), _kept(), _widths())
-    return "\n\n".join([_INTRODUCTION, *(block for part in parts for block in part)]) + "\n"
+    blocks = [_INTRODUCTION]
+    for part in (_spatial, _starts, _trend, _hardest, _kept, _widths):
+        blocks += part()
+    return "\n\n".join(blocks) + "\n"
 
 
 _INTRODUCTION = """\
@@ -219,21 +255,23 @@ def _text(*sentences: str) -> str:
     return textwrap.fill(" ".join(sentences), 118, break_on_hyphens=False, break_long_words=False)
 
 
-def _table(heads: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
-    lines = [heads, ["---"] * len(heads), *rows]
-    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
-
-
-def _signed(one: Comparison) -> str:
-    text = f"{one.change:+}".replace("-", "−") if one.change else "0.00"
-    low, high = (f"{end:+.1f}".replace("-", "−") for end in one.interval)
-    return f"{f'**{text}**' if one.is_clear else text} ({low} to {high})"
+def _signed(comparison: Comparison) -> str:
+    text = "0.00"
+    if comparison.change:
+        text = f"{comparison.change:+}"
+    if comparison.is_clear:
+        text = f"**{text}**"
+    low, high = comparison.interval
+    return f"{text} ({low:+.1f} to {high:+.1f})".replace("-", "−")
 
 
 def _spatial() -> Iterator[str]:
-    drops, rows = spatial_drops(), rows_of("main")
+    rows = rows_of("main")
+    drops = printed_drops()
+    changes = spatial_changes()
+    models = models_of("main")
     every = len(published_tasks("main"))
-    some = len(defined_tasks(rows[next(iter(drops)), SPATIAL]))
+    some = len(defined_tasks(rows[models[0], SPATIAL]))
     yield f"## Spatial: {some} tasks against {every}"
     yield _text(
         f"The spatial setting exists for {some} tasks. The printed change of its average is from",
@@ -244,15 +282,14 @@ def _spatial() -> Iterator[str]:
         "model", "explicit, all tasks", "explicit, same tasks", "spatial", "drop as printed",
         "change on the same tasks",
     )  # fmt: skip
-    yield _table(
-        heads,
-        [
-            (model, rows[model, EXPLICIT].average, one.first, one.second, printed, _signed(one))
-            for model, (printed, one) in drops.items()
-        ],
-    )
-    printed = sorted(drops, key=lambda model: drops[model][0])
-    same = sorted(drops, key=lambda model: -drops[model][1].change)
+    lines = []
+    for model, change in changes.items():
+        explicit = rows[model, EXPLICIT].average
+        cells = (explicit, change.first, change.second, drops[model], _signed(change))
+        lines.append((model, *cells))
+    yield table(heads, lines)
+    printed = sorted(models, key=drops.__getitem__)
+    same = sorted(models, key=lambda model: -changes[model].change)
     yield _text(
         f"From the smallest drop to the largest, as printed: {', '.join(printed)};",
         f"on the same tasks: {', '.join(same)}.",
@@ -260,78 +297,94 @@ def _spatial() -> Iterator[str]:
 
 
 def _starts() -> Iterator[str]:
-    cells = shortest_context()
-    differ = [one for *_, one in cells if one.change]
+    lines = []
+    differing = 0
+    clear = 0
+    for model, task, change in shortest_context():
+        lines.append((model, task, change.first, change.second, _signed(change)))
+        differing += change.change != 0
+        clear += change.is_clear
     yield "## Context: where it starts"
     yield _text(
         "Introduction and command alone, stages 1 and 5, are what the direct setting says. The",
         "ablation's row with these stages differs from the main table's direct row in",
-        f"{len(differ)} of {len(cells)} cells; in {sum(one.is_clear for one in differ)} the",
+        f"{differing} of {len(lines)} cells; in {clear} the",
         "interval leaves out zero. Either the words are others, or two runs of the same differ",
         "this much: the figures cannot say which.",
     )
-    yield _table(
-        ("model", "task", "direct", "stages 1,5", "change"),
-        [(model, task, one.first, one.second, _signed(one)) for model, task, one in cells],
-    )
+    yield table(("model", "task", "direct", "stages 1,5", "change"), lines)
 
 
 def _trend() -> Iterator[str]:
-    rows, tasks, steps = rows_of("context"), published_tasks("context"), context_steps()
-    rises = [one for *_, one in steps if one.change > 0]
+    rows = rows_of("context")
+    tasks = published_tasks("context")
+    steps = context_steps()
+    rises = sum(step.change.change > 0 for step in steps)
+    clear = sum(step.change.is_clear for step in steps)
     yield "## Context: does success fall with every stage?"
     yield _text(
-        f"Of {len(steps)} steps to one more stage, {len(rises)} are up, and",
-        f"{sum(one.is_clear for *_, one in steps) or 'none'} has an interval without zero.",
+        f"Of {len(steps)} steps to one more stage, {rises} are up, and",
+        f"{clear or 'none'} has an interval without zero.",
         "From the shortest context to the longest every model falls.",
     )
-    heads = [f"{before} → {after}" for _, before, after, _ in steps[:3]]
     lines = []
     for model in models_of("context"):
-        own = [one for one in steps if one[0] == model]
-        whole = compare(rows[model, own[0][1]], rows[model, own[-1][2]], tasks)
-        changes = [f"{one.first} → {one.second}: {_signed(one)}" for *_, one in own]
-        lines.append((model, *changes, _signed(whole)))
-    yield _table(("model", *heads, "first to last"), lines)
+        own = [step for step in steps if step.model == model]
+        cells = [model]
+        for step in own:
+            change = step.change
+            cells.append(f"{change.first} → {change.second}: {_signed(change)}")
+        whole = compare(rows[model, own[0].before], rows[model, own[-1].after], tasks)
+        lines.append((*cells, _signed(whole)))
+    heads = [f"{step.before} → {step.after}" for step in own]
+    yield table(("model", *heads, "first to last"), lines)
 
 
 def _hardest() -> Iterator[str]:
     rows = rows_of("main")
     shared = defined_tasks(rows[models_of("main")[0], SPATIAL])
-    lowest, on_shared = lowest_settings(), lowest_settings(shared)
-    count = sum(name == REASONING for name in lowest.values())
+    lowest = lowest_settings()
+    lowest_shared = lowest_settings(shared)
     yield "## Is reasoning always the hardest?"
     yield _text(
-        f"Reasoning has the lowest average of {count} of {len(lowest)} models; on the",
-        f"{len(shared)} tasks that have every setting, of",
-        f"{sum(name == REASONING for name in on_shared.values())}. The last columns compare it",
+        f"Reasoning has the lowest average of {_hardest_for(lowest)} of {len(lowest)} models; on",
+        f"the {len(shared)} tasks that have every setting, of",
+        f"{_hardest_for(lowest_shared)}. The last columns compare it",
         "with spatial on these tasks: above zero, spatial is easier.",
     )
     lines = []
     for model in models_of("main"):
-        one = compare(rows[model, REASONING], rows[model, SPATIAL], shared)
-        lines.append((model, lowest[model], on_shared[model], one.first, one.second, _signed(one)))
-    heads = "model", "lowest, as printed", "lowest, same tasks", REASONING, SPATIAL, "change"
-    yield _table(heads, lines)
+        change = compare(rows[model, REASONING], rows[model, SPATIAL], shared)
+        cells = (change.first, change.second, _signed(change))
+        lines.append((model, lowest[model], lowest_shared[model], *cells))
+    heads = ("model", "lowest, as printed", "lowest, same tasks", REASONING, SPATIAL, "change")
+    yield table(heads, lines)
+
+
+def _hardest_for(lowest: Mapping[str, str]) -> int:
+    """Return the number of models for which reasoning is lowest."""
+    return list(lowest.values()).count(REASONING)
 
 
 def _kept() -> Iterator[str]:
-    changes = setting_changes()
+    changed = {}
+    kept = {}
+    small = []
+    for (model, setting), change in setting_changes().items():
+        changed[model, setting] = _signed(change)
+        low, high = change.kept_interval
+        kept[model, setting] = f"{change.kept:.0f} ({low:.0f} to {high:.0f})"
+        if setting == DIRECT and not change.is_clear:
+            small.append(model)
     yield "## What each model loses, and keeps"
     yield "Points from explicit, on the tasks that have the setting:"
-    yield _by_setting({key: _signed(one) for key, one in changes.items()})
-    small = [model for (model, name), one in changes.items() if name == DIRECT and not one.is_clear]
+    yield _by_setting(changed)
     yield _text(
         f"In the direct setting the changes of {', '.join(small)} have an interval with zero: not",
         "every model loses much there, with memory or without.",
     )
     yield "Percent of the explicit rate that is kept:"
-    yield _by_setting(
-        {
-            key: f"{one.kept[0]:.0f} ({one.kept[1].low:.0f} to {one.kept[1].high:.0f})"
-            for key, one in changes.items()
-        }
-    )
+    yield _by_setting(kept)
     yield _text(
         "Of the two systems that plan in words, GroundSG-QwenVL keeps most, and MemER less than",
         "pi0.5, which has no memory, in the first three settings. A low explicit rate is",
@@ -339,18 +392,20 @@ def _kept() -> Iterator[str]:
     )
 
 
-def _by_setting(cells: Mapping[tuple[str, str], str]) -> str:
-    lines = [(model, *(cells[model, name] for name in IMPLICIT)) for model in models_of("main")]
-    return _table(("model", *IMPLICIT), lines)
+def _by_setting(texts: Mapping[tuple[str, str], str]) -> str:
+    lines = []
+    for model in models_of("main"):
+        cells = [texts[model, setting] for setting in IMPLICIT]
+        lines.append((model, *cells))
+    return table(("model", *IMPLICIT), lines)
 
 
 def _widths() -> Iterator[str]:
-    widths = half_widths()
-    usual = [width for rate, width in widths if 10 <= rate <= 90]  # noqa: PLR2004 - percent
+    usual = half_widths()
     real, _ = TRIALS["real"]
     low, high = wilson_interval(real // 2, real)
     yield "## How wide is a cell?"
-    yield _table(
+    yield table(
         ("table", "trials of a cell", "half the 95 % interval (Wilson), points"),
         [
             ("main, planner, context", CELL, f"{min(usual):.0f} to {max(usual):.0f} (10 to 90 %)"),

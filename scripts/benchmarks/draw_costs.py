@@ -39,7 +39,8 @@ def physics_step(workload: Workload) -> float:
 def exported_step(workload: Workload, coding: PictureCoding) -> float:
     """Time steps whose pictures are stored in a trajectory's file; the median of all."""
     session = workload.start()
-    cameras, durations = session.world.cameras, []
+    cameras = session.world.cameras
+    durations = []
     with (
         tempfile.TemporaryDirectory() as folder,
         zipfile.ZipFile(Path(folder) / "trajectory.zip", "w") as archive,
@@ -49,7 +50,7 @@ def exported_step(workload: Workload, coding: PictureCoding) -> float:
             start = time.perf_counter()
             session.step(action)
             pictures = cameras.pictures(CAMERAS)
-            tracks.add({f"{one}_rgb": pictures[one] for one in CAMERAS})
+            tracks.add({f"{camera}_rgb": pictures[camera] for camera in CAMERAS})
             durations.append(time.perf_counter() - start)
         tracks.finish()
     return statistics.median(durations)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
@@ -52,102 +52,78 @@ def all_measures() -> tuple[Measure, ...]:
     return (*_steps(), *_resets(), *_processes(), *_workers(), *_large_runs())
 
 
-def _steps() -> tuple[Measure, ...]:
+def _steps() -> Iterator[Measure]:
     table = over_the_table()
-    # The arm works near the front camera, as in most long videos.
-    video = stretch("VideoPlaceButton", 0, first=130)
-    eager, stock = partial(eager_step, table), partial(stock_step, table)
-    floor, physics = partial(floor_step, table), partial(physics_step, table)
+    stock = partial(stock_step, table)
 
     def against_stock(goal: float, name: str, ours: Callable[[Workload], float]) -> Measure:
         return Measure(goal, name, partial(ours, table), stock, "stock", "ms")
 
-    return (
-        Measure(7, "eager step, over the table", eager, stock, "stock", "ms"),
-        Measure(
-            5,
-            "eager step, as in videos",
-            partial(eager_step, video),
-            partial(stock_step, video),
-            "stock",
-            "ms",
-        ),
-        against_stock(12, "... light meshes, over the table", partial(eager_step, rendering=LIGHT)),
-        against_stock(70, "lazy step, 16 to a picture pair", lazy_step),
-        against_stock(
-            5, "exported step, PNG, over the table", partial(exported_step, coding="png")
-        ),
-        against_stock(5, "... lossless video", partial(exported_step, coding="lossless-video")),
-        Measure(0.8, "eager step against its floor", eager, floor, "floor", "ms"),
-        Measure(
-            0.5, "step without pictures", partial(undrawn_step, table), physics, "physics", "ms"
-        ),
-    )
+    yield against_stock(7, "eager step, over the table", eager_step)
+    # The arm works near the front camera, as in most long videos.
+    video = stretch("VideoPlaceButton", 0, first=130)
+    eager = partial(eager_step, video)
+    stock_video = partial(stock_step, video)
+    yield Measure(5, "eager step, as in videos", eager, stock_video, "stock", "ms")
+    light = partial(eager_step, rendering=LIGHT)
+    yield against_stock(12, "... light meshes, over the table", light)
+    yield against_stock(70, "lazy step, 16 to a picture pair", lazy_step)
+    pictures = partial(exported_step, coding="png")
+    yield against_stock(5, "exported step, PNG, over the table", pictures)
+    lossless = partial(exported_step, coding="lossless-video")
+    yield against_stock(5, "... lossless video", lossless)
+    eager = partial(eager_step, table)
+    floor = partial(floor_step, table)
+    yield Measure(0.8, "eager step against its floor", eager, floor, "floor", "ms")
+    undrawn = partial(undrawn_step, table)
+    physics = partial(physics_step, table)
+    yield Measure(0.5, "step without pictures", undrawn, physics, "physics", "ms")
 
 
-def _resets() -> tuple[Measure, ...]:
+def _resets() -> Iterator[Measure]:
     episode = video_episode()
-    cold, stock = partial(cold_reset, episode), partial(stock_reset, episode)
+    stock = partial(stock_reset, episode)
+    cold = partial(cold_reset, episode)
+    yield Measure(4.5, "video reset, cold, all frames", cold, stock, "stock")
     on_demand = partial(cold, frames=False)
-    return (
-        Measure(4.5, "video reset, cold, all frames", cold, stock, "stock"),
-        Measure(30, "video reset, cold, frames on demand", on_demand, stock, "stock"),
-        Measure(60, "video reset, warm, all frames", partial(warm_reset, episode), stock, "stock"),
-    )
+    yield Measure(30, "video reset, cold, frames on demand", on_demand, stock, "stock")
+    warm = partial(warm_reset, episode)
+    yield Measure(60, "video reset, warm, all frames", warm, stock, "stock")
 
 
-def _processes() -> tuple[Measure, ...]:
-    following, start = partial(next_episode, "ours"), partial(process_start, "ours")
-    stock, stock_start = partial(next_episode, "stock"), partial(process_start, "stock")
-    return (
-        Measure(15, "next episode in the same process", following, stock, "stock"),
-        Measure(5, "process start to first observation", start, stock_start, "stock"),
-        Measure(
-            0.9, "steps a second of a remote policy", over_loopback, in_process, "in process", "1/s"
-        ),
-        Measure(0.9, "steps a second of a hosted policy", hosted, in_process, "in process", "1/s"),
-        Measure(50, "run engine, of an episode", engine_time, episode_time, "episode", "ms"),
-        Measure(3, "resuming with 100,000 records", resume_time),
-        Measure(0.7, "verifying an episode", verify_time),
-        Measure(0.5, "memory of a process", process_memory, unit="GiB"),
-    )
+def _processes() -> Iterator[Measure]:
+    following = partial(next_episode, "ours")
+    stock = partial(next_episode, "stock")
+    yield Measure(15, "next episode in the same process", following, stock, "stock")
+    start = partial(process_start, "ours")
+    stock_start = partial(process_start, "stock")
+    yield Measure(5, "process start to first observation", start, stock_start, "stock")
+    remote = "steps a second of a remote policy"
+    yield Measure(0.9, remote, over_loopback, in_process, "in process", "1/s")
+    own_process = "steps a second of a hosted policy"
+    yield Measure(0.9, own_process, hosted, in_process, "in process", "1/s")
+    yield Measure(50, "run engine, of an episode", engine_time, episode_time, "episode", "ms")
+    yield Measure(3, "resuming with 100,000 records", resume_time)
+    yield Measure(0.7, "verifying an episode", verify_time)
+    yield Measure(0.5, "memory of a process", process_memory, unit="GiB")
 
 
-def _workers() -> tuple[Measure, ...]:
-    """Return those of a run's workers, and of Gymnasium's."""
-    slow, waving = partial(episodes_per_hour, SlowPolicy), partial(episodes_per_hour, WavingPolicy)
-    return (
-        Measure(
-            6,
-            "episodes an hour of 16 workers, 50 ms a call",
-            partial(slow, 16),
-            partial(slow, 1),
-            "1 worker",
-            "1/h",
-        ),
-        Measure(
-            1.6,
-            "episodes an hour of 2 workers",
-            partial(waving, 2),
-            partial(waving, 1),
-            "1 worker",
-            "1/h",
-        ),
-        Measure(
-            5,
-            "steps a second of AsyncVectorEnv, chunks of 16",
-            vector_rate,
-            partial(vector_rate, 1),
-            "chunks of 1",
-            "1/s",
-        ),
-    )
+def _workers() -> Iterator[Measure]:
+    """Yield those of a run's workers, and of Gymnasium's."""
+
+    def against_one(goal: float, name: str, policy: type, workers: int) -> Measure:
+        ours = partial(episodes_per_hour, policy, workers)
+        single = partial(episodes_per_hour, policy, 1)
+        return Measure(goal, f"episodes an hour of {name}", ours, single, "1 worker", "1/h")
+
+    yield against_one(6, "16 workers, 50 ms a call", SlowPolicy, 16)
+    yield against_one(1.6, "2 workers", WavingPolicy, 2)
+    name = "steps a second of AsyncVectorEnv, chunks of 16"
+    yield Measure(5, name, vector_rate, partial(vector_rate, 1), "chunks of 1", "1/s")
 
 
-def _large_runs() -> tuple[Measure, ...]:
-    return (
-        Measure(5, "tables of 50,000 records, CPU", partial(command_time, "tables")),
-        Measure(20, "merge of 50,000 records, CPU", partial(command_time, "records merge")),
-        Measure(60, "report of 50,000 records, CPU", partial(command_time, "report")),
-        Measure(1, "... memory", partial(command_memory, "report"), unit="GiB"),
-    )
+def _large_runs() -> Iterator[Measure]:
+    yield Measure(5, "tables of 50,000 records, CPU", partial(command_time, "tables"))
+    yield Measure(20, "merge of 50,000 records, CPU", partial(command_time, "records merge"))
+    yield Measure(60, "report of 50,000 records, CPU", partial(command_time, "report"))
+    yield Measure(1, "... memory", partial(command_memory, "report"), unit="GiB")

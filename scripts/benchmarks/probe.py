@@ -83,6 +83,8 @@ if __name__ == "__main__":
         _observe(words[0], 0)
     elif what == "next":
         found = _next_episode(words[0])
+    elif what == "memory":
+        found = _memory()
     else:
-        found = _memory() if what == "memory" else _command(words)
+        found = _command(words)
     sys.stdout.write(json.dumps(found))

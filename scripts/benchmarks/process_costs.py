@@ -37,9 +37,8 @@ def process_memory() -> float:
 def probe(*words: str) -> dict[str, float]:
     """Return what the probe's process reports of itself."""
     # Bytecode is cached, as for an installed package.
-    variables = {
-        key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"
-    }
+    variables = dict(os.environ)
+    variables.pop("PYTHONDONTWRITEBYTECODE", None)
     done = subprocess.run(  # noqa: S603 - our own command
         [sys.executable, "-m", "benchmarks.probe", *words],
         check=True,

@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from written_parts import table
+
 from benchmarks.measures import Measure
 from roboirg.core.errors import InvalidValueError
 from roboirg.core.version import __version__
@@ -17,6 +19,8 @@ from roboirg.util.processor import processor_features
 
 Row = dict[str, Any]
 
+HEADS = ("measure", "ours", "baseline", "ratio", "goal", "date", "load")
+NUMBERS = ("ours", "baseline", "ratio", "goal", "load")
 _WHOLE = 1000
 """From here on values are shown as whole numbers."""
 
@@ -49,17 +53,19 @@ def run_measures(
         "load": round(load, 1),
         "roboirg": __version__,
     }
-    return [
-        {**_figures(measure, own, base), **where}
-        for measure, own, base in zip(measures, ours, baselines, strict=True)
-    ]
+    rows = []
+    for measure, own, base in zip(measures, ours, baselines, strict=True):
+        rows.append(_figures(measure, own, base) | where)
+    return rows
 
 
 def _figures(measure: Measure, ours: list[float], baseline: list[float]) -> Row:
-    value, ratio = statistics.median(ours), None
+    value = statistics.median(ours)
+    ratio = None
     if baseline:
-        ratio = value / statistics.median(baseline)
-        ratio = ratio if measure.unit.startswith("1/") else 1.0 / ratio
+        ratio = statistics.median(baseline) / value
+        if measure.unit.startswith("1/"):
+            ratio = value / statistics.median(baseline)
     return {
         "name": measure.name, "unit": measure.unit, "ours": ours, "baseline": baseline,
         "against": measure.against, "value": value, "ratio": ratio, "goal": measure.goal,
@@ -79,8 +85,11 @@ def update_figures(path: Path, measured: Sequence[Row]) -> None:
     A file of earlier results is kept up to date: what was measured now takes the place of the row
     of the same name, other rows stay.
     """
-    rows = {_key(row): row for row in read_figures(path)} if path.exists() else {}
-    rows |= {_key(row): row for row in measured}
+    rows = {}
+    if path.exists():
+        rows = {_key(row): row for row in read_figures(path)}
+    for row in measured:
+        rows[_key(row)] = row
     path.write_text(json.dumps({"figures": list(rows.values())}, indent=1) + "\n", "utf-8")
 
 
@@ -95,23 +104,27 @@ def read_figures(path: Path) -> list[Row]:
 
 def markdown_table(figures: Sequence[Mapping[str, Any]]) -> str:
     """Return rows as a table for the documents."""
-    lines = ["| measure | ours | baseline | ratio | goal | date | load |",
-             "| --- | ---: | ---: | ---: | ---: | --- | ---: |"]  # fmt: skip
+    rows = []
     for row in figures:
-        base, ratio, goal = "", "", f"at most {row['goal']:g} {row['unit']}"
+        goal = f"at most {row['goal']:g} {row['unit']}"
+        base = ""
+        ratio = ""
         if row["ratio"] is not None:
             median = statistics.median(row["baseline"])
             base = f"{_format_value(median, row['unit'])} ({row['against']})"
-            ratio, goal = f"{row['ratio']:.3g} ×", f"{row['goal']:g} ×"
+            ratio = f"{row['ratio']:.3g} ×"
+            goal = f"{row['goal']:g} ×"
         ours = _format_value(row["value"], row["unit"])
-        cells = (row["name"], ours, base, ratio, goal, row["date"], row["load"])
-        lines.append(f"| {' | '.join(map(str, cells))} |")
-    return "\n".join(lines) + "\n"
+        rows.append((row["name"], ours, base, ratio, goal, row["date"], row["load"]))
+    return table(HEADS, rows, NUMBERS) + "\n"
 
 
 def _format_value(value: float, unit: str) -> str:
-    shown = value * 1e3 if unit == "ms" else value  # times are in seconds
-    return f"{shown:,.0f} {unit}" if shown >= _WHOLE else f"{shown:.3g} {unit}"
+    if unit == "ms":
+        value *= 1e3  # times are in seconds
+    if value >= _WHOLE:
+        return f"{value:,.0f} {unit}"
+    return f"{value:.3g} {unit}"
 
 
 def _key(row: Mapping[str, Any]) -> tuple[str, str]:

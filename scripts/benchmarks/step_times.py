@@ -7,7 +7,7 @@ import gc
 import itertools
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,15 +63,22 @@ def stretch(task: str, index: int, first: int) -> Workload:
     """Play the first stages, of the demonstration or the policy, and cut out a stretch."""
     episode = get_episode(task, "test", index)
     session = EpisodeSession(episode, visible=False)
-    expert, actions = MotionPrimitives(session.world), []
-    stages = (*episode.demonstration, *episode.stages)
-    for trajectory in itertools.chain.from_iterable(expert.execute(s.primitive) for s in stages):
+    end = first + STEPS
+    actions = []
+    for trajectory in _trajectories(episode, session):
         for action in trajectory:
             session.step(action)
             actions.append(action)
-        if len(actions) >= first + STEPS:
+        if len(actions) >= end:
             break
-    return Workload(episode, np.stack(actions[:first]), np.stack(actions[first : first + STEPS]))
+    return Workload(episode, np.stack(actions[:first]), np.stack(actions[first:end]))
+
+
+def _trajectories(episode: Episode, session: EpisodeSession) -> Iterator[Iterable[Action]]:
+    """Yield the actions of each motion of the expert; the next is planned from where it ends."""
+    expert = MotionPrimitives(session.world)
+    for stage in (*episode.demonstration, *episode.stages):
+        yield from expert.execute(stage.primitive)
 
 
 def eager_step(workload: Workload, rendering: RenderSettings = FAITHFUL) -> float:

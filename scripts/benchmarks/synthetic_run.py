@@ -78,9 +78,11 @@ def _records(jobs: Iterable[Job], rng: np.random.Generator) -> Iterator[Record]:
 def _varied(record: Record, job: Job, episode: Episode, rng: np.random.Generator) -> Record:
     """Return a record with an outcome, events and times of its own."""
     share = rng.random()
-    outcome: Outcome = (
-        "success" if share < _SUCCESS else "failure" if share < _SUCCESS + _FAILURE else "error"
-    )
+    outcome: Outcome = "error"
+    if share < _SUCCESS:
+        outcome = "success"
+    elif share < _SUCCESS + _FAILURE:
+        outcome = "failure"
     events, shown = _events(episode, rng)
     if outcome != "success":
         last = rng.random() * events[-1].step
@@ -117,20 +119,24 @@ def _varied(record: Record, job: Job, episode: Episode, rng: np.random.Generator
 def _events(episode: Episode, rng: np.random.Generator) -> tuple[list[EventRecord], int]:
     """Return events that complete the stages, most of them, and the steps of the demonstration."""
     events = [(0, True, Fact("lying", item.name)) for item in episode.scene.objects]
-    step = turn = 0
+    step = 0
+    turn = 0
     for number, stage in enumerate((*episode.demonstration, *episode.stages)):
         for fact in _completing_facts(stage):
             start = step + int(rng.integers(8, 2 * _MOVE_STEPS))
             end = start + stage.lasting + int(rng.integers(2, 8))
             reached = Fact("reached", fact.subject)
-            events += [((step + start) // 2, True, reached), (start, True, fact)]
-            events += [(end, False, reached), (end, False, fact)]
+            events.append(((step + start) // 2, True, reached))
+            events.append((start, True, fact))
+            events.append((end, False, reached))
+            events.append((end, False, fact))
             step = end
         if number < len(episode.demonstration):
             turn = step + 1
-    return [
-        EventRecord(step=at - turn, holds=holds, **fact._asdict()) for at, holds, fact in events
-    ], turn
+    records = []
+    for at, holds, fact in events:
+        records.append(EventRecord(step=at - turn, holds=holds, **fact._asdict()))
+    return records, turn
 
 
 def _completing_facts(stage: Stage) -> tuple[Fact, ...]:

@@ -44,7 +44,8 @@ class WavingPolicy:
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         """Restart the swing from the arm's current position."""
         del instruction, demonstration
-        self._start, self._step = None, 0
+        self._start = None
+        self._step = 0
 
     def act(self, observation: Observation) -> NDArray[np.floating[Any]]:
         """Return the next actions."""
@@ -87,7 +88,8 @@ class SlowPolicy:
     ) -> list[NDArray[np.floating[Any]]]:
         """Return the next sixteen actions of each episode."""
         time.sleep(CALL_S)
-        return [state.act(one) for state, one in zip(states, observations, strict=True)]
+        pairs = zip(states, observations, strict=True)
+        return [state.act(observation) for state, observation in pairs]
 
 
 def steps_per_second(policy: type, workers: int) -> float:
@@ -107,7 +109,8 @@ def episodes_per_hour(policy: type, workers: int, max_steps: int = MAX_STEPS) ->
         max_steps=max_steps,
     )
     # Without the beginning, when some workers still start, and the end, when some have no more.
-    first, last = 4 * workers, count - workers
+    first = 4 * workers
+    last = count - workers
     times = []
     with tempfile.TemporaryDirectory() as folder:
         runner = EpisodeRunner(Path(folder), hosting=plan.hosting.settings)
