@@ -79,6 +79,14 @@ def test_a_point_off_the_thing_is_wrong_whatever_the_words() -> None:
     assert verdict("remain static", waits.stages[1], waits, {"button"}) == "right"
 
 
+def test_another_color_is_wrong_where_the_stage_points_at_nothing() -> None:
+    episode = get_episode("SwingXtimes", "test", 3)
+    down = episode.stages[-2]
+    assert (plain_subgoal(down), down.points_at) == ("put the green cube on the table", None)
+    assert verdict("put the green cube on the table", down, episode) == "right"
+    assert verdict("put the red cube on the table", down, episode) == "wrong_thing"
+
+
 def test_equal_cubes_stand_for_each_other_in_any_order_as_often_as_they_are_meant() -> None:
     episode = get_episode("BinFill", "test", 7)  # one blue cube and four green ones
     first = episode.stages[0]

@@ -332,7 +332,7 @@ def _covering_place(chunks: Chunks, found: re.Match[str]) -> Description | None:
 
 def _covering_it(chunks: Chunks, found: re.Match[str]) -> Description:
     """Return a thing as it is: *over it* says no more."""
-    return _thing(found, "thing", chunks)._replace(is_shown=False)
+    return _thing(found, "thing", chunks)
 
 
 def _shown(chunks: Chunks, found: re.Match[str]) -> Description:
