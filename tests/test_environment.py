@@ -20,6 +20,7 @@ from roboirg.core.actions import ACTION_SPACES
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.core.instruction_options import OPTION_NAMES
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.envs.env_settings import EnvOptions, EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
@@ -69,7 +70,7 @@ def test_depth_and_calibration_are_there_for_the_cameras_asked_for():
     observation, info = env.reset()
     assert observation in env.observation_space
     fields = {
-        "front_depth": ((256, 256, 1), np.int16),
+        "front_depth": ((PICTURE_SIZE, PICTURE_SIZE, 1), np.int16),
         "front_extrinsic": ((3, 4), np.float32),
         "front_intrinsic": ((3, 3), np.float32),
     }
@@ -99,8 +100,9 @@ def test_subgoals_are_grounded_once_their_object_is_seen_and_then_frozen():
     # Projected by hand; the center of a container is some 4 cm above the table.
     z = 0.04
     distance = -0.44721 * x - 0.89443 * z + 0.49194
-    row = 128 + 128 * (0.89443 * x - 0.44721 * z - 0.08944) / distance
-    column = 128 + 128 * y / distance
+    middle = PICTURE_SIZE / 2
+    row = middle + middle * (0.89443 * x - 0.44721 * z - 0.08944) / distance
+    column = middle + middle * y / distance
     assert (int(found[1]), int(found[2])) == pytest.approx((row, column), abs=6)
     texts = {(info["subgoal"], info["grounded_subgoal"])}
     policy = make_policy("oracle", 0)

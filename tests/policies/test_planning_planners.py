@@ -20,6 +20,7 @@ from planning_fakes import (
 import roboirg
 from roboirg.core.episode import Primitive
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.policies import Policy, PrivilegedPolicy, make_policy, play
 from roboirg.policies.contract.base import SubgoalEnd
 from roboirg.policies.hands.scripted_hands import ScriptedHands
@@ -31,7 +32,7 @@ from roboirg.policies.vlm.models import ModelOptions
 
 CHUNK = 16
 GO = "pick up the red cube at <|box_start|>(500,250)<|box_end|>"
-SUBGOAL = "pick up the red cube at <128, 64>"
+SUBGOAL = f"pick up the red cube at <{PICTURE_SIZE // 2}, {PICTURE_SIZE // 4}>"
 KINDS = ("qwen", "gemini", "memer")
 ANSWERS = {
     "qwen": GO,

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from roboirg.core.actions import JOINT_LOW, POSE_SIZE
 from roboirg.core.environment_options import DemonstrationFrames
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.simulation.proprioception import Proprioception
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
-from roboirg.simulation.rendering.viewpoint import SIZE
 from roboirg.simulation.world import World
 
 
@@ -128,10 +128,10 @@ def picture_fields(spec: ObservationSpec) -> dict[str, FieldFormat]:
     """Return the format of each field that is drawn."""
     formats = {}
     for camera in spec.cameras:
-        formats[f"{camera}_rgb"] = FieldFormat((SIZE, SIZE, 3), np.uint8)
+        formats[f"{camera}_rgb"] = FieldFormat((PICTURE_SIZE, PICTURE_SIZE, 3), np.uint8)
     if spec.depth:
         for camera in spec.cameras:
-            formats[f"{camera}_depth"] = FieldFormat((SIZE, SIZE, 1), np.int16)
+            formats[f"{camera}_depth"] = FieldFormat((PICTURE_SIZE, PICTURE_SIZE, 1), np.int16)
     return formats
 
 

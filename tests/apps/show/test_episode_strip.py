@@ -16,6 +16,7 @@ from roboirg.apps.show.playthrough import (
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
 from roboirg.core.motions import Away, Glow, Point, Shuttle, Swap, Vanish
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.tasks.splits.splits import get_episode
 
 pytest.importorskip("matplotlib")
@@ -124,7 +125,7 @@ def test_a_playthrough_shows_the_start_each_stage_and_the_end(snapshot):
     played = play_through(get_episode("VideoUnmask", "test", 3))
     assert (played.verdict, played.moments[-1].step) == ("success", played.steps)
     assert [(one.step, one.caption, one.is_demonstration) for one in played.moments] == snapshot
-    assert all(one.picture.shape == (256, 256, 3) for one in played.moments)
+    assert all(one.picture.shape == (PICTURE_SIZE, PICTURE_SIZE, 3) for one in played.moments)
     assert len({one.picture.tobytes() for one in played.moments}) > 2
 
 

@@ -63,7 +63,7 @@ from roboirg.stats.rates import (
 )
 
 UNATTRIBUTED = "not attributed"
-FAILURES: Mapping[str, str] = {
+FAILURE_KINDS: Mapping[str, str] = {
     **{name: failure.kind for name, failure in failures.FAILURES.items()},
     UNATTRIBUTED: "",
 }
@@ -197,7 +197,7 @@ def count_failures(frame: Frame, by: Sequence[str]) -> Mapping[Key, Counter[str]
         counts = counts_by_key[tuple(values)]
         counts["trials"] += 1
         if outcome == "failure":
-            name = failure if failure in FAILURES else UNATTRIBUTED
+            name = failure if failure in FAILURE_KINDS else UNATTRIBUTED
             counts[name] += 1
     return counts_by_key
 
@@ -289,7 +289,7 @@ def make_failure_name_table(data: RunData) -> Table:
     occurring: Counter[str] = Counter()
     for counts in counts_by_scope.values():
         occurring += counts
-    names = [name for name in FAILURES if name in occurring]
+    names = [name for name in FAILURE_KINDS if name in occurring]
     if not names:
         raise InvalidValueError("No episode of the runs failed.")
 
@@ -298,7 +298,7 @@ def make_failure_name_table(data: RunData) -> Table:
         failed = [counts[name] for name in names]
         return list(map(str, (counts["trials"], sum(failed), *failed)))
 
-    failure_columns = [Column(name.replace("_", " "), FAILURES[name]) for name in names]
+    failure_columns = [Column(name.replace("_", " "), FAILURE_KINDS[name]) for name in names]
     return Table(
         key="failure_names",
         title="Failures by name",

@@ -16,7 +16,7 @@ from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, known_name
 from roboirg.core.field_types import check_whole
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.observations import CAMERAS, check_cameras
+from roboirg.core.observations import CAMERAS, PICTURE_SIZE, check_cameras
 from roboirg.core.word_pools import PoolName, pool_of
 from roboirg.language.generator import instruct_with
 from roboirg.language.instruction_row import row
@@ -24,7 +24,6 @@ from roboirg.language.scenarios.identity import language_label
 from roboirg.language.settings import all_settings
 from roboirg.language.variants import instructions
 from roboirg.tasks.splits.splits import get_episode
-from roboirg.util.media import PICTURE_SIZE
 from roboirg.util.short_hash import short_hash
 
 FormatName = Literal["lerobot-v3", "lerobot-v2.1", "robomme-hdf5"]
