@@ -57,12 +57,15 @@ def test_what_is_due_is_right_and_another_act_is_lost(task: str) -> None:
         ("ButtonUnmaskSwap", 0, "press the second button", "right"),
         ("ButtonUnmaskSwap", 0, "press the button", "right"),
         ("SwingXtimes", 1, "move to the top of the left-side target", "wrong_place"),
+        ("SwingXtimes", 7, "put the green cube on the table", "right"),
+        # It points at nothing, so no cube is meant but the one in the hand.
+        ("SwingXtimes", 7, "put the red cube on the table", "wrong_thing"),
         ("PutInBox", 1, "put it into the green box", "wrong_place"),
         ("StopCube", 1, "remain static for 30 steps", "right"),
     ],
 )
 def test_what_is_wrong(task: str, number: int, said: str, expected: str) -> None:
-    index = 30 if task == "PutInBox" else 0
+    index = {"PutInBox": 30, "SwingXtimes": 3}.get(task, 0)
     episode = get_episode(task, "test", index)
     assert verdict(said, episode.stages[number], episode) == expected
 
@@ -77,14 +80,6 @@ def test_a_point_off_the_thing_is_wrong_whatever_the_words() -> None:
     assert verdict(plain_subgoal(place), place, episode, set()) == "wrong_place"
     waits = get_episode("StopCube", "test", 0)
     assert verdict("remain static", waits.stages[1], waits, {"button"}) == "right"
-
-
-def test_another_color_is_wrong_where_the_stage_points_at_nothing() -> None:
-    episode = get_episode("SwingXtimes", "test", 3)
-    down = episode.stages[-2]
-    assert (plain_subgoal(down), down.points_at) == ("put the green cube on the table", None)
-    assert verdict("put the green cube on the table", down, episode) == "right"
-    assert verdict("put the red cube on the table", down, episode) == "wrong_thing"
 
 
 def test_equal_cubes_stand_for_each_other_in_any_order_as_often_as_they_are_meant() -> None:

@@ -67,6 +67,7 @@ def test_difficulties_select_the_episodes_that_have_them_in_every_task() -> None
     assert hard == tuple(range(3, 50, 4))
     both = parse_episodes("hard, medium", "test", tasks)
     assert both == tuple(sorted({*hard, *range(2, 50, 4)}))
+    assert parse_episodes("hard,0,3", "test", tasks) == (*hard, 0)
     # The difficulties of two tasks of this split have another order in part.
     uneven = parse_episodes("hard", "val", tasks)
     assert len(uneven) < len(parse_episodes("hard", "val", ("BinFill",)))

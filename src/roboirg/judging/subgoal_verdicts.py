@@ -64,7 +64,8 @@ def judge_subgoal(
 
     if said == right:
         return "right"
-    meant = _objects(episode.scene, right_things, due.points_at)
+    # A stage may point at nothing; None would stand for all that is inside of nothing.
+    meant = _objects(episode.scene, {*right_things, due.points_at} - {None})
     # "Pick up the cube" without a color or a point does not name one of several cubes.
     if pointed_at is None and _is_vague(said, right) and _have_alike(meant, episode.scene):
         return "wrong_thing"
@@ -138,13 +139,8 @@ def _places(stage: Stage) -> frozenset[str | None]:
     return frozenset(fact.place for fact in facts_of(stage.expects))
 
 
-def _objects(
-    scene: Scene, right_things: AbstractSet[str], points_at: str | None
-) -> list[SceneObject]:
-    """Return the right things and the one to point at, if any, and the cubes inside of these."""
-    names = set(right_things)
-    if points_at is not None:  # or else each thing that is inside of nothing would be found
-        names.add(points_at)
+def _objects(scene: Scene, names: Collection[str | None]) -> list[SceneObject]:
+    """Return the objects of some names, and the cubes that are inside such an object."""
     return [item for item in scene.objects if item.name in names or item.inside in names]
 
 

@@ -120,9 +120,9 @@ def test_a_trajectory_s_name_has_all_that_it_depends_on(make_plan):
     assert set(spec) == set(job.spec._fields)
     words = (replace(job.options, setting="direct"), replace(job.options, form="resolved"))
     others = [
-        *(job._replace(**{name: value}) for name, value in fields.items()),
-        *(job._replace(spec=job.spec._replace(**{name: value})) for name, value in spec.items()),
-        *(job._replace(options=one) for one in words),
+        *(replace(job, **{name: value}) for name, value in fields.items()),
+        *(replace(job, spec=job.spec._replace(**{name: value})) for name, value in spec.items()),
+        *(replace(job, options=one) for one in words),
     ]
     assert len({one.path(Path()) for one in (job, *others)}) == 1 + len(others)
 

@@ -173,7 +173,8 @@ class TaskText(NamedTuple):
     facts: dict[str, Any]
 
 
-class RecordingJob(NamedTuple):
+@dataclass(frozen=True)
+class RecordingJob:
     """One trajectory to record.
 
     Attributes:
@@ -267,9 +268,9 @@ def _jobs_of(plan: ExportPlan, episode: Episode) -> list[SpokenJob]:
         spec=plan.recording,
     )
     if plan.policy != ORACLE:
-        return [SpokenJob(job._replace(options=text.options), (text,)) for text in texts]
+        return [SpokenJob(replace(job, options=text.options), (text,)) for text in texts]
     variations = range(plan.variations)
-    return [SpokenJob(job._replace(variation=number), texts) for number in variations]
+    return [SpokenJob(replace(job, variation=number), texts) for number in variations]
 
 
 def _texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:

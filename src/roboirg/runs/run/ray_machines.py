@@ -19,6 +19,7 @@ import socket
 import tempfile
 import threading
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -43,7 +44,8 @@ _PID_SUFFIX = ".pid"
 """Of empty files named after the processes of a run on a machine."""
 
 
-class MachineVersions(NamedTuple):
+@dataclass(frozen=True)
+class MachineVersions:
     """What must be the same on every machine, or records of one run would differ.
 
     Attributes:
