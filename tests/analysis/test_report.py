@@ -131,19 +131,17 @@ def test_what_is_amiss_is_said_first() -> None:
 
 
 def what_a_reader_sees(page: Page) -> str:
-    """The notes of all cells, then each episode: what can be chosen of it, and its details."""
+    """The notes of all cells; what can be chosen, of each episode; and the details of each."""
     lines: list[str] = []
     for level in page.data["matrix"]["levels"]:
-        lines.append(level["difficulty"] or "all")
         for cell in level["cells"]:
             lines += cell["note"]
-    for number, details in enumerate(page.details):
-        chosen = []
-        for choice in page.data["choices"]:
-            place = page.data["columns"][choice["name"]][number]
-            chosen.append([*choice["values"], "–"][place])  # -1 for none
-        lines.append(", ".join(chosen))
-        lines += [f"  {name}: {details[name]}" for name in details]
+    for choice in page.data["choices"]:
+        values = [*choice["values"], "none"]  # whose place is -1
+        chosen = [values[place] for place in page.data["columns"][choice["name"]]]
+        lines.append(f"{choice['label']}: {chosen}")
+    for details in page.details:
+        lines += [f"{name}: {details[name]}" for name in details]
     return "\n".join([*lines, page.notes])
 
 

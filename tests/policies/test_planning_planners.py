@@ -20,19 +20,19 @@ from planning_fakes import (
 import roboirg
 from roboirg.core.episode import Primitive
 from roboirg.core.errors import InvalidValueError
-from roboirg.core.observations import PICTURE_SIZE
 from roboirg.policies import Policy, PrivilegedPolicy, make_policy, play
 from roboirg.policies.contract.base import SubgoalEnd
 from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.planners import make_planner as make_by_kind
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.planners.oracle_planner import OraclePlanner
+from roboirg.policies.planners.points import to_pixel
 from roboirg.policies.planners.vlm_planner import MOST_USELESS
 from roboirg.policies.vlm.models import ModelOptions
 
 CHUNK = 16
 GO = "pick up the red cube at <|box_start|>(500,250)<|box_end|>"
-SUBGOAL = f"pick up the red cube at <{PICTURE_SIZE // 2}, {PICTURE_SIZE // 4}>"
+SUBGOAL = f"pick up the red cube at <{to_pixel(500)}, {to_pixel(250)}>"
 KINDS = ("qwen", "gemini", "memer")
 ANSWERS = {
     "qwen": GO,

@@ -63,7 +63,6 @@ def test_over_it_leaves_a_thing_the_one_in_the_video():
     chunks = Chunks("lift the same container over it")
     read_things(chunks)
     _, container = chunks.tokens()
-    assert container.text.endswith("over it")
     assert container.value.is_shown
 
 
