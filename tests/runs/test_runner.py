@@ -279,9 +279,10 @@ def test_machines_of_other_versions_are_named() -> None:
     random = read_policy("random")
     here = MachineVersions.expected((unknown_policy("x"), random))
     assert here.difference(MachineVersions.expected((read_policy("oracle"), random))) is None
-    there = here._replace(language="2.0.1")
+    there = dataclasses.replace(here, language="2.0.1")
     assert (
         here.difference(there) == f"its language has version 2.0.1 there and {here.language} here"
     )
-    other = here._replace(policies=(here.policies[0], dataclasses.replace(random, version="old")))
+    older = dataclasses.replace(random, version="old")
+    other = dataclasses.replace(here, policies=(here.policies[0], older))
     assert str(here.difference(other)).startswith("the policy version of random is old there")
