@@ -20,6 +20,7 @@ from roboirg.core.actions import ACTION_SPACES
 from roboirg.core.environment_options import ENVIRONMENT_OPTIONS
 from roboirg.core.errors import InvalidValueError, RoboIRGError, UnknownNameError
 from roboirg.core.instruction_options import OPTION_NAMES
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.envs.env_settings import EnvOptions, EnvSettings
 from roboirg.envs.environment import RoboIRGEnv
@@ -72,7 +73,7 @@ def test_depth_and_calibration_are_there_for_the_cameras_asked_for():
     assert observation in env.observation_space
 
     fields = {
-        "front_depth": ((256, 256, 1), np.int16),
+        "front_depth": ((PICTURE_SIZE, PICTURE_SIZE, 1), np.int16),
         "front_extrinsic": ((3, 4), np.float32),
         "front_intrinsic": ((3, 3), np.float32),
     }
@@ -102,8 +103,10 @@ def test_a_subgoal_is_grounded_once_its_object_is_seen():
     x, y, _ = env.episode.scene[container].position
     z = 0.04
     distance = -0.44721 * x - 0.89443 * z + 0.49194
-    assert row == pytest.approx(128 + 128 * (0.89443 * x - 0.44721 * z - 0.08944) / distance, abs=6)
-    assert column == pytest.approx(128 + 128 * y / distance, abs=6)
+    middle = PICTURE_SIZE / 2
+    expected_row = middle + middle * (0.89443 * x - 0.44721 * z - 0.08944) / distance
+    assert row == pytest.approx(expected_row, abs=6)
+    assert column == pytest.approx(middle + middle * y / distance, abs=6)
 
 
 def test_a_grounded_subgoal_is_frozen_until_its_stage_is_over():

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from roboirg.analysis.comparability import IMPLICIT, REAL, differences_of
 from roboirg.analysis.measures.run_data import RunData
-from roboirg.analysis.published import MAX_STEPS
+from roboirg.analysis.published import PUBLISHED_MAX_STEPS
 from roboirg.analysis.results.run_cells import cells_of
 from roboirg.analysis.tables.paper_tables import make_table
 from roboirg.analysis.tables.rendering import FORMATS
@@ -61,7 +61,7 @@ def differences(results, planned=()) -> tuple[str, ...] | None:
         ({"episodes": [*range(49), 50]}, ("49 of 50 episodes",)),
         ({"split": "val"}, ("split val",)),
         ({"split": "random"}, ("split random",)),
-        ({"max_steps": 1500}, (f"1500 steps instead of {MAX_STEPS}",)),
+        ({"max_steps": 1500}, (f"1500 steps instead of {PUBLISHED_MAX_STEPS}",)),
         ({"meshes": "light"}, ("light meshes",)),
         ({"demonstration_frames": "none"}, ("frames of the video: none",)),
         ({"environment_version": 99}, ("environment version 99",)),

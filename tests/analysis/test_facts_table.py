@@ -12,7 +12,7 @@ from flat_jobs import job_of
 from made_records import make_record
 from page_text import call, store
 
-from roboirg.analysis.tables.facts_table import NOT_APPLICABLE, NOT_REPORTED, RUN
+from roboirg.analysis.tables.facts_table import NO_NETWORK, NOT_REPORTED, RUN
 from roboirg.core.inference_facts import InferenceFacts, inference_facts
 from roboirg.records.record import Record
 from roboirg.runs.plan.plan_maker import make_plan
@@ -116,7 +116,7 @@ MINE = InferenceFacts(
         (
             {},
             {"network": "none"},
-            {"dtype": NOT_APPLICABLE, "preprocessing": NOT_APPLICABLE, "device": NOT_REPORTED},
+            {"dtype": NO_NETWORK, "preprocessing": NO_NETWORK, "device": NOT_REPORTED},
         ),
         (  # The policy behind a planner does not speak for the planner.
             {},

@@ -177,6 +177,13 @@ def test_a_pose_that_cannot_be_reached_and_what_came_before(task):
     assert play.finding(timed_out=False) is None
 
 
+def test_an_episode_that_ends_in_its_demonstration_has_a_failure() -> None:
+    episode = get_episode("VideoPlaceOrder", "test", 1)
+    found = attribute_failure(episode, [], timed_out=True, policy_start_step=0, elapsed_steps=50)
+    assert found is not None
+    assert found.failure == "no_attempt"
+
+
 # Who does what is meant, and who does something else perfectly
 
 

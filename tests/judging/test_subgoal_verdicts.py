@@ -57,12 +57,15 @@ def test_what_is_due_is_right_and_another_act_is_lost(task):
         ("ButtonUnmaskSwap", 0, "press the second button", "right"),
         ("ButtonUnmaskSwap", 0, "press the button", "right"),
         ("SwingXtimes", 1, "move to the top of the left-side target", "wrong_place"),
+        ("SwingXtimes", 7, "put the green cube on the table", "right"),
+        # It points at nothing, so no cube is meant but the one in the hand.
+        ("SwingXtimes", 7, "put the red cube on the table", "wrong_thing"),
         ("PutInBox", 1, "put it into the green box", "wrong_place"),
         ("StopCube", 1, "remain static for 30 steps", "right"),
     ],
 )
 def test_a_subgoal_is_judged_by_what_is_wrong_with_it(task, number, said, expected):
-    index = 30 if task == "PutInBox" else 0
+    index = {"PutInBox": 30, "SwingXtimes": 3}.get(task, 0)
     episode = get_episode(task, "test", index)
     assert verdict(said, episode.stages[number], episode) == expected
 

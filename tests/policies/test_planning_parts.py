@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.core.policy_needs import (
     merge_demonstration_frames,
     merge_observe_every,
@@ -55,7 +56,7 @@ def test_points_are_scaled_row_first_all_at_once(point, reply, points):
 
 @given(thousandths)
 def test_a_pixel_is_floored_and_stays_in_the_picture(value):
-    assert to_pixel(value) == min(int(Fraction(256 * value, 1000)), 255)
+    assert to_pixel(value) == min(int(Fraction(PICTURE_SIZE * value, 1000)), PICTURE_SIZE - 1)
 
 
 @pytest.mark.parametrize(

@@ -26,12 +26,13 @@ from roboirg.policies.hands.scripted_hands import ScriptedHands
 from roboirg.policies.planners import make_planner as make_by_kind
 from roboirg.policies.planners.hierarchical_policy import HierarchicalPolicy
 from roboirg.policies.planners.oracle_planner import OraclePlanner
+from roboirg.policies.planners.points import to_pixel
 from roboirg.policies.planners.query_schedule import MOST_USELESS
 from roboirg.policies.vlm.models import ModelOptions
 
 CHUNK = 16
 GO = "pick up the red cube at <|box_start|>(500,250)<|box_end|>"
-SUBGOAL = "pick up the red cube at <128, 64>"
+SUBGOAL = f"pick up the red cube at <{to_pixel(500)}, {to_pixel(250)}>"
 KINDS = ("qwen", "gemini", "memer")
 ANSWERS = {
     "qwen": GO,

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from roboirg import reader
 from roboirg.language import instruct
 from roboirg.reader import interpret
+from roboirg.reader.phrases import Chunks
+from roboirg.reader.things import read_things
 from roboirg.reader.tokens import FILLERS, split_sentences
 from roboirg.reader.vocabulary import is_known
 from roboirg.tasks import every_task, get_task
@@ -57,6 +59,13 @@ def test_any_text_gives_one_goal_or_a_complaint(task, text):
 def test_endless_places_are_given_up():
     text = "Take the cube " + "closest to the cube " * 300 + "at the far left."
     assert interpret(text, PICK, "PickXtimes").goals == ()
+
+
+def test_over_it_leaves_a_thing_the_one_in_the_video():
+    chunks = Chunks("lift the same container over it")
+    read_things(chunks)
+    _, container = chunks.tokens()
+    assert container.value.is_shown
 
 
 @pytest.mark.parametrize("text", ["", "  ", "...", "\n", "?!", "I like the red cube."])

@@ -5,6 +5,8 @@ import os
 
 import numpy as np
 
+from roboirg.core.observations import PICTURE_SIZE
+
 
 class Pointer:
     """Names two subgoals of a form, and then the second again."""
@@ -21,7 +23,7 @@ class Pointer:
         self.ends.append(end)
 
     def plan(self, observation, step):
-        self.pictures += observation["front_rgb"].shape == (256, 256, 3)
+        self.pictures += observation["front_rgb"].shape == (PICTURE_SIZE, PICTURE_SIZE, 3)
         return "pick up the container" if self.ends else "remain static for 5 steps"
 
     @property

@@ -64,6 +64,7 @@ def test_difficulties_select_the_episodes_that_have_them_in_every_task():
 
     both = parse_episodes("hard, medium", "test", tasks)
     assert both == tuple(sorted({*hard, *range(2, 50, 4)}))
+    assert parse_episodes("hard,0,3", "test", tasks) == (*hard, 0)
 
     # The difficulties of two tasks of this split have another order in part.
     uneven = parse_episodes("hard", "val", tasks)

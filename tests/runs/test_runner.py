@@ -295,8 +295,9 @@ def test_machines_of_other_versions_are_named():
     random = read_policy("random")
     here = MachineVersions((unknown_policy("x"), random))
     assert here.difference(MachineVersions((read_policy("oracle"), random))) is None
-    there = here._replace(installed=here.installed._replace(package_version="9"))
+    there = dataclasses.replace(here, installed=here.installed._replace(package_version="9"))
     own = here.installed.package_version
     assert here.difference(there) == f"the package version is 9 there and {own} here"
-    other = here._replace(policies=(here.policies[0], dataclasses.replace(random, version="old")))
+    older = dataclasses.replace(random, version="old")
+    other = dataclasses.replace(here, policies=(here.policies[0], older))
     assert str(here.difference(other)).startswith("the policy version of random is old there")

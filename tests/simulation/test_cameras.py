@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-from roboirg.core.observations import CAMERAS
+from roboirg.core.observations import CAMERAS, PICTURE_SIZE
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.simulation.world import World
 from roboirg.tasks.splits.splits import get_episode
+
+MIDDLE = PICTURE_SIZE // 2
 
 pytestmark = pytest.mark.sim
 
@@ -28,7 +30,7 @@ def test_the_front_camera_stands_where_robomme_s_does(cameras):
     expected = [[0, 1, 0, 0], [0.89443, 0, -0.44721, -0.08944], [-0.44721, 0, -0.89443, 0.49194]]
     assert cameras.extrinsic("front") == pytest.approx(np.array(expected), abs=1e-5)
     for camera in CAMERAS:
-        matrix = [[128, 0, 128], [0, 128, 128], [0, 0, 1]]
+        matrix = [[MIDDLE, 0, MIDDLE], [0, MIDDLE, MIDDLE], [0, 0, 1]]
         assert cameras.intrinsic(camera) == pytest.approx(np.array(matrix), abs=1e-4)
 
 
@@ -36,10 +38,10 @@ def test_depth_of_the_bare_table_is_as_computed_by_hand(cameras):
     # A pixel's ray meets z = 0 at a depth of height / slope. Camera axes in the world: down is
     # (0.894, 0, -0.447), forward (-0.447, 0, -0.894), and the eye is 0.4 above the table.
     depth = cameras.depth("front")
-    assert (depth.shape, depth.dtype) == ((256, 256, 1), np.int16)
+    assert (depth.shape, depth.dtype) == ((PICTURE_SIZE, PICTURE_SIZE, 1), np.int16)
     for row in (104, 150, 200):
-        slope = 0.894427 + 0.447214 * (row + 0.5 - 128) / 128
-        assert depth[row, 128, 0] == pytest.approx(400 / slope, abs=1)
+        slope = 0.894427 + 0.447214 * (row + 0.5 - MIDDLE) / MIDDLE
+        assert depth[row, MIDDLE, 0] == pytest.approx(400 / slope, abs=1)
 
 
 @pytest.mark.parametrize("camera", CAMERAS)

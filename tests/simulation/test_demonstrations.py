@@ -14,6 +14,7 @@ from flat_jobs import job_of
 from selection import slow_but
 
 import roboirg
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.runs.play.rollout import EpisodeRunner
 from roboirg.simulation.cameras import Cameras
 from roboirg.simulation.episode_session import EpisodeSession
@@ -159,7 +160,7 @@ def test_nothing_is_drawn_before_it_is_read(drawn):
 
     env.close()
     assert world() is None
-    assert video["wrist_rgb"].shape == (66, 256, 256, 3)
+    assert video["wrist_rgb"].shape == (66, PICTURE_SIZE, PICTURE_SIZE, 3)
     assert drawn == ["front", "wrist"] + ["wrist"] * 66
 
     other = pickle.loads(pickle.dumps(video))  # noqa: S301 - our own

@@ -6,11 +6,11 @@ import sapien
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.simulation.rendering.viewpoint import (
     FOCAL_LENGTH,
     FRONT_EYE,
     FRONT_TARGET,
-    SIZE,
     reach_pixels,
     to_front_camera,
 )
@@ -26,9 +26,9 @@ def covered(corners, shift):
 
     `shift` displaces its corners, pixels.
     """
-    places = FOCAL_LENGTH * corners[..., :2] / corners[..., 2:] + SIZE / 2
+    places = FOCAL_LENGTH * corners[..., :2] / corners[..., 2:] + PICTURE_SIZE / 2
     places = np.round((places + shift) * GRID) / GRID
-    ticks = np.arange(SIZE // 2 - WINDOW, SIZE // 2 + WINDOW) + 0.5
+    ticks = np.arange(PICTURE_SIZE // 2 - WINDOW, PICTURE_SIZE // 2 + WINDOW) + 0.5
     x, y = np.meshgrid(ticks, ticks)
     (ax, ay), (bx, by) = (
         np.moveaxis(corner, -1, 0)[..., None, None]
@@ -77,7 +77,7 @@ def test_what_lies_between_the_middles_of_pixels_is_left_out():
 
 
 def test_what_is_out_of_the_picture_is_left_out_and_what_is_at_the_eye_is_kept():
-    beside = square(1.0, 8, center=(SIZE, 0))
+    beside = square(1.0, 8, center=(PICTURE_SIZE, 0))
     behind = square(1.0, 8) * [1, 1, -1]
     assert reach_pixels(np.concatenate([beside, behind])).tolist() == [False] * 2 + [True] * 2
 

@@ -393,7 +393,8 @@ def test_a_reader_is_trained_for_a_body_that_is_there_and_goes_on_where_it_was(t
     reader = load_reader(out)
     body = load_body(SHIPPED.body)
     assert (reader.plan["tasks"], reader.plan["body"]) == (["StopCube"], body.version)
-    assert reader.vocabulary[1:] == (body.sight.classes, *body.goals)
+    assert reader.vocabulary.classes == body.sight.classes
+    assert reader.vocabulary[2:] == (body.goals.tasks, body.goals.parts)
     assert not list(tmp_path.rglob("recordings"))
     out.unlink()
     again = CliRunner().invoke(app, call)

@@ -11,7 +11,7 @@ from roboirg_learn.policy.trained_reader import TrainedReader
 
 def reader_for(classes, goals, **plan):
     """Return a reader that fits a body of these classes and goals."""
-    vocabulary = Vocabulary(("cube", "pick"), classes, *goals)
+    vocabulary = Vocabulary(("cube", "pick"), classes, goals.tasks, goals.parts)
     about = ReaderPlan(goals.tasks, **plan).about
     task_net = TaskNet(vocabulary).eval()
     net = ListenerNet(vocabulary).eval()

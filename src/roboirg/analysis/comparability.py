@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from roboirg.analysis.published import MAX_STEPS, TRIALS, published_tasks
+from roboirg.analysis.published import PUBLISHED_MAX_STEPS, TRIALS, published_tasks
 from roboirg.analysis.results.frame import RunNames
 from roboirg.analysis.results.policy_run import PolicyRun
 from roboirg.analysis.results.run_cells import CellKey
@@ -147,8 +147,8 @@ def _explicit_differences(policy_run: PolicyRun, cell: Cell) -> Iterator[str]:
         yield f"split {conditions.split}"
     elif played < episodes:
         yield f"{played} of {counted(episodes, 'episode')}"
-    if environment.max_steps != MAX_STEPS:
-        yield f"{environment.max_steps} steps instead of {MAX_STEPS}"
+    if environment.max_steps != PUBLISHED_MAX_STEPS:
+        yield f"{environment.max_steps} steps instead of {PUBLISHED_MAX_STEPS}"
     if environment.meshes != DEFAULT_MESHES:
         yield f"{environment.meshes} meshes"
     if environment.demonstration_frames not in (None, "all"):

@@ -36,7 +36,7 @@ TRIALS: Mapping[RateTable, Trials] = {
     "context": Trials(50, 3),
     "real": Trials(10, 1),
 }
-MAX_STEPS = 1300
+PUBLISHED_MAX_STEPS = 1300
 """Control steps that the published policies had."""
 
 _SIMULATED = (

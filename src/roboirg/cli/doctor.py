@@ -323,6 +323,7 @@ def _draw_test_frame(render_s: int) -> None:
         RoboIRGError: no device can render, or there is no picture.
     """
     # Imported here because only the child process may load them.
+    from roboirg.core.observations import PICTURE_SIZE
     from roboirg.simulation.rendering.render_device import describe_device, find_render_device
     from roboirg.simulation.world import World
     from roboirg.tasks.splits import get_episode
@@ -338,7 +339,8 @@ def _draw_test_frame(render_s: int) -> None:
     colors = len(set(map(bytes, pixels)))
     if colors < _FEWEST_COLORS:
         raise RenderDeviceError(f"the picture of a scene has only {colors} colors.")
-    sys.stdout.write(f"256 x 256 pixels in {time.perf_counter() - start:.1f} s\n")
+    duration = time.perf_counter() - start
+    sys.stdout.write(f"{PICTURE_SIZE} x {PICTURE_SIZE} pixels in {duration:.1f} s\n")
     _go_on_drawing(world, render_s)
 
 

@@ -35,7 +35,7 @@ TERMINATED = 143
 """Exit codes."""
 EXECUTORS = ("local", "ray")
 
-PlanName = Annotated[
+RunPlan = Annotated[
     str | None,
     typer.Option(
         "--plan",
@@ -61,7 +61,7 @@ def run(
             help="Output folder; give the same folder again to resume.", show_default="required"
         ),
     ] = None,
-    plan: PlanName = None,
+    plan: RunPlan = None,
     workers: Workers = None,
     executor: Annotated[
         str, typer.Option(help="Where to play: local, or ray (cluster address in RAY_ADDRESS).")

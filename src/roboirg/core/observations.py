@@ -14,6 +14,9 @@ FRONT = "front"
 WRIST = "wrist"
 CAMERAS = (FRONT, WRIST)
 
+PICTURE_SIZE = 256
+"""Width and height of the pictures in observations, pixels: of both cameras, and of depth."""
+
 DemonstrationSource = Literal["none", "recorded", "planned"]
 """Who moves the robot in a demonstration: RoboMME's recorded actions, or the oracle; ``none``
 without a demonstration."""

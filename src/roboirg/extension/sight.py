@@ -15,7 +15,7 @@ from roboirg.core.actions import WAYPOINT
 from roboirg.core.episode import ROBOT_BASE, Episode, SceneObject
 from roboirg.core.errors import MotionPlanningError
 from roboirg.core.motions import Point
-from roboirg.core.observations import FRONT, Demonstration, Pixels
+from roboirg.core.observations import FRONT, PICTURE_SIZE, Demonstration, Pixels
 from roboirg.envs.environment import RoboIRGEnv
 from roboirg.envs.factory import make
 from roboirg.policies.builtin.waypoint_expert import Disturbance, WaypointExpert
@@ -26,7 +26,7 @@ from roboirg.simulation.episode_session import EpisodeSession
 from roboirg.simulation.panda import JointTrajectory, Panda
 from roboirg.simulation.physics_settings import HOME_ACTION
 from roboirg.simulation.proprioception import Proprioception, ProprioceptiveState, euler_angles
-from roboirg.simulation.rendering.viewpoint import FOCAL_LENGTH, SIZE, front_camera_matrix
+from roboirg.simulation.rendering.viewpoint import FOCAL_LENGTH, front_camera_matrix
 from roboirg.simulation.world import World
 from roboirg.util.media import Picture, decode_png, encode_png
 
@@ -161,7 +161,7 @@ def points_of(positions: NDArray[np.floating]) -> NDArray[np.float64]:
     in_camera = positions @ rotation.T + matrix[:3, 3]
     # Pixels to the right of the picture's center, and down from it.
     offsets = FOCAL_LENGTH * in_camera[..., :2] / in_camera[..., 2:]
-    points: NDArray[np.float64] = SIZE / 2 + offsets
+    points: NDArray[np.float64] = PICTURE_SIZE / 2 + offsets
     return points
 
 
@@ -179,7 +179,7 @@ def places_of(points: NDArray[np.floating], heights: NDArray[np.floating]) -> Fl
     """
     matrix = front_camera_matrix()
     rotation = matrix[:3, :3]
-    slopes = (points - SIZE / 2) / FOCAL_LENGTH
+    slopes = (points - PICTURE_SIZE / 2) / FOCAL_LENGTH
     in_camera = np.column_stack([slopes, np.ones(len(points))])
     # The matrix leads from the world to the camera, so its inverse is applied: the rotation's
     # transpose, to the rays and to the camera's own position.

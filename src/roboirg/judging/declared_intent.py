@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from roboirg.core.episode import Episode, SlotValue, describe_goal, values_in
 from roboirg.core.failures import FailureName
@@ -17,7 +17,8 @@ _FAILURES: Mapping[str, FailureName] = {
 """The failure of a policy whose last subgoal got a verdict."""
 
 
-class DeclaredIntent(NamedTuple):
+@dataclass(frozen=True)
+class DeclaredIntent:
     """What a listener understood, or how a planner's subgoals compare with what was due.
 
     Attributes:

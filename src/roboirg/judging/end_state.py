@@ -219,7 +219,7 @@ def judge_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> FailureAttribut
 
 def _meant_at_end(replay: EpisodeReplay) -> frozenset[str]:
     """Return the names of the objects that the stage means that is current at the end."""
-    current = max(replay.expected_stage, 0)
+    current = replay.expected_stage
     return meant_objects(replay.stages, current, replay.episode.scene, replay.facts[-1])
 
 
@@ -287,7 +287,7 @@ def _describe(
     replay: EpisodeReplay, failure: FailureName, subject: str | None, step: int, words: str
 ) -> FailureAttribution:
     """Return a failure in words, and what is expected at the end."""
-    expected = describe_expected(replay.stages[max(replay.expected_stage, 0)])
+    expected = describe_expected(replay.stages[replay.expected_stage])
     return FailureAttribution.of(failure, subject, step, f"{words}; {expected}")
 
 

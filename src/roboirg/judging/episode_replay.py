@@ -96,8 +96,11 @@ class EpisodeReplay:
 
     @property
     def expected_stage(self) -> int:
-        """Index of the stage that is expected at the end, or at the verdict."""
-        return self.judge.index - len(self.episode.demonstration)
+        """Index of the policy's stage that is expected at the end, or at the verdict.
+
+        The first one if the episode ended in the demonstration.
+        """
+        return max(self.judge.index - len(self.episode.demonstration), 0)
 
     @property
     def acted_since(self) -> int:

@@ -65,7 +65,8 @@ def judge_subgoal(
 
     if said.words == right.words:
         return "right"
-    meant = _objects(episode.scene, {*right_things, due.points_at})
+    # A stage may point at nothing; None would stand for all that is inside of nothing.
+    meant = _objects(episode.scene, {*right_things, due.points_at} - {None})
     # "Pick up the cube" without a color or a point does not name one of several cubes.
     if pointed_at is None and said.is_vaguer(right) and _have_alike(meant, episode.scene):
         return "wrong_thing"

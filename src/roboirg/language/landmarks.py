@@ -17,7 +17,8 @@ from roboirg.core.motions import Away
 MARGIN = 0.03
 """Meters by which a landmark's object must exceed all others in the compared quantity."""
 COLUMN_MARGIN = 6.0
-"""The same in columns of the front camera's picture (256 pixels wide)."""
+"""The same in columns of the front camera's picture, 256 pixels wide. What words mean does not
+depend on how many pixels observations have."""
 
 _PICTURE_MIDDLE = 128.0
 """Column of the front camera's axis, and as many columns for a tangent of 1 from there."""

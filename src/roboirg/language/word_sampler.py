@@ -13,7 +13,7 @@ from roboirg.core.episode import Episode
 
 LANGUAGE_VERSION = "4.7.0"
 """The version of all words. Every change of words needs a new one."""
-DRAWS = "4.5.0"
+DRAWS_VERSION = "4.5.0"
 """Key of all random draws: an older version, so that only the words that were mended change."""
 
 Option = TypeVar("Option")
@@ -69,7 +69,7 @@ def sampler_of(episode: Episode, variant: int = 0) -> WordSampler:
 
 def sampler_for(key: str) -> WordSampler:
     """Return the sampler of a key."""
-    return WordSampler(f"{DRAWS}|{key}")
+    return WordSampler(f"{DRAWS_VERSION}|{key}")
 
 
 # Cached: all settings and forms of an episode draw the same.

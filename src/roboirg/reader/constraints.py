@@ -11,7 +11,7 @@ from roboirg.core.episode import Goal, Scene, SlotValue
 from roboirg.reader.command import Act
 from roboirg.reader.referents import Referents
 from roboirg.reader.series import Target, TargetWay, Visit
-from roboirg.reader.things import ALL, Description
+from roboirg.reader.things import ALL_OF_THEM, Description
 
 Values = set[str] | set[int] | None
 """The values that a slot can have; None for any."""
@@ -389,7 +389,7 @@ class _Command:
         if thing.noun not in ("cube", "one"):
             raise UnfitWordsError(f'there is no "{thing.noun}" to put into the bin')
         if thing.is_open:
-            if thing.number in (None, ALL):
+            if thing.number in (None, ALL_OF_THEM):
                 raise UnfitWordsError("does not understand how many cubes are meant")
             colors = self._referents.colors
         else:
@@ -400,7 +400,7 @@ class _Command:
         """Return how many cubes of a color a description means."""
         if thing.number is None:
             raise UnfitWordsError("does not understand how many cubes are meant")
-        if thing.number == ALL:
+        if thing.number == ALL_OF_THEM:
             return self._referents.count_of(color)
         return thing.number
 

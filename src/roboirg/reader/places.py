@@ -35,7 +35,7 @@ _CUBE_HEIGHT = 0.02
 _TIE = 0.01
 """Meters; the same words may mean things that differ by less."""
 _TANGENT_TIE = 2 / 128
-"""Two pixels, as a tangent: the picture is 256 pixels wide and 90 degrees."""
+"""Two pixels, as a tangent, of a picture with 256 columns and 90 degrees, whatever is observed."""
 _WIDE_TIE = 0.03
 """Meters, for *next to*, *between* and *in the middle*."""
 

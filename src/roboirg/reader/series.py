@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from roboirg.reader.phrases import Found, Rule, compiled
+from roboirg.reader.phrases import Found, PhraseRule, compiled
 from roboirg.reader.tokens import ADVERBS, number_of, ordinal_of
 
 Relation = Literal["before", "after"]
@@ -223,22 +223,22 @@ def _relation(word: str) -> Relation | None:
 
 TARGET_RULES = (
     # Before single targets: "from your right to your left target".
-    Rule("way", _WAY, _way),
-    Rule("target", _SIDE_TARGET, _side_target),
-    Rule("target", _PRESS_TARGET, _target),
-    Rule("target", _WHERE, _target),
+    PhraseRule("way", _WAY, _way),
+    PhraseRule("target", _SIDE_TARGET, _side_target),
+    PhraseRule("target", _PRESS_TARGET, _target),
+    PhraseRule("target", _WHERE, _target),
     # Before single placements: "the target of the last placement".
-    Rule("target", _TARGET, _target),
-    Rule("target", _PLACING, _target),
+    PhraseRule("target", _TARGET, _target),
+    PhraseRule("target", _PLACING, _target),
     # After targets, which these may hold: "the second time it passes target#1".
-    Rule("passed", _PASSED, _times),
-    Rule("visit", _VISIT, _visit),
-    Rule("visit", _NEXT, _next_visit),
+    PhraseRule("passed", _PASSED, _times),
+    PhraseRule("visit", _VISIT, _visit),
+    PhraseRule("visit", _NEXT, _next_visit),
 )
 """Targets, and visits of a cube to one; where nothing is said, the order does not matter."""
 TIMES_RULES = (
     # Before other numbers: "three times more".
-    Rule("more", _MORE, _times),
-    Rule("times", _TIMES, _times),
+    PhraseRule("more", _MORE, _times),
+    PhraseRule("times", _TIMES, _times),
 )
 """Repetitions."""

@@ -12,12 +12,12 @@ import re
 from collections.abc import Mapping
 from typing import Literal, NamedTuple, cast
 
-from roboirg.reader.phrases import Chunks, Found, Rewrites, Rule, compiled
+from roboirg.reader.phrases import Chunks, Found, PhraseRule, Rewrites, compiled
 from roboirg.reader.places import Place, Side
 from roboirg.reader.tokens import color_of, number_of, ordinal_of
 
-Moment = Literal["first", "last"]
-ALL = -1
+PlaceMoment = Literal["first", "last"]
+ALL_OF_THEM = -1
 """The number of *all red cubes*."""
 
 
@@ -27,7 +27,7 @@ class Description(NamedTuple):
     Attributes:
         noun: ``cube``, ``container``, ``box`` or ``tape``; ``one`` for any of them.
         color: of the thing.
-        number: how many of them, or `ALL`; None if the words do not say.
+        number: how many of them, or `ALL_OF_THEM`; None if the words do not say.
         is_definite: whether it is *the* or *that*, so that it may have been named before.
         is_shown: whether it is the one that the video shows.
         place: where it stands.
@@ -42,7 +42,7 @@ class Description(NamedTuple):
     is_definite: bool = False
     is_shown: bool = False
     place: Place | None = None
-    moment: Moment | None = None
+    moment: PlaceMoment | None = None
     under: Description | None = None
     like: Description | None = None
 
@@ -273,7 +273,7 @@ def _named(found: Found) -> Description:
 def _number_by(determiner: str, *, is_plural: bool) -> int | None:
     """Return how many things words without a number mean: *a cube* is one; None if unclear."""
     if determiner in ("all", "each", "every", "both"):
-        return ALL
+        return ALL_OF_THEM
     if determiner in ("a", "an", "another", "the", "") and not is_plural:
         return 1
     return None
@@ -311,7 +311,7 @@ def _covering_place(found: Found) -> Description | None:
 def _covering_it(found: Found) -> Description:
     """Return a thing as it is: *over it* says no more."""
     thing: Description = found.value("thing")
-    return thing._replace(is_shown=False)
+    return thing
 
 
 def _shown(found: Found) -> Description:
@@ -339,7 +339,7 @@ def _over(thing: Description, under: Description) -> Description | None:
     return thing._replace(noun="container", under=under._replace(noun="cube"))
 
 
-def _moment(*words: str) -> Moment | None:
+def _moment(*words: str) -> PlaceMoment | None:
     """Return the moment of a place: *now* is the last one, *was* and *at first* the first."""
     text = " ".join(words)
     if re.search(r"\b(?:now|currently|at the moment)\b", text):
@@ -351,28 +351,28 @@ def _moment(*words: str) -> Moment | None:
 
 _NAMES = (
     # "two of each color" and "blue's container" hold a number, a color or a noun of their own.
-    Rule("each", _EACH, _number_of_each),
-    Rule("thing", _OWNED, _owned),
+    PhraseRule("each", _EACH, _number_of_each),
+    PhraseRule("thing", _OWNED, _owned),
     # With a noun before those without: "red cube", then "red".
-    Rule("thing", _NAMED, _named),
-    Rule("thing", _COLORED, _named),
+    PhraseRule("thing", _NAMED, _named),
+    PhraseRule("thing", _COLORED, _named),
 )
 """Things by their names."""
 _PLACE_RULES = [
-    Rule("place", compiled(pattern, _PARTS), functools.partial(_place, place=place))
+    PhraseRule("place", compiled(pattern, _PARTS), functools.partial(_place, place=place))
     for pattern, place in _PLACES.items()
 ]
 _DESCRIPTIONS = (
     *_PLACE_RULES,
-    Rule("place", _AMONG, _member),
+    PhraseRule("place", _AMONG, _member),
     # A place goes to the nearest thing: "the container over the cube in the middle".
-    Rule("thing", _STANDING, _standing),
-    Rule("thing", _COVERING, _covering),
-    Rule("thing", _COVERING_PLACE, _covering_place),
-    Rule("thing", _COVERING_IT, _covering_it),
-    Rule("thing", _COVERED, _covering),
-    Rule("thing", _SHOWN, _shown),
+    PhraseRule("thing", _STANDING, _standing),
+    PhraseRule("thing", _COVERING, _covering),
+    PhraseRule("thing", _COVERING_PLACE, _covering_place),
+    PhraseRule("thing", _COVERING_IT, _covering_it),
+    PhraseRule("thing", _COVERED, _covering),
+    PhraseRule("thing", _SHOWN, _shown),
 )
 """Places, and words that describe a thing and stand behind it."""
-_LIKENESSES = (Rule("thing", _LIKE, _like),)
+_LIKENESSES = (PhraseRule("thing", _LIKE, _like),)
 """Things of the color of another one, whose description has been read."""

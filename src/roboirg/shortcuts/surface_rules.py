@@ -7,7 +7,7 @@ takes what the command states plainly, and decides about the slots that the comm
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import NamedTuple
+from dataclasses import dataclass
 
 from roboirg.core.goal_slots import SLOT_TYPE_NAMES
 from roboirg.reader.tokens import Sentence, number_of
@@ -28,7 +28,8 @@ _REACH = 2
 """Words between a difference and its number: *two visits before*."""
 
 
-class SlotWords(NamedTuple):
+@dataclass(frozen=True)
+class SlotWords:
     """What a rule sees of one slot that the command leaves open.
 
     Attributes:

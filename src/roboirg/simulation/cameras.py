@@ -17,7 +17,7 @@ import sapien
 import sapien.render
 from numpy.typing import NDArray
 
-from roboirg.core.observations import CAMERAS, FRONT, WRIST, Pixels
+from roboirg.core.observations import CAMERAS, FRONT, PICTURE_SIZE, WRIST, Pixels
 from roboirg.core.waiting import DRAWING
 from roboirg.simulation.panda import CAMERA_LINK, Panda
 from roboirg.simulation.rendering.culling import CullableBodies
@@ -32,7 +32,6 @@ from roboirg.simulation.rendering.viewpoint import (
     FAR,
     FIELD_OF_VIEW,
     NEAR,
-    SIZE,
     front_camera_pose,
 )
 
@@ -203,7 +202,7 @@ def _make_camera(name: str, shader: str) -> sapien.render.RenderCameraComponent:
         name: of the camera.
         shader: folder of its shader; empty for SAPIEN's own.
     """
-    component = sapien.render.RenderCameraComponent(SIZE, SIZE, shader)
+    component = sapien.render.RenderCameraComponent(PICTURE_SIZE, PICTURE_SIZE, shader)
     component.set_fovy(FIELD_OF_VIEW, compute_x=True)
     component.near = NEAR
     component.far = FAR

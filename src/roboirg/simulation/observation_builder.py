@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,14 +12,15 @@ from numpy.typing import NDArray
 from roboirg.core.actions import JOINT_LOW, POSE_SIZE
 from roboirg.core.environment_options import DemonstrationFrames
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.simulation.proprioception import Proprioception
 from roboirg.simulation.rendering.render_settings import FAITHFUL, RenderSettings
-from roboirg.simulation.rendering.viewpoint import SIZE
 from roboirg.simulation.world import World
 
 
-class ObservationSpec(NamedTuple):
+@dataclass(frozen=True)
+class ObservationSpec:
     """Fields of observations and of the video besides proprioception.
 
     Attributes:
@@ -44,11 +46,11 @@ class ObservationSpec(NamedTuple):
         """The spec of the observations in ``history``."""
         if self.history_cameras is None:
             return self
-        return self._replace(cameras=self.history_cameras)
+        return replace(self, cameras=self.history_cameras)
 
     def validated(self) -> ObservationSpec:
         """Return this spec, with the cameras as a tuple, if it is valid."""
-        fields = self._asdict()
+        fields = dict(vars(self))
         del fields["rendering"]
         needs = PolicyNeeds(**fields)  # which checks them
         for camera in needs.history_cameras or ():
@@ -56,7 +58,7 @@ class ObservationSpec(NamedTuple):
                 raise InvalidValueError(
                     f"history_cameras has {camera!r}, but cameras is {needs.cameras}; add it there."
                 )
-        return self._replace(cameras=needs.cameras)
+        return replace(self, cameras=needs.cameras)
 
 
 class ObservationBuilder:
@@ -128,10 +130,10 @@ def picture_fields(spec: ObservationSpec) -> dict[str, FieldFormat]:
     """Return the format of each field that is drawn."""
     formats = {}
     for camera in spec.cameras:
-        formats[f"{camera}_rgb"] = FieldFormat((SIZE, SIZE, 3), np.uint8)
+        formats[f"{camera}_rgb"] = FieldFormat((PICTURE_SIZE, PICTURE_SIZE, 3), np.uint8)
     if spec.depth:
         for camera in spec.cameras:
-            formats[f"{camera}_depth"] = FieldFormat((SIZE, SIZE, 1), np.int16)
+            formats[f"{camera}_depth"] = FieldFormat((PICTURE_SIZE, PICTURE_SIZE, 1), np.int16)
     return formats
 
 

@@ -96,7 +96,7 @@ class Panda:
             rendering: how pictures are drawn.
         """
         hull = _hull(records, rendering)
-        bodies = {}  # by the cameras that draw them
+        bodies: dict[tuple[str, ...], sapien.render.RenderBodyComponent] = {}  # by cameras
         cameras: tuple[str, ...] = CAMERAS
         if link == BASE_LINK and rendering.culling:
             # The base never moves; of it the front camera draws only what reaches a pixel.

@@ -30,8 +30,6 @@ _LABEL_X = 4
 _LABEL_Y = 14
 _LABEL_SCALE = 0.45
 """Place and size of a frame's label, as in `draw_text`."""
-PICTURE_SIZE = 256
-"""Width and height of the pictures in observations, pixels."""
 
 
 class Picture(NamedTuple):
@@ -74,7 +72,7 @@ def evenly_spaced(count: int, most: int) -> NDArray[np.intp]:
     return np.linspace(0, count - 1, min(count, most)).round().astype(np.intp)
 
 
-def scaled_square(picture: NDArray[Any], size: int = PICTURE_SIZE) -> NDArray[Any]:
+def scaled_square(picture: NDArray[Any], size: int) -> NDArray[Any]:
     """Crop a picture to its central square and scale it to `size` x `size` pixels."""
     import cv2
 
@@ -176,14 +174,14 @@ def _check_pyav() -> None:
         import av  # noqa: F401 - an extra, and slow to import
 
 
-Color = tuple[int, int, int]
+Rgb = tuple[int, int, int]
 """RGB, 0 to 255."""
 
 _FONT = 0  # cv2.FONT_HERSHEY_SIMPLEX; importing OpenCV is slow
 
 
 def draw_text(
-    image: Pixels, text: str, x: int, y: int, scale: float, color: Color, thickness: int = 1
+    image: Pixels, text: str, x: int, y: int, scale: float, color: Rgb, thickness: int = 1
 ) -> None:
     """Draw a line of text into a picture; characters outside ASCII become ``?``.
 

@@ -9,7 +9,7 @@ import numpy as np
 from roboirg.apps.demonstrations.trajectory import TrajectoryFacts, write_arrays
 from roboirg.apps.demonstrations.trajectory_recorder import PictureTracks
 from roboirg.core.episode import ENVIRONMENT_VERSION
-from roboirg.core.observations import CAMERAS
+from roboirg.core.observations import CAMERAS, PICTURE_SIZE
 from roboirg.util.atomic_write import replacing
 
 STEPS = 7
@@ -17,16 +17,16 @@ STEPS = 7
 
 
 def picture(camera, seed, row):
-    """Return a picture (256, 256, 3) with large areas and some noise."""
+    """Return a picture with large areas and some noise."""
     rng = np.random.default_rng((CAMERAS.index(camera), seed, row))
-    found = np.zeros((256, 256, 3), np.uint8)
+    found = np.zeros((PICTURE_SIZE, PICTURE_SIZE, 3), np.uint8)
     found[:] = rng.integers(0, 256, 3)
     found[40:60, 10 * row % 200 : 10 * row % 200 + 30] = rng.integers(0, 256, (20, 30, 3))
     return found
 
 
 def depth(seed, row):
-    return np.full((256, 256, 1), 400 + seed % 100 + row, np.int16)
+    return np.full((PICTURE_SIZE, PICTURE_SIZE, 1), 400 + seed % 100 + row, np.int16)
 
 
 def arrays_of(episode, rows, video_length, *, has_depth, disturbed=False):

@@ -129,11 +129,11 @@ def test_a_trajectory_s_name_has_all_that_it_depends_on(make_plan):
     }  # fmt: skip
     assert set(spec) == set(job.spec._fields)
 
-    others = [job._replace(**{name: value}) for name, value in fields.items()]
+    others = [replace(job, **{name: value}) for name, value in fields.items()]
     for name, value in spec.items():
-        others.append(job._replace(spec=job.spec._replace(**{name: value})))
+        others.append(replace(job, spec=job.spec._replace(**{name: value})))
     for words in ({"setting": "direct"}, {"form": "resolved"}):
-        others.append(job._replace(options=replace(job.options, **words)))
+        others.append(replace(job, options=replace(job.options, **words)))
 
     assert len({exported.path(Path()) for exported in (job, *others)}) == 1 + len(others)
 
@@ -229,7 +229,7 @@ def test_other_options_and_folders_are_refused(tmp_path, export, make_plan, monk
             for other in ({"format": "lerobot-v2.1"}, {"video": True})
         ),
         *(
-            ({"cameras": ("front",), **other}, r"cameras is front and size 256; .* both cam")
+            ({"cameras": ("front",), **other}, r"cameras is front and size .*; .* both cam")
             for other in ({"format": "robomme-hdf5"}, {"format": "lerobot-v2.1"})
         ),
     ],

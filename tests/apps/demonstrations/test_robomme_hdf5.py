@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 import synthetic_trajectories as synthetic
 
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.language import instruct
 from roboirg.tasks.splits.splits import get_episode
 
 h5py = pytest.importorskip("h5py")
 
 SHAPES = {
-    "obs/front_rgb": ("uint8", (256, 256, 3)),
-    "obs/wrist_rgb": ("uint8", (256, 256, 3)),
-    "obs/front_depth": ("int16", (256, 256, 1)),
-    "obs/wrist_depth": ("int16", (256, 256, 1)),
+    "obs/front_rgb": ("uint8", (PICTURE_SIZE, PICTURE_SIZE, 3)),
+    "obs/wrist_rgb": ("uint8", (PICTURE_SIZE, PICTURE_SIZE, 3)),
+    "obs/front_depth": ("int16", (PICTURE_SIZE, PICTURE_SIZE, 1)),
+    "obs/wrist_depth": ("int16", (PICTURE_SIZE, PICTURE_SIZE, 1)),
     "obs/front_camera_extrinsic": ("float32", (3, 4)),
     "obs/wrist_camera_extrinsic": ("float32", (3, 4)),
     "obs/joint_state": ("float32", (7,)),

@@ -19,6 +19,7 @@ from roboirg.apps.demonstrations.trajectory import (
 )
 from roboirg.apps.demonstrations.trajectory_recorder import RecordingSpec
 from roboirg.core.errors import InvalidValueError
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.tasks.splits.splits import get_episode
 
 
@@ -70,7 +71,7 @@ def test_a_damaged_trajectory_is_named(tmp_path):
 
 @pytest.mark.parametrize(("coding", "most"), [("lossless-video", 0.0), ("lossy-video", 4.0)])
 def test_a_video_shows_what_was_encoded(coding, most):
-    encoder = VideoEncoder(coding, 256)
+    encoder = VideoEncoder(coding, PICTURE_SIZE)
     pictures = np.stack([synthetic.picture("front", 7, row) for row in range(25)])
     for picture in pictures:
         encoder.add(picture)

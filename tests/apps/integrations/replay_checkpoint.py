@@ -10,10 +10,12 @@ from lerobot.processor import (
 from replay_policy.configuration_replay import ReplayConfig
 from replay_policy.modeling_replay import ReplayPolicy
 
+from roboirg.core.observations import PICTURE_SIZE
+
 
 def save_checkpoint(folder, table):
     """Save a policy that repeats the actions of a table, as LeRobot saves policies."""
-    picture = PolicyFeature(type=FeatureType.VISUAL, shape=(3, 256, 256))
+    picture = PolicyFeature(type=FeatureType.VISUAL, shape=(3, PICTURE_SIZE, PICTURE_SIZE))
     config = ReplayConfig(
         device="cpu",
         table=str(table),

@@ -10,13 +10,14 @@ import numpy as np
 
 from roboirg.apps.policy_check.expert_episode import ExpertEpisode, ExpertMoment
 from roboirg.core.actions import JOINT_HIGH, JOINT_LOW
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.core.policy_needs import PolicyNeeds
 
 MOMENTS = 20
 ROWS = 16
 REST = np.array([0.0, 0.2, 0.0, -2.1, 0.0, 2.4, 0.8])
 TEXT = "Take the red cube and press the button."
-PICTURE = np.zeros((256, 256, 3), np.uint8)
+PICTURE = np.zeros((PICTURE_SIZE, PICTURE_SIZE, 3), np.uint8)
 
 
 def path_from(joints, motion):

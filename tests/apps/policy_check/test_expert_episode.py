@@ -9,6 +9,7 @@ import pytest
 from roboirg.apps.policy_check.expert_episode import MAX_ROWS, ExpertEpisode, record_expert
 from roboirg.apps.policy_check.policy_check import check_policy
 from roboirg.core.errors import RenderDeviceError
+from roboirg.core.observations import PICTURE_SIZE
 
 pytestmark = pytest.mark.sim
 ROWS = 16
@@ -36,7 +37,7 @@ def test_a_recorded_episode_is_what_the_expert_did():
         assert 1 <= len(moment.actions) <= MAX_ROWS
         # The arm follows its targets.
         assert np.abs(moment.actions[-1, :7] - after.still).max() < 0.1
-        assert moment.observation["front_rgb"].shape == (256, 256, 3)
+        assert moment.observation["front_rgb"].shape == (PICTURE_SIZE, PICTURE_SIZE, 3)
 
     grips = {float(moment.actions[0, -1]) for moment in moments}
     assert grips == {-1.0, 1.0}

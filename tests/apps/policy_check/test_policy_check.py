@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from roboirg.apps.policy_check.check_result import CheckResult
 from roboirg.apps.policy_check.commands import check_policy as command
 from roboirg.apps.policy_check.policy_check import check_policy, print_check_results
-from roboirg.core.observations import CAMERAS
+from roboirg.core.observations import CAMERAS, PICTURE_SIZE
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.policies.contract.synthetic_episodes import SyntheticEpisodes
 
@@ -204,7 +204,7 @@ def test_made_up_observations_have_depth_matrices_and_a_history_that_ends_in_the
 
     for seen in (episode.first, later):
         for camera in CAMERAS:
-            assert seen[f"{camera}_depth"].shape == (256, 256, 1)
+            assert seen[f"{camera}_depth"].shape == (PICTURE_SIZE, PICTURE_SIZE, 1)
             assert seen[f"{camera}_extrinsic"].shape == (3, 4)
             assert seen[f"{camera}_intrinsic"].shape == (3, 3)
     assert len(later["history"]) == 4

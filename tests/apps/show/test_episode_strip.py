@@ -16,6 +16,7 @@ from roboirg.apps.show.playthrough import (
 from roboirg.core.conditions import Fact
 from roboirg.core.episode import Scene
 from roboirg.core.motions import Away, Glow, Point, Shuttle, Swap, Vanish
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.tasks.splits.splits import get_episode
 
 pytest.importorskip("matplotlib")
@@ -132,7 +133,8 @@ def test_a_playthrough_shows_the_start_each_stage_and_the_end(snapshot):
     assert [
         (moment.step, moment.caption, moment.is_demonstration) for moment in played.moments
     ] == snapshot
-    assert all(moment.picture.shape == (256, 256, 3) for moment in played.moments)
+    for moment in played.moments:
+        assert moment.picture.shape == (PICTURE_SIZE, PICTURE_SIZE, 3)
     assert len({moment.picture.tobytes() for moment in played.moments}) > 2
 
 

@@ -20,8 +20,9 @@ from roboirg_learn.listener.object_relations import SeenObjects
 
 CELL = 8
 """Pixels of a cell of the grid in which objects are found."""
-SIZE = 256
-GRID = SIZE // CELL
+INPUT_SIZE = 256
+"""Rows and columns of the pictures that trained detectors read, so no other size will do."""
+GRID = INPUT_SIZE // CELL
 CHANNELS = (16, 32, 64, 64)
 MAX_OBJECTS = 20
 MIN_SCORE = 0.3

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, get_args
+from typing import Any, Literal, get_args
 
 import torch
 from torch import nn
@@ -30,7 +31,8 @@ Without the video, nothing is seen of a scene that has one.
 """
 
 
-class LearnedModel(NamedTuple):
+@dataclass(frozen=True)
+class LearnedModel:
     """A trained listener.
 
     Attributes:

@@ -21,7 +21,7 @@ from pydantic import PositiveInt
 from roboirg.extension.episodes import ENVIRONMENT_VERSION, Episode, episodes_of
 from roboirg.extension.sight import LabeledView
 from roboirg_learn.labeled_views import draw_missing, look, read_views
-from roboirg_learn.listener.detector_net import SIZE, DetectorNet, detector_loss
+from roboirg_learn.listener.detector_net import INPUT_SIZE, DetectorNet, detector_loss
 from roboirg_learn.listener.encoders import ENCODERS
 from roboirg_learn.listener.learned_model import LearnedModel, Without, hide
 from roboirg_learn.listener.object_relations import (
@@ -219,7 +219,7 @@ def _plane_of(labeled: LabeledEpisodes) -> TablePlane:
     views = _views_in(labeled.by_key)
     centers = np.concatenate([view.centers for view in views])
     positions = np.concatenate([view.positions for view in views])
-    return fit_plane(centers / SIZE, positions)
+    return fit_plane(centers / INPUT_SIZE, positions)
 
 
 def _see_each(
@@ -278,7 +278,7 @@ def _labels(views: Iterable[LabeledView], classes: Sequence[str]) -> list[SeenOb
     found = []
     for view in views:
         kinds = np.array([numbers[name] for name in view.names], np.int64)
-        found.append(SeenObjects(kinds, view.centers / np.float32(SIZE)))
+        found.append(SeenObjects(kinds, view.centers / np.float32(INPUT_SIZE)))
     return found
 
 

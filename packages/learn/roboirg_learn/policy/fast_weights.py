@@ -34,7 +34,7 @@ from roboirg_learn.policy.memories import (
 )
 
 FAST_HEADS = 2
-SIZE = WIDTH // FAST_HEADS
+HEAD_WIDTH = WIDTH // FAST_HEADS
 EXPERT_WIDTH = WIDTH // 2
 LAST = 8
 """Looks whose tokens the body sees, the present one included."""
@@ -128,11 +128,12 @@ class FastWeightMemory(LookMemory):
         super().__init__()
         self.frames = FrameTokens()
         self.projected = nn.Linear(WIDTH, 3 * WIDTH, bias=False)
-        self.norms = nn.ModuleList(nn.LayerNorm(SIZE) for _ in range(3))
+        self.norms = nn.ModuleList(nn.LayerNorm(HEAD_WIDTH) for _ in range(3))
         self.rate = nn.Linear(WIDTH, FAST_HEADS)
-        self.weights = nn.Parameter(torch.randn(FAST_HEADS, SIZE, SIZE) / math.sqrt(SIZE))
-        self.scale = nn.Parameter(torch.zeros(FAST_HEADS, 1, SIZE))
-        self.shift = nn.Parameter(torch.zeros(FAST_HEADS, 1, SIZE))
+        weights = torch.randn(FAST_HEADS, HEAD_WIDTH, HEAD_WIDTH) / math.sqrt(HEAD_WIDTH)
+        self.weights = nn.Parameter(weights)
+        self.scale = nn.Parameter(torch.zeros(FAST_HEADS, 1, HEAD_WIDTH))
+        self.shift = nn.Parameter(torch.zeros(FAST_HEADS, 1, HEAD_WIDTH))
         self.norm = nn.LayerNorm(WIDTH)
         self.out = nn.Linear(WIDTH, WIDTH, bias=False)
         self.narrow = nn.Linear(WIDTH, EXPERT_WIDTH)
@@ -179,7 +180,7 @@ class FastWeightMemory(LookMemory):
         """Return what the weights are updated and read with at each look."""
         batch, length, count = tokens.there.shape
         projected = self.projected(tokens.values)
-        thirds = projected.reshape(batch, length, count, 3, FAST_HEADS, SIZE).unbind(3)
+        thirds = projected.reshape(batch, length, count, 3, FAST_HEADS, HEAD_WIDTH).unbind(3)
         looks = []
         for norm, part in zip(self.norms, thirds, strict=True):
             looks.append(norm(part).transpose(2, 3).unbind(1))  # each (B, heads, m, size)
@@ -199,7 +200,7 @@ class FastWeightMemory(LookMemory):
             return state
         batch, _, count = tokens.there.shape
         weights = self.weights.expand(batch, -1, -1, -1)
-        biases = tokens.values.new_zeros(batch, FAST_HEADS, 1, SIZE)
+        biases = tokens.values.new_zeros(batch, FAST_HEADS, 1, HEAD_WIDTH)
         return FastState(Fast(weights, biases), tokens.values.new_zeros(batch, 0, count, WIDTH))
 
 

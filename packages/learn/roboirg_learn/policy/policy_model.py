@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from roboirg.extension.commands import InvalidValueError, short_hash
 from roboirg.extension.sight import LOOK_EVERY, points_of
 from roboirg_learn.labeled_views import LATER_STEP
+from roboirg_learn.listener.vocabulary import Vocabulary
 from roboirg_learn.policy.body_net import BodyAnswer, BodyNet
 from roboirg_learn.policy.memories import Carried
 from roboirg_learn.policy.moves import waypoint
@@ -47,7 +48,9 @@ def load_policy(files: PolicyFiles) -> PolicyModel:
     """
     body = load_body(files.body)
     reader = load_reader(files.reader)
-    if reader.vocabulary[1:] != (body.sight.classes, *body.goals):
+    words = reader.vocabulary.words
+    fitting = Vocabulary(words, body.sight.classes, body.goals.tasks, body.goals.parts)
+    if reader.vocabulary != fitting:
         raise InvalidValueError(
             f"The reader {str(files.reader)!r} does not fit the body {str(files.body)!r}, which "
             "knows other things or goals; train one for it with: roboirg learn reader "

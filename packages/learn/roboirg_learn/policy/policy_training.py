@@ -6,6 +6,7 @@ import json
 import math
 import random
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -102,7 +103,7 @@ def _learn_body(plan: BodyPlan, folder: Path, workers: int, progress: Progress) 
     lessons = [BodyLesson(played, _subgoals_of(played)) for played in recorded]
     layout = BodyLayout(body.sight, body.goals, forms)
     planner = train_body(plan, lessons, layout, folder, progress)
-    return body._replace(forms=forms, planner=planner)
+    return replace(body, forms=forms, planner=planner)
 
 
 def _body_alone(

@@ -15,7 +15,7 @@ from roboirg_learn.policy.tracks import LookTokens
 ROWS = (32, 160)
 """First and last row + 1 of the part of the picture that shows the table."""
 COLUMNS = 256
-"""Of the picture."""
+"""Of the picture that trained detectors read, so no other size will do."""
 NEAR_TOOL = 0.07
 """Meters in the plane from the tool within which the hand may hide a thing."""
 HIDDEN_LOOKS = 5

@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from roboirg.extension.episodes import Episode, read_subgoal
 from roboirg.extension.sight import ExpertRecording, points_of
 from roboirg_learn.policy.moves import LookDecision
-from roboirg_learn.policy.sight import Sight
+from roboirg_learn.policy.sight import COLUMNS, Sight
 
 AT = "{at}"
 NO_THING = -1
 """In the place of an object's number where a subgoal points at none."""
-LAST_PIXEL = 255
+LAST_PIXEL = COLUMNS - 1
 """Greatest column and row of the front picture."""
 THINGS = ("cube", "tape", "container", "target", "bin", "box", "button")
 MOTIONS = (

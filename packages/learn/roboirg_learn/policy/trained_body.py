@@ -7,8 +7,9 @@ a second net, which names subgoals; its first net, the hands, follows them.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import torch
@@ -32,7 +33,8 @@ Kind = Move | SubgoalForm
 Pictures = Sequence[NDArray[np.uint8]]
 
 
-class GoalLayout(NamedTuple):
+@dataclass(frozen=True)
+class GoalLayout:
     """Which number of a goal stands for which task, and for which part of an answer.
 
     Attributes:
@@ -62,7 +64,8 @@ class GoalLayout(NamedTuple):
         return self.numbers(episode.task, answer)
 
 
-class TrainedBody(NamedTuple):
+@dataclass(frozen=True)
+class TrainedBody:
     """A trained body.
 
     Attributes:

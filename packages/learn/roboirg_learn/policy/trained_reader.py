@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import torch
@@ -22,7 +23,8 @@ from roboirg_learn.policy.trained_body import GoalLayout
 from roboirg_learn.trained_file import TrainedFile, load_trained, save_trained
 
 
-class TrainedReader(NamedTuple):
+@dataclass(frozen=True)
+class TrainedReader:
     """A trained reader.
 
     Attributes:

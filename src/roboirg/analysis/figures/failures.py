@@ -11,7 +11,7 @@ from roboirg.analysis.figures.panels import RowLabel, panels
 from roboirg.analysis.measures.run_data import RunData
 from roboirg.analysis.results.option_labels import options_label, options_sort_key
 from roboirg.analysis.tables.diagnostic_tables import (
-    FAILURES,
+    FAILURE_KINDS,
     count_failures,
     occurring_failures,
 )
@@ -38,7 +38,7 @@ _DARK = frozenset((*_ORANGE[:4], *_BLUE[:4], *_GRAY[:2]))
 NOTE = "n: trials with a verdict; the rest of a bar succeeded."
 
 
-COLORS = dict(zip(FAILURES, (*_ORANGE, *_BLUE, *_GRAY, "#eeeeee"), strict=True))
+COLORS = dict(zip(FAILURE_KINDS, (*_ORANGE, *_BLUE, *_GRAY, "#eeeeee"), strict=True))
 """By name of the failure: orange for grounding, blue for execution, gray for undecided."""
 
 
@@ -76,8 +76,8 @@ def _keys(causes: Iterable[str]) -> dict[str, Artist]:
     keys: dict[str, Artist] = {}
     for name in causes:
         label = name.replace("_", " ")
-        if FAILURES[name]:
-            label = f"{FAILURES[name]}: {label}"
+        if FAILURE_KINDS[name]:
+            label = f"{FAILURE_KINDS[name]}: {label}"
         keys[label] = Patch(facecolor=COLORS[name], edgecolor=paper())
     return keys
 

@@ -13,14 +13,14 @@ from typing import NamedTuple, get_args
 from roboirg.analysis.page.episodes import PageEpisodes
 from roboirg.analysis.results.frame import suite, task_order
 from roboirg.analysis.results.option_labels import options_label, options_sort_key
-from roboirg.analysis.tables.diagnostic_tables import FAILURES, UNATTRIBUTED
+from roboirg.analysis.tables.diagnostic_tables import FAILURE_KINDS, UNATTRIBUTED
 from roboirg.core.episode import DIFFICULTIES
 from roboirg.core.instruction_options import InstructionOptions
 from roboirg.records.mixing import FAIRNESS
 from roboirg.records.record import ERROR_KINDS, Outcome, Summary
 
 _KINDS: dict[str, str] = {
-    **FAILURES,
+    **FAILURE_KINDS,
     UNATTRIBUTED: UNATTRIBUTED,
     **dict.fromkeys(ERROR_KINDS, "error"),
 }
@@ -159,6 +159,6 @@ def _failure(record: Summary) -> str | None:
     if record.error:
         return record.error
     attribution = record.attribution
-    if attribution is None or attribution.failure not in FAILURES:
+    if attribution is None or attribution.failure not in FAILURE_KINDS:
         return UNATTRIBUTED
     return attribution.failure

@@ -237,7 +237,8 @@ class _PlayedStage(NamedTuple):
     step: int | None
 
 
-class _PlayedScene(NamedTuple):
+@dataclass(frozen=True)
+class _PlayedScene:
     """What is the same whenever a scene is played.
 
     Attributes:

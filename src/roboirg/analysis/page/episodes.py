@@ -16,7 +16,7 @@ from roboirg.records.film import poster_name
 from roboirg.records.record import Record, Summary
 from roboirg.records.run_files import run_file
 
-Runs = Mapping[str, Source]
+SourceByName = Mapping[str, Source]
 """The runs that a page shows by their names: one, or two to compare."""
 
 
@@ -54,12 +54,12 @@ class PageEpisodes:
         all: by policy run, task, episode, options and policy seed.
     """
 
-    runs: Runs
+    runs: SourceByName
     data: RunData
     all: tuple[PageEpisode, ...]
 
     @classmethod
-    def of(cls, runs: Runs, *, videos: bool) -> PageEpisodes:
+    def of(cls, runs: SourceByName, *, videos: bool) -> PageEpisodes:
         """Gather and sort the episodes, with or without their videos."""
         frames = []
         for name, source in _named(runs):
@@ -84,14 +84,14 @@ class PageEpisodes:
             yield from run.stored.records(results)
 
 
-def _named(runs: Runs) -> Iterator[tuple[str, Source]]:
+def _named(runs: SourceByName) -> Iterator[tuple[str, Source]]:
     """Yield each run with the name that its policy runs bear; a single run has an empty one."""
     has_several_runs = len(runs) > 1
     for name, run in runs.items():
         yield name if has_several_runs else "", run
 
 
-def _episodes(runs: Runs, frame: Frame, *, videos: bool) -> Iterator[PageEpisode]:
+def _episodes(runs: SourceByName, frame: Frame, *, videos: bool) -> Iterator[PageEpisode]:
     """Yield the episodes of a frame that were played, those of a scene one after the other."""
     sources = dict(_named(runs))
     names = list(sources)

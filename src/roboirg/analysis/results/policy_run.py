@@ -20,9 +20,9 @@ from roboirg.records.record import Job, Summary
 CONDITIONS = ("split", *ENVIRONMENT_OPTIONS, "wordings", "arm")
 """The names of all conditions."""
 
-PRIVILEGED = " (privileged)"
+PRIVILEGED_MARK = " (privileged)"
 """Mark of policies that read the simulator's state."""
-HANDS = f" ({SCRIPTED_HANDS})"
+HANDS_MARK = f" ({SCRIPTED_HANDS})"
 """Mark of planners whose hands read it, while they see pictures and words."""
 
 _read_conditions = operator.attrgetter("split", "environment", "options.wordings", "arm")
@@ -106,7 +106,7 @@ class PolicyRun(NamedTuple):
         if not self.is_privileged:
             return ""
         has_scripted_hands = SCRIPTED_HANDS in str(self.versions.policy_version)
-        return HANDS if has_scripted_hands else PRIVILEGED
+        return HANDS_MARK if has_scripted_hands else PRIVILEGED_MARK
 
 
 def labels(policy_runs: Iterable[PolicyRun]) -> dict[PolicyRun, str]:

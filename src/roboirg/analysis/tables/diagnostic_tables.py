@@ -62,7 +62,7 @@ from roboirg.stats.rates import (
 from roboirg.util.discovery import with_entries
 
 UNATTRIBUTED = "not attributed"
-FAILURES: Mapping[str, str] = {
+FAILURE_KINDS: Mapping[str, str] = {
     **{name: failure.kind for name, failure in failures.FAILURES.items()},
     UNATTRIBUTED: "",
 }
@@ -199,17 +199,17 @@ def count_failures(frame: Frame, by: Sequence[str]) -> Mapping[Key, Counter[str]
         counts = counts_by_key[tuple(values)]
         counts["trials"] += 1
         if outcome == "failure":
-            name = failure if failure in FAILURES else UNATTRIBUTED
+            name = failure if failure in FAILURE_KINDS else UNATTRIBUTED
             counts[name] += 1
     return counts_by_key
 
 
 def occurring_failures(counts: Iterable[Counter[str]]) -> list[str]:
-    """Return the names of the failures that some of the counts have, in the order of `FAILURES`."""
+    """Return names of failures that occur in some counts, in the order of `FAILURE_KINDS`."""
     total: Counter[str] = Counter()
     for counts_of_key in counts:
         total += counts_of_key
-    return [name for name in FAILURES if name in total]
+    return [name for name in FAILURE_KINDS if name in total]
 
 
 def make_failure_table(data: RunData, *, means: bool = False) -> Table:
@@ -304,7 +304,7 @@ def make_failure_name_table(data: RunData) -> Table:
     for key, counts in counts_by_scope.items():
         failed = [counts[name] for name in names]
         cells[key] = list(map(str, (counts["trials"], sum(failed), *failed)))
-    failure_columns = [Column(name.replace("_", " "), FAILURES[name]) for name in names]
+    failure_columns = [Column(name.replace("_", " "), FAILURE_KINDS[name]) for name in names]
     return Table(
         key="failure_names",
         title="Failures by name",

@@ -20,7 +20,7 @@ from roboirg.util.media import CONTROL_RATE
 
 RUN = "the run"
 NOT_REPORTED = "not reported"
-NOT_APPLICABLE = "not applicable, as there is no neural network"
+NO_NETWORK = "not applicable, as there is no neural network"
 
 Facts = Iterator[tuple[str, Iterable[object]]]
 """Names of facts, each with all its values; None is unknown."""
@@ -188,7 +188,7 @@ def _declared(record: Record) -> dict[str, object]:
     metadata = _metadata(record)
     declared: dict[str, object] = {}
     if metadata.get("network") == "none":
-        declared |= dict.fromkeys(_OF_NETWORKS, NOT_APPLICABLE)
+        declared |= dict.fromkeys(_OF_NETWORKS, NO_NETWORK)
     inference = record.inference
     # Measured is the process that played, which is not that of a policy server.
     if inference is not None and SERVER not in metadata:

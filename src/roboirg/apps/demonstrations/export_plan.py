@@ -17,7 +17,7 @@ from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, known_name
 from roboirg.core.field_types import check_whole
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.observations import CAMERAS, check_cameras
+from roboirg.core.observations import CAMERAS, PICTURE_SIZE, check_cameras
 from roboirg.core.word_pools import PoolName, pool_of
 from roboirg.language.generator import instruct_with
 from roboirg.language.instruction_row import row
@@ -25,7 +25,6 @@ from roboirg.language.scenarios.identity import language_label
 from roboirg.language.settings import all_settings
 from roboirg.language.variants import instructions
 from roboirg.tasks.splits.splits import get_episode
-from roboirg.util.media import PICTURE_SIZE
 from roboirg.util.short_hash import short_hash
 
 Outcomes = Literal["successes", "all"]
@@ -181,7 +180,8 @@ class TaskText(NamedTuple):
     facts: dict[str, Any]
 
 
-class RecordingJob(NamedTuple):
+@dataclass(frozen=True)
+class RecordingJob:
     """One trajectory to record.
 
     Attributes:
@@ -275,9 +275,9 @@ def _jobs_of(plan: ExportPlan, episode: Episode) -> list[SpokenJob]:
         spec=plan.recording,
     )
     if plan.policy != ORACLE:
-        return [SpokenJob(job._replace(options=text.options), (text,)) for text in texts]
+        return [SpokenJob(replace(job, options=text.options), (text,)) for text in texts]
     variations = range(plan.variations)
-    return [SpokenJob(job._replace(variation=number), texts) for number in variations]
+    return [SpokenJob(replace(job, variation=number), texts) for number in variations]
 
 
 def _texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:

@@ -11,11 +11,12 @@ import io
 import json
 import zipfile
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import cv2
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,8 +35,7 @@ _FACTS = "facts.json"
 _ARRAY = ".npy"
 
 
-@dataclass(frozen=True)
-class TrajectoryFacts:
+class TrajectoryFacts(msgspec.Struct, frozen=True):
     """What identifies a trajectory, and how it ended.
 
     Attributes:
@@ -181,7 +181,7 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
     try:
         with zipfile.ZipFile(path) as archive:
             yield archive
-    except (OSError, zipfile.BadZipFile, ValueError, KeyError) as error:
+    except (OSError, zipfile.BadZipFile, ValueError, KeyError, msgspec.ValidationError) as error:
         raise InvalidValueError(f"The trajectory {str(path)!r} cannot be read: {error}.") from error
 
 
@@ -192,7 +192,7 @@ def _read_facts(archive: zipfile.ZipFile, path: Path) -> TrajectoryFacts:
             f"{str(path)!r} is a trajectory of version {fields.get('version')}; "
             f"this package reads version {TRAJECTORY_VERSION}. Delete it to record it again."
         )
-    return TrajectoryFacts(**fields)
+    return msgspec.convert(fields, TrajectoryFacts)
 
 
 def _read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
@@ -208,7 +208,7 @@ def write_arrays(
         file = io.BytesIO()
         np.save(file, array, allow_pickle=False)
         archive.writestr(name + _ARRAY, file.getvalue())
-    archive.writestr(_FACTS, json.dumps(asdict(facts)))
+    archive.writestr(_FACTS, json.dumps(msgspec.to_builtins(facts)))
 
 
 def picture_name(track: str, row: int) -> str:

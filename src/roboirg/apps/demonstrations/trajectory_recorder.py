@@ -36,14 +36,14 @@ from roboirg.core.actions import (
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.errors import InvalidValueError, MotionPlanningError
 from roboirg.core.instruction_options import InstructionOptions
-from roboirg.core.observations import CAMERAS, FetchedDemonstration, Pixels
+from roboirg.core.observations import CAMERAS, PICTURE_SIZE, FetchedDemonstration, Pixels
 from roboirg.core.policy_needs import PolicyNeeds
 from roboirg.core.subgoal_text import split_point
 from roboirg.envs.factory import make
 from roboirg.policies.contract.base import Policy, close_policy
 from roboirg.policies.contract.play import EpisodeLoop, Moment
 from roboirg.util.atomic_write import replacing
-from roboirg.util.media import PICTURE_SIZE, scaled_square
+from roboirg.util.media import scaled_square
 
 if TYPE_CHECKING:
     from roboirg.envs.environment import RoboIRGEnv

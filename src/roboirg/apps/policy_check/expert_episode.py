@@ -23,7 +23,7 @@ TASK = "PickXtimes"
 SETTING = "explicit"
 SPLIT = "train"
 EPISODE = 0
-MAX_STEPS = 140
+EXPERT_STEPS = 140
 """Control steps: the expert takes a cube at step 84 and carries it until step 164."""
 MAX_ROWS = 16
 """Rows of a chunk that are compared, at most: the policy is asked again after them."""
@@ -132,7 +132,7 @@ def _pieces(expert: OraclePolicy, rows: int) -> Iterator[Rows]:
     of the world.
     """
     steps = 0
-    while steps < MAX_STEPS:
+    while steps < EXPERT_STEPS:
         # The expert knows where everything is, so it looks at no observation.
         chunk = np.asarray(expert.act(cast("Observation", {})), np.float64)
         for start in range(0, len(chunk), rows):

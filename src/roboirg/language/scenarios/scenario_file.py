@@ -11,8 +11,9 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from roboirg.core.episode import SUITES
 from roboirg.core.errors import InvalidValueError
@@ -446,7 +447,8 @@ def _is_said(row: PointerRow, words: str, sentence: str) -> bool:
     return _pattern(row.words).fullmatch(words) is not None
 
 
-class _SentenceReader(NamedTuple):
+@dataclass(frozen=True)
+class _SentenceReader:
     """Reads the sentences of a scenario.
 
     Attributes:

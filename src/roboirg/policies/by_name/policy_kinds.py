@@ -49,7 +49,7 @@ CLASS, LIVE, LISTENER, PLANNER, SYSTEM = "class", "live", "vlm-listener", "plann
 PolicyMaker = Callable[[int], Policy]
 """Makes a policy from a seed, without network or the libraries of providers."""
 
-SCRIPTED_HANDS = "roboirg.policies.hands.scripted_hands:ScriptedHands"
+SCRIPTED_HANDS_CLASS = "roboirg.policies.hands.scripted_hands:ScriptedHands"
 
 live: dict[str, Any] = {}
 """The classes and objects that this process alone has, by the names of the policies."""
@@ -150,7 +150,7 @@ def system_of(kind: str, target: str, options: Mapping[str, str]) -> System | No
 
 def make_follower(spec: str, seed: int) -> Policy:
     """Make what follows a planner: any policy, or the scripted hands; nothing is connected."""
-    import_path = SCRIPTED_HANDS if spec == SCRIPTED else spec
+    import_path = SCRIPTED_HANDS_CLASS if spec == SCRIPTED else spec
     make = maker_of(split_spec(spec, import_path))
     return make(seed)
 

@@ -7,14 +7,16 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 from roboirg.core.actions import ARM_JOINTS, JOINT_HIGH, JOINT_LOW, REACH_HIGH, REACH_LOW
-from roboirg.core.observations import Observation
+from roboirg.core.observations import PICTURE_SIZE, Observation
 from roboirg.core.policy_needs import PolicyNeeds
 
-PICTURE = (256, 256, 3)
-DEPTH = (256, 256, 1)
-MAX_DEPTH = 2000
+PICTURE = (PICTURE_SIZE, PICTURE_SIZE, 3)
+DEPTH = (PICTURE_SIZE, PICTURE_SIZE, 1)
+DEEPEST_MM = 2000
 """Millimeters."""
-INTRINSIC = np.array([[128, 0, 128], [0, 128, 128], [0, 0, 1]], np.float32)
+_HALF = PICTURE_SIZE // 2
+"""Row and column of the picture's center; and at 90 degrees the focal length."""
+INTRINSIC = np.array([[_HALF, 0, _HALF], [0, _HALF, _HALF], [0, 0, 1]], np.float32)
 """From the camera's frame to pixels."""
 _FINGER_RANGE = 0.04
 """Meters."""
@@ -89,7 +91,7 @@ class SyntheticEpisodes:
             observation[f"{camera}_rgb"] = rng.integers(0, 256, PICTURE, dtype=np.uint8)
         if self._needs.depth:
             for camera in self._needs.cameras:
-                observation[f"{camera}_depth"] = rng.integers(0, MAX_DEPTH, DEPTH, dtype=np.int16)
+                observation[f"{camera}_depth"] = rng.integers(0, DEEPEST_MM, DEPTH, dtype=np.int16)
         if self._needs.calibration:
             for camera in self._needs.cameras:
                 extrinsic = rng.uniform(-1, 1, (3, 4)).astype(np.float32)

@@ -25,7 +25,7 @@ from pydantic import Field
 from roboirg.core.actions import Actions
 from roboirg.core.error_words import one_line
 from roboirg.core.errors import InvalidValueError, MissingDependencyError
-from roboirg.core.observations import Demonstration, Observation
+from roboirg.core.observations import PICTURE_SIZE, Demonstration, Observation
 from roboirg.core.policy_ref import UNKNOWN_VERSION
 from roboirg.policies.contract.option_checking import NOT_COMPARED
 from roboirg.policies.contract.policy_urls import UrlOptions, read_options, split_url
@@ -314,12 +314,12 @@ def _describe(config: Any, before: object, after: object) -> dict[str, Any]:  # 
     steps_before = _step_names(before)
     metadata: dict[str, Any] = {
         "preprocessing": f"the checkpoint declares the inputs {', '.join(inputs)}; roboirg resizes "
-        "pictures from 256 × 256 pixels to the declared height and width, if these are another "
-        "square (whether training did likewise: not reported by the checkpoint), and scales their "
-        "brightness to [0, 1], the range in which LeRobot's datasets deliver pictures; then the "
-        "preprocessor that training saved with it is applied to all inputs, in the steps "
-        f"{', '.join(steps_before) or 'none'}; its postprocessor is applied to the actions, in the "
-        f"steps {', '.join(_step_names(after)) or 'none'}"
+        f"pictures from {PICTURE_SIZE} × {PICTURE_SIZE} pixels to the declared height and width, "
+        "if these are another square (whether training did likewise: not reported by the "
+        "checkpoint), and scales their brightness to [0, 1], the range in which LeRobot's datasets "
+        "deliver pictures; then the preprocessor that training saved with it is applied to all "
+        f"inputs, in the steps {', '.join(steps_before) or 'none'}; its postprocessor is applied "
+        f"to the actions, in the steps {', '.join(_step_names(after)) or 'none'}"
     }
     tokenizers = [name for name in steps_before if "tokenizer" in name]
     if tokenizers:

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.core.subgoal_text import MOST_SUBGOAL_LETTERS
 from roboirg.util.reply_reading import UnparsableReplyError, answer_of
 
-PICTURE_SIZE = 256
 """Rows and columns of the front picture."""
 SCALE = 1000
 """The whole height or width in a model's coordinates."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import socket
-from typing import Annotated, NamedTuple
+from dataclasses import dataclass
+from typing import Annotated
 from urllib.parse import quote, urlsplit
 
 from pydantic import AfterValidator, Field
@@ -23,7 +24,8 @@ ActionSpaceName = Annotated[str, AfterValidator(lambda name: find_action_space(n
 """An option that names an action space."""
 
 
-class Endpoint(NamedTuple):
+@dataclass(frozen=True)
+class Endpoint:
     """Host (lower case), port, and path (empty, or from its slash on) of a server."""
 
     host: str

@@ -18,7 +18,7 @@ from roboirg.policies.remote.endpoints import MIB
 
 Message = Mapping[str, Any]
 """Names and values, as the codec has read them."""
-Numbers = Literal["uint8", "real numbers"]
+NumberType = Literal["uint8", "real numbers"]
 _REAL_KINDS = "fiu"
 """NumPy's letters for the dtypes of real numbers: floats, and integers with and without a sign."""
 
@@ -89,7 +89,9 @@ class Service(ABC):
         self.policy = None
 
 
-def read_array(message: Message, key: str, numbers: Numbers, shape: tuple[int | str, ...]) -> Any:  # noqa: ANN401
+def read_array(
+    message: Message, key: str, numbers: NumberType, shape: tuple[int | str, ...]
+) -> Any:  # noqa: ANN401
     """Return an array of a message; raise if it has another type or shape than it must have.
 
     Args:

@@ -48,7 +48,7 @@ TimeLeft = Callable[[], float]
 It raises `TimeoutError` when the time for the whole message is over."""
 
 Text = Annotated[str, Meta(max_length=MAX_TEXT)]
-Names = Annotated[tuple[Text, ...], Meta(max_length=64)]
+ShortTexts = Annotated[tuple[Text, ...], Meta(max_length=64)]
 
 
 class HostRequest(Struct, forbid_unknown_fields=True, omit_defaults=True):
@@ -94,7 +94,7 @@ class Begun(Struct, tag="begun", forbid_unknown_fields=True):
 class Question(Struct, tag="question", forbid_unknown_fields=True):
     """A policy's process asks the world for fields of the video."""
 
-    fields: Names = ()
+    fields: ShortTexts = ()
 
 
 class Outcome(Struct, tag="outcome", forbid_unknown_fields=True, omit_defaults=True):
@@ -122,7 +122,7 @@ class Outcome(Struct, tag="outcome", forbid_unknown_fields=True, omit_defaults=T
     details: Annotated[str, Meta(max_length=MAX_DETAILS_LENGTH)] = ""
     needs: PolicyNeeds = PolicyNeeds()
     version: Name = "unknown"
-    reads: Names = ()
+    reads: ShortTexts = ()
     metadata: Annotated[str, Meta(max_length=MAX_METADATA_LENGTH)] = "{}"
     usage: Annotated[dict[Text, float], Meta(max_length=MAX_COSTS)] = {}
     inference: InferenceFacts | None = None

@@ -51,7 +51,7 @@ PHASES: Mapping[str, str] = {
     "close": "policy's close()",
 }
 
-Answer = Callable[[Question], Call]
+AnswerQuestion = Callable[[Question], Call]
 """Returns the world's answer to a question of the policy's process."""
 
 
@@ -97,7 +97,7 @@ class PolicyLine:
         with theirs, _supervised():
             ask(hosts, HostRequest("open", policy), theirs)
 
-    def call(self, call: Call, answer: Answer | None = None) -> Outcome:
+    def call(self, call: Call, answer: AnswerQuestion | None = None) -> Outcome:
         """Call the policy and return the outcome, which may be an error of the policy.
 
         Args:
@@ -185,7 +185,7 @@ class PolicyLine:
             self._until = min(time.monotonic() + self._limit_s, self._sent_at + most_s)
         return self._time_left()
 
-    def _outcome(self, answer: Answer | None) -> Outcome:
+    def _outcome(self, answer: AnswerQuestion | None) -> Outcome:
         """Return the outcome of a call that has begun; meanwhile answer the process's questions.
 
         Raises:

@@ -141,14 +141,19 @@ def parse_splits(text: str) -> tuple[Split, ...]:
 
 
 def parse_episodes(given: object, split: str, tasks: Collection[str]) -> Numbers:
-    """Parse episodes: a number of them, positions in a list, or those of some difficulties.
+    """Parse episodes: a list of positions, ranges and difficulties, or how many of the first.
 
-    ``4`` is the first four. With a comma or a dash it is a list of positions, and so is a list of
-    Python or YAML, whose positions are not compared with the size of the split: only those who
-    know the salt of private episodes can draw it.
+    | typed | selects |
+    | --- | --- |
+    | ``4``, a number alone | the first four |
+    | ``0,3,5-9``; ``7,`` | the positions |
+    | ``hard``; ``easy,hard`` | those that have such a difficulty in all of the tasks |
+    | ``hard,7`` | both |
+    | ``all`` | every one |
 
-    In a split of fixed episodes ``all`` is every one, and ``easy``, ``medium``, ``hard`` or several
-    of them are those that have such a difficulty in all of the tasks.
+    Difficulties and ``all`` need a split of fixed episodes. A list of Python or YAML has the same
+    items. Its positions are not compared with the size of the split: only those who know the salt
+    of private episodes can draw it.
 
     Raises:
         UnknownNameError: there is no such split.
@@ -157,24 +162,28 @@ def parse_episodes(given: object, split: str, tasks: Collection[str]) -> Numbers
     words = parse_names("episode", given)
     if means_all(words):
         return _episodes_of_levels(DIFFICULTIES, split, tasks)
-    if {*words} <= {*DIFFICULTIES}:  # all of them are levels
-        return _episodes_of_levels(words, split, tasks)
-    if isinstance(given, Iterable) and not isinstance(given, str):
-        return _union(_parse_ranges("episode", words, _EPISODES_HINT))
+    levels = [word for word in words if word in DIFFICULTIES]
+    positions = [word for word in words if word not in DIFFICULTIES]
 
-    typed = str(given).strip()
+    ranges: list[range] = []
     # A number alone, even a negative one, which is then refused, is a count and no position.
-    if re.fullmatch(rf"-?{_NUMBER}", typed):
-        ranges = [_first_episodes(typed)]
-    else:
-        ranges = _parse_ranges("episode", words, _EPISODES_HINT)
-    for numbers in ranges:
-        size = splits.split_size(split)
-        if numbers[-1] >= size:
-            raise InvalidValueError(
-                f"There is no episode {numbers[-1]}: split {split!r} has episodes 0 to {size - 1}."
-            )
-    return _union(ranges)
+    if re.fullmatch(rf"-?{_NUMBER}", str(given).strip()):
+        ranges = [_first_episodes(positions[0])]
+    elif positions:
+        ranges = _parse_ranges("episode", positions, _EPISODES_HINT)
+    last = max((numbers[-1] for numbers in ranges), default=-1)
+    is_typed = isinstance(given, str | int)
+    if is_typed and last >= splits.split_size(split):
+        raise InvalidValueError(
+            f"There is no episode {last}: split {split!r} has episodes 0 to "
+            f"{splits.split_size(split) - 1}."
+        )
+
+    found: list[int] = []
+    if levels:
+        found += _episodes_of_levels(levels, split, tasks)
+    found += _union(ranges)
+    return distinct(found)
 
 
 def _first_episodes(count: str) -> range:

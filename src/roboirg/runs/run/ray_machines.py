@@ -19,6 +19,7 @@ import socket
 import tempfile
 import threading
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -42,8 +43,11 @@ KEY_S = 1.0
 _PID_SUFFIX = ".pid"
 """Of empty files named after the processes of a run on a machine."""
 
+_INSTALLED = INSTALLED._replace(package_version=__version__)
 
-class MachineVersions(NamedTuple):
+
+@dataclass(frozen=True)
+class MachineVersions:
     """What must be the same on every machine, or records of one run would differ.
 
     Attributes:
@@ -52,7 +56,7 @@ class MachineVersions(NamedTuple):
     """
 
     policies: tuple[PolicyRef, ...]
-    installed: Versions = INSTALLED._replace(package_version=__version__)
+    installed: Versions = _INSTALLED
 
     def difference(self, there: MachineVersions) -> str | None:
         """Return the first difference of another machine, in words; None if there is none."""

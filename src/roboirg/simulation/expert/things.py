@@ -10,9 +10,10 @@ import numpy as np
 import sapien
 
 from roboirg.core.episode import SceneObject
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.core.subgoal_text import Point
 from roboirg.simulation.bodies import Body
-from roboirg.simulation.rendering.viewpoint import FOCAL_LENGTH, SIZE, to_front_camera
+from roboirg.simulation.rendering.viewpoint import FOCAL_LENGTH, to_front_camera
 from roboirg.simulation.world import World
 
 _HELD = ("held", "picked", "lifted")
@@ -74,8 +75,8 @@ def origin_pixel(body: Body) -> Point | None:
     x, y, z = to_front_camera(frame)[:3, 3]
     if z <= 0:  # behind the camera
         return None
-    row = round(SIZE / 2 + FOCAL_LENGTH * float(y / z))
-    column = round(SIZE / 2 + FOCAL_LENGTH * float(x / z))
-    if row not in range(SIZE) or column not in range(SIZE):
+    row = round(PICTURE_SIZE / 2 + FOCAL_LENGTH * float(y / z))
+    column = round(PICTURE_SIZE / 2 + FOCAL_LENGTH * float(x / z))
+    if row not in range(PICTURE_SIZE) or column not in range(PICTURE_SIZE):
         return None
     return row, column

@@ -1,4 +1,4 @@
-"""Picture size, field of view, the front camera's pose, and which triangles reach a pixel."""
+"""Field of view, the front camera's pose, and which triangles reach a pixel."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 import sapien
 from numpy.typing import NDArray
 
-SIZE = 256
-"""Width and height of a picture, pixels."""
+from roboirg.core.observations import PICTURE_SIZE
+
 FIELD_OF_VIEW = math.pi / 2
-FOCAL_LENGTH = SIZE / 2 / math.tan(FIELD_OF_VIEW / 2)
+FOCAL_LENGTH = PICTURE_SIZE / 2 / math.tan(FIELD_OF_VIEW / 2)
 """Pixels."""
 NEAR = 0.01
 FAR = 100.0
@@ -67,10 +67,10 @@ def reach_pixels(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
         (n); always true for triangles with a corner in front of the near plane.
     """
     depths = corners[..., 2:]
-    places = FOCAL_LENGTH * corners[..., :2] / depths + SIZE / 2
+    places = FOCAL_LENGTH * corners[..., :2] / depths + PICTURE_SIZE / 2
     # The first and last pixels of the picture whose centers lie in the box, across and down.
     first = np.ceil(places.min(axis=1) - EDGE_TOLERANCE - PIXEL_CENTER).clip(min=0)
-    last = np.floor(places.max(axis=1) + EDGE_TOLERANCE - PIXEL_CENTER).clip(max=SIZE - 1)
+    last = np.floor(places.max(axis=1) + EDGE_TOLERANCE - PIXEL_CENTER).clip(max=PICTURE_SIZE - 1)
     has_pixel = (first <= last).all(axis=1)
     is_too_near = depths[..., 0].min(axis=1) < NEAR
     return np.asarray(has_pixel | is_too_near)

@@ -14,6 +14,7 @@ from roboirg.apps.grounding.items.media_store import EpisodeMedia
 from roboirg.apps.grounding.items.referents import is_ordered, noun, pointed_kinds
 from roboirg.core.episode import ENVIRONMENT_VERSION, Episode
 from roboirg.core.instruction_options import InstructionOptions
+from roboirg.core.observations import PICTURE_SIZE
 from roboirg.core.word_pools import POOLS, pool_of
 from roboirg.language import instruct_with
 from roboirg.language.generator import find_refusal
@@ -30,7 +31,6 @@ from roboirg.tasks import get_task, with_goal
 
 QUESTIONS = "grounding_questions"
 """Name of the prompts for the questions that the listener does not ask."""
-SIZE = 256
 ID_DIGITS = 16
 
 
@@ -212,8 +212,8 @@ def _points_question(episode: Episode) -> dict[str, Any]:
         "points",
         things=", then ".join(f"the {name}" for name in nouns),
         rule=questions.fill("several" if is_sequence else "amounts"),
-        width=str(SIZE),
-        height=str(SIZE),
+        width=str(PICTURE_SIZE),
+        height=str(PICTURE_SIZE),
     )
     return {"points_question": question, "points_in_order": is_sequence}
 

@@ -20,8 +20,7 @@ from roboirg.core.instruction_options import (
     DEFAULT_DISTRACTOR,
     DEFAULT_FRAME,
 )
-from roboirg.core.observations import CAMERAS
-from roboirg.util.media import PICTURE_SIZE
+from roboirg.core.observations import CAMERAS, PICTURE_SIZE
 
 
 @EnvConfig.register_subclass("roboirg")

@@ -15,12 +15,12 @@ from roboirg.core.actions import Actions
 from roboirg.core.environment_options import MAX_STEPS
 from roboirg.core.errors import InvalidActionError, InvalidValueError
 from roboirg.core.field_types import check_whole
-from roboirg.core.observations import CAMERAS, Pixels, proprioception
+from roboirg.core.observations import CAMERAS, PICTURE_SIZE, Pixels, proprioception
 from roboirg.envs.env_settings import EnvOptions
 from roboirg.envs.environment import StepResult
 from roboirg.envs.factory import make
 from roboirg.policies.contract.play import Moment
-from roboirg.util.media import PICTURE_SIZE, scaled_square
+from roboirg.util.media import scaled_square
 
 NEW_ROLLOUT = "lerobot_new_rollout"
 """Option with which LeRobot, from 0.6.1 on, marks the resets that it means."""
