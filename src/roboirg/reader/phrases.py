@@ -81,7 +81,7 @@ class Token(NamedTuple):
     text: str
 
 
-class Found:
+class FoundPhrase:
     """A phrase that a rule has found in a sentence.
 
     Attributes:
@@ -102,7 +102,7 @@ class Found:
         return self._chunks.value(self[name])
 
 
-class Rule(NamedTuple):
+class PhraseRule(NamedTuple):
     """How phrases of one pattern are read.
 
     Attributes:
@@ -113,7 +113,7 @@ class Rule(NamedTuple):
 
     kind: str
     pattern: re.Pattern[str]
-    read: Callable[[Found], Value]
+    read: Callable[[FoundPhrase], Value]
 
 
 class Chunks:
@@ -128,7 +128,7 @@ class Chunks:
         self._values: list[Value] = []
         self._words: list[str] = []
 
-    def apply(self, rules: Iterable[Rule]) -> bool:
+    def apply(self, rules: Iterable[PhraseRule]) -> bool:
         """Replace the phrases of each rule by chunks, and return whether there were any.
 
         *The red cube* becomes ``thing#3``.
@@ -138,10 +138,10 @@ class Chunks:
             self.text = rule.pattern.sub(functools.partial(self._chunk, rule), self.text)
         return self.text != before
 
-    def _chunk(self, rule: Rule, match: re.Match[str]) -> str:
+    def _chunk(self, rule: PhraseRule, match: re.Match[str]) -> str:
         """Return the chunk for a phrase, or its words if the rule does not read them."""
         words = match[0]
-        value = rule.read(Found(match, self))
+        value = rule.read(FoundPhrase(match, self))
         if value is None:
             return words
         number = len(self._values)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from roboirg.reader.phrases import Found, Rule, compiled
+from roboirg.reader.phrases import FoundPhrase, PhraseRule, compiled
 from roboirg.reader.tokens import ADVERBS, number_of, ordinal_of
 
 Relation = Literal["before", "after"]
@@ -153,7 +153,7 @@ _WAY = compiled(
 )  # fmt: skip
 
 
-def _times(found: Found) -> int:
+def _times(found: FoundPhrase) -> int:
     """Return the number of repetitions that a phrase names: 3 for *three times*, 2 for *twice*.
 
     Without a number it is once.
@@ -173,7 +173,7 @@ def _rank(words: list[str]) -> int | None:
     return ranks.pop() if len(ranks) == 1 else None
 
 
-def _visit(found: Found) -> Visit | None:
+def _visit(found: FoundPhrase) -> Visit | None:
     """Return the visit that a phrase names; None if it names several."""
     if found["number"]:
         return Visit(number_of(found["number"]))
@@ -181,23 +181,23 @@ def _visit(found: Found) -> Visit | None:
     return None if rank is None else Visit(rank)
 
 
-def _next_visit(_found: Found) -> Visit:
+def _next_visit(_found: FoundPhrase) -> Visit:
     """Return the next visit, whichever that is."""
     return Visit(None)
 
 
-def _way(found: Found) -> TargetWay:
+def _way(found: FoundPhrase) -> TargetWay:
     """Return the sides that a phrase names, in its order."""
     sides = (found["start"], found["end"], found["over"], found["then"])
     return TargetWay(tuple(side for side in sides if side))
 
 
-def _side_target(found: Found) -> Target:
+def _side_target(found: FoundPhrase) -> Target:
     """Return the target on a side."""
     return Target(found["side"] or found["on"])
 
 
-def _target(found: Found) -> Target | None:
+def _target(found: FoundPhrase) -> Target | None:
     """Return a target with the placement that its words name; None if they name several.
 
     *the second target used before the press* has the rank 2 and the relation ``before``.
@@ -223,22 +223,22 @@ def _relation(word: str) -> Relation | None:
 
 TARGET_RULES = (
     # Before single targets: "from your right to your left target".
-    Rule("way", _WAY, _way),
-    Rule("target", _SIDE_TARGET, _side_target),
-    Rule("target", _PRESS_TARGET, _target),
-    Rule("target", _WHERE, _target),
+    PhraseRule("way", _WAY, _way),
+    PhraseRule("target", _SIDE_TARGET, _side_target),
+    PhraseRule("target", _PRESS_TARGET, _target),
+    PhraseRule("target", _WHERE, _target),
     # Before single placements: "the target of the last placement".
-    Rule("target", _TARGET, _target),
-    Rule("target", _PLACING, _target),
+    PhraseRule("target", _TARGET, _target),
+    PhraseRule("target", _PLACING, _target),
     # After targets, which these may hold: "the second time it passes target#1".
-    Rule("passed", _PASSED, _times),
-    Rule("visit", _VISIT, _visit),
-    Rule("visit", _NEXT, _next_visit),
+    PhraseRule("passed", _PASSED, _times),
+    PhraseRule("visit", _VISIT, _visit),
+    PhraseRule("visit", _NEXT, _next_visit),
 )
 """Targets, and visits of a cube to one; where nothing is said, the order does not matter."""
 TIMES_RULES = (
     # Before other numbers: "three times more".
-    Rule("more", _MORE, _times),
-    Rule("times", _TIMES, _times),
+    PhraseRule("more", _MORE, _times),
+    PhraseRule("times", _TIMES, _times),
 )
 """Repetitions."""

@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping
 from typing import Literal, NamedTuple, cast
 
-from roboirg.reader.phrases import Chunks, Found, Rewrites, Rule, compiled
+from roboirg.reader.phrases import Chunks, FoundPhrase, PhraseRule, Rewrites, compiled
 from roboirg.reader.places import Place, Side
 from roboirg.reader.tokens import color_of, number_of, ordinal_of
 
@@ -200,7 +200,7 @@ def read_things(chunks: Chunks) -> None:
     chunks.apply(_LIKENESSES)
 
 
-def _place(found: Found, place: Place) -> Place | None:
+def _place(found: FoundPhrase, place: Place) -> Place | None:
     """Return a place with the side, rank and anchors that its words name; None if too deep.
 
     Args:
@@ -232,7 +232,7 @@ def _is_deep(anchor: object) -> bool:
     return levels >= _MAX_DEPTH
 
 
-def _anchor(found: Found, name: str) -> object:
+def _anchor(found: FoundPhrase, name: str) -> object:
     """Return the description of a thing, or the kind of a fixture: ``target#1``, ``the bin``."""
     kind, _, _ = found[name].partition("#")
     if kind == "thing":
@@ -240,18 +240,18 @@ def _anchor(found: Found, name: str) -> object:
     return kind.removeprefix("the ")
 
 
-def _member(found: Found) -> Place:
+def _member(found: FoundPhrase) -> Place:
     """Return a place among a few things, *on the left of the two in the back*."""
     place: Place = found.value("place")
     return place._replace(group=found.value("group"), size=number_of(found["size"]) or 0)
 
 
-def _number_of_each(found: Found) -> int:
+def _number_of_each(found: FoundPhrase) -> int:
     """Return how many there are of each color."""
     return number_of(found["count"]) or 1
 
 
-def _named(found: Found) -> Description:
+def _named(found: FoundPhrase) -> Description:
     """Return the description of a thing that is named by noun, color or both.
 
     *two red cubes* has the noun ``cube``, the color ``red`` and the number 2.
@@ -279,13 +279,13 @@ def _number_by(determiner: str, *, is_plural: bool) -> int | None:
     return None
 
 
-def _like(found: Found) -> Description:
+def _like(found: FoundPhrase) -> Description:
     """Return cubes of the color of another thing: *one more of the same color as the red one*."""
     number = number_of(found["count"]) or 1
     return Description("cube", number=number, like=found.value("like"))
 
 
-def _standing(found: Found) -> Description | None:
+def _standing(found: FoundPhrase) -> Description | None:
     """Return a thing with its place; None if it has another description already.
 
     *thing#0 that was place#1* also says when it stood there: at first.
@@ -297,30 +297,30 @@ def _standing(found: Found) -> Description | None:
     return thing._replace(place=found.value("place"), moment=moment)
 
 
-def _covering(found: Found) -> Description | None:
+def _covering(found: FoundPhrase) -> Description | None:
     """Return a container over a thing."""
     return _over(found.value("thing"), found.value("under"))
 
 
-def _covering_place(found: Found) -> Description | None:
+def _covering_place(found: FoundPhrase) -> Description | None:
     """Return a container over what stands at a place."""
     under = Description("cube", is_definite=True, place=found.value("place"))
     return _over(found.value("thing"), under)
 
 
-def _covering_it(found: Found) -> Description:
+def _covering_it(found: FoundPhrase) -> Description:
     """Return a thing as it is: *over it* says no more."""
     thing: Description = found.value("thing")
     return thing._replace(is_shown=False)
 
 
-def _shown(found: Found) -> Description:
+def _shown(found: FoundPhrase) -> Description:
     """Return a thing as the one that the video shows."""
     thing: Description = found.value("thing")
     return thing._replace(is_shown=True)
 
 
-def _owned(found: Found) -> Description:
+def _owned(found: FoundPhrase) -> Description:
     """Return the container over a cube, *blue's container*."""
     cube = Description("cube", color_of(found["color"] or found["other"]))
     return Description("container", is_definite=True, under=cube)
@@ -351,28 +351,28 @@ def _moment(*words: str) -> Moment | None:
 
 _NAMES = (
     # "two of each color" and "blue's container" hold a number, a color or a noun of their own.
-    Rule("each", _EACH, _number_of_each),
-    Rule("thing", _OWNED, _owned),
+    PhraseRule("each", _EACH, _number_of_each),
+    PhraseRule("thing", _OWNED, _owned),
     # With a noun before those without: "red cube", then "red".
-    Rule("thing", _NAMED, _named),
-    Rule("thing", _COLORED, _named),
+    PhraseRule("thing", _NAMED, _named),
+    PhraseRule("thing", _COLORED, _named),
 )
 """Things by their names."""
 _PLACE_RULES = [
-    Rule("place", compiled(pattern, _PARTS), functools.partial(_place, place=place))
+    PhraseRule("place", compiled(pattern, _PARTS), functools.partial(_place, place=place))
     for pattern, place in _PLACES.items()
 ]
 _DESCRIPTIONS = (
     *_PLACE_RULES,
-    Rule("place", _AMONG, _member),
+    PhraseRule("place", _AMONG, _member),
     # A place goes to the nearest thing: "the container over the cube in the middle".
-    Rule("thing", _STANDING, _standing),
-    Rule("thing", _COVERING, _covering),
-    Rule("thing", _COVERING_PLACE, _covering_place),
-    Rule("thing", _COVERING_IT, _covering_it),
-    Rule("thing", _COVERED, _covering),
-    Rule("thing", _SHOWN, _shown),
+    PhraseRule("thing", _STANDING, _standing),
+    PhraseRule("thing", _COVERING, _covering),
+    PhraseRule("thing", _COVERING_PLACE, _covering_place),
+    PhraseRule("thing", _COVERING_IT, _covering_it),
+    PhraseRule("thing", _COVERED, _covering),
+    PhraseRule("thing", _SHOWN, _shown),
 )
 """Places, and words that describe a thing and stand behind it."""
-_LIKENESSES = (Rule("thing", _LIKE, _like),)
+_LIKENESSES = (PhraseRule("thing", _LIKE, _like),)
 """Things of the color of another one, whose description has been read."""
