@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from roboirg.reader.phrases import Chunks, Found, PhraseRule, Rewrites, Token, Value, compiled
+from roboirg.reader.phrases import Chunks, FoundPhrase, PhraseRule, Rewrites, Token, Value, compiled
 from roboirg.reader.series import TARGET_RULES, TIMES_RULES
 from roboirg.reader.things import Description, read_things
 from roboirg.reader.tokens import Sentence, word_set
@@ -247,12 +247,12 @@ def read_command(words: Sentence) -> Reading:
     return _acts(chunks)
 
 
-def _words(found: Found) -> str:
+def _words(found: FoundPhrase) -> str:
     """Return the words themselves, where the kind of the chunk says enough."""
     return found.text
 
 
-def _goal(found: Found) -> Value:
+def _goal(found: FoundPhrase) -> Value:
     """Return where something goes: a target, a way over targets, a box, or a noun such as ``bin``.
 
     None if the words are a thing that is no box.

@@ -81,7 +81,7 @@ class Token(NamedTuple):
     text: str
 
 
-class Found:
+class FoundPhrase:
     """A phrase that a rule has found in a sentence.
 
     Attributes:
@@ -113,7 +113,7 @@ class PhraseRule(NamedTuple):
 
     kind: str
     pattern: re.Pattern[str]
-    read: Callable[[Found], Value]
+    read: Callable[[FoundPhrase], Value]
 
 
 class Chunks:
@@ -141,7 +141,7 @@ class Chunks:
     def _chunk(self, rule: PhraseRule, match: re.Match[str]) -> str:
         """Return the chunk for a phrase, or its words if the rule does not read them."""
         words = match[0]
-        value = rule.read(Found(match, self))
+        value = rule.read(FoundPhrase(match, self))
         if value is None:
             return words
         number = len(self._values)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Literal, NamedTuple
 
-from roboirg.reader.phrases import Found, PhraseRule, compiled
+from roboirg.reader.phrases import FoundPhrase, PhraseRule, compiled
 from roboirg.reader.tokens import ADVERBS, number_of, ordinal_of
 
 Relation = Literal["before", "after"]
@@ -153,7 +153,7 @@ _WAY = compiled(
 )  # fmt: skip
 
 
-def _times(found: Found) -> int:
+def _times(found: FoundPhrase) -> int:
     """Return the number of repetitions that a phrase names: 3 for *three times*, 2 for *twice*.
 
     Without a number it is once.
@@ -173,7 +173,7 @@ def _rank(words: list[str]) -> int | None:
     return ranks.pop() if len(ranks) == 1 else None
 
 
-def _visit(found: Found) -> Visit | None:
+def _visit(found: FoundPhrase) -> Visit | None:
     """Return the visit that a phrase names; None if it names several."""
     if found["number"]:
         return Visit(number_of(found["number"]))
@@ -181,23 +181,23 @@ def _visit(found: Found) -> Visit | None:
     return None if rank is None else Visit(rank)
 
 
-def _next_visit(_found: Found) -> Visit:
+def _next_visit(_found: FoundPhrase) -> Visit:
     """Return the next visit, whichever that is."""
     return Visit(None)
 
 
-def _way(found: Found) -> TargetWay:
+def _way(found: FoundPhrase) -> TargetWay:
     """Return the sides that a phrase names, in its order."""
     sides = (found["start"], found["end"], found["over"], found["then"])
     return TargetWay(tuple(side for side in sides if side))
 
 
-def _side_target(found: Found) -> Target:
+def _side_target(found: FoundPhrase) -> Target:
     """Return the target on a side."""
     return Target(found["side"] or found["on"])
 
 
-def _target(found: Found) -> Target | None:
+def _target(found: FoundPhrase) -> Target | None:
     """Return a target with the placement that its words name; None if they name several.
 
     *the second target used before the press* has the rank 2 and the relation ``before``.

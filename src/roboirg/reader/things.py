@@ -12,12 +12,12 @@ import re
 from collections.abc import Mapping
 from typing import Literal, NamedTuple, cast
 
-from roboirg.reader.phrases import Chunks, Found, PhraseRule, Rewrites, compiled
+from roboirg.reader.phrases import Chunks, FoundPhrase, PhraseRule, Rewrites, compiled
 from roboirg.reader.places import Place, Side
 from roboirg.reader.tokens import color_of, number_of, ordinal_of
 
-PlaceMoment = Literal["first", "last"]
-ALL_OF_THEM = -1
+Moment = Literal["first", "last"]
+ALL = -1
 """The number of *all red cubes*."""
 
 
@@ -27,7 +27,7 @@ class Description(NamedTuple):
     Attributes:
         noun: ``cube``, ``container``, ``box`` or ``tape``; ``one`` for any of them.
         color: of the thing.
-        number: how many of them, or `ALL_OF_THEM`; None if the words do not say.
+        number: how many of them, or `ALL`; None if the words do not say.
         is_definite: whether it is *the* or *that*, so that it may have been named before.
         is_shown: whether it is the one that the video shows.
         place: where it stands.
@@ -42,7 +42,7 @@ class Description(NamedTuple):
     is_definite: bool = False
     is_shown: bool = False
     place: Place | None = None
-    moment: PlaceMoment | None = None
+    moment: Moment | None = None
     under: Description | None = None
     like: Description | None = None
 
@@ -200,7 +200,7 @@ def read_things(chunks: Chunks) -> None:
     chunks.apply(_LIKENESSES)
 
 
-def _place(found: Found, place: Place) -> Place | None:
+def _place(found: FoundPhrase, place: Place) -> Place | None:
     """Return a place with the side, rank and anchors that its words name; None if too deep.
 
     Args:
@@ -232,7 +232,7 @@ def _is_deep(anchor: object) -> bool:
     return levels >= _MAX_DEPTH
 
 
-def _anchor(found: Found, name: str) -> object:
+def _anchor(found: FoundPhrase, name: str) -> object:
     """Return the description of a thing, or the kind of a fixture: ``target#1``, ``the bin``."""
     kind, _, _ = found[name].partition("#")
     if kind == "thing":
@@ -240,18 +240,18 @@ def _anchor(found: Found, name: str) -> object:
     return kind.removeprefix("the ")
 
 
-def _member(found: Found) -> Place:
+def _member(found: FoundPhrase) -> Place:
     """Return a place among a few things, *on the left of the two in the back*."""
     place: Place = found.value("place")
     return place._replace(group=found.value("group"), size=number_of(found["size"]) or 0)
 
 
-def _number_of_each(found: Found) -> int:
+def _number_of_each(found: FoundPhrase) -> int:
     """Return how many there are of each color."""
     return number_of(found["count"]) or 1
 
 
-def _named(found: Found) -> Description:
+def _named(found: FoundPhrase) -> Description:
     """Return the description of a thing that is named by noun, color or both.
 
     *two red cubes* has the noun ``cube``, the color ``red`` and the number 2.
@@ -273,19 +273,19 @@ def _named(found: Found) -> Description:
 def _number_by(determiner: str, *, is_plural: bool) -> int | None:
     """Return how many things words without a number mean: *a cube* is one; None if unclear."""
     if determiner in ("all", "each", "every", "both"):
-        return ALL_OF_THEM
+        return ALL
     if determiner in ("a", "an", "another", "the", "") and not is_plural:
         return 1
     return None
 
 
-def _like(found: Found) -> Description:
+def _like(found: FoundPhrase) -> Description:
     """Return cubes of the color of another thing: *one more of the same color as the red one*."""
     number = number_of(found["count"]) or 1
     return Description("cube", number=number, like=found.value("like"))
 
 
-def _standing(found: Found) -> Description | None:
+def _standing(found: FoundPhrase) -> Description | None:
     """Return a thing with its place; None if it has another description already.
 
     *thing#0 that was place#1* also says when it stood there: at first.
@@ -297,30 +297,30 @@ def _standing(found: Found) -> Description | None:
     return thing._replace(place=found.value("place"), moment=moment)
 
 
-def _covering(found: Found) -> Description | None:
+def _covering(found: FoundPhrase) -> Description | None:
     """Return a container over a thing."""
     return _over(found.value("thing"), found.value("under"))
 
 
-def _covering_place(found: Found) -> Description | None:
+def _covering_place(found: FoundPhrase) -> Description | None:
     """Return a container over what stands at a place."""
     under = Description("cube", is_definite=True, place=found.value("place"))
     return _over(found.value("thing"), under)
 
 
-def _covering_it(found: Found) -> Description:
+def _covering_it(found: FoundPhrase) -> Description:
     """Return a thing as it is: *over it* says no more."""
     thing: Description = found.value("thing")
     return thing
 
 
-def _shown(found: Found) -> Description:
+def _shown(found: FoundPhrase) -> Description:
     """Return a thing as the one that the video shows."""
     thing: Description = found.value("thing")
     return thing._replace(is_shown=True)
 
 
-def _owned(found: Found) -> Description:
+def _owned(found: FoundPhrase) -> Description:
     """Return the container over a cube, *blue's container*."""
     cube = Description("cube", color_of(found["color"] or found["other"]))
     return Description("container", is_definite=True, under=cube)
@@ -339,7 +339,7 @@ def _over(thing: Description, under: Description) -> Description | None:
     return thing._replace(noun="container", under=under._replace(noun="cube"))
 
 
-def _moment(*words: str) -> PlaceMoment | None:
+def _moment(*words: str) -> Moment | None:
     """Return the moment of a place: *now* is the last one, *was* and *at first* the first."""
     text = " ".join(words)
     if re.search(r"\b(?:now|currently|at the moment)\b", text):
