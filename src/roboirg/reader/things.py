@@ -16,8 +16,8 @@ from roboirg.reader.phrases import Chunks, FoundPhrase, PhraseRule, Rewrites, co
 from roboirg.reader.places import Place, Side
 from roboirg.reader.tokens import color_of, number_of, ordinal_of
 
-Moment = Literal["first", "last"]
-ALL = -1
+PlaceMoment = Literal["first", "last"]
+ALL_OF_THEM = -1
 """The number of *all red cubes*."""
 
 
@@ -27,7 +27,7 @@ class Description(NamedTuple):
     Attributes:
         noun: ``cube``, ``container``, ``box`` or ``tape``; ``one`` for any of them.
         color: of the thing.
-        number: how many of them, or `ALL`; None if the words do not say.
+        number: how many of them, or `ALL_OF_THEM`; None if the words do not say.
         is_definite: whether it is *the* or *that*, so that it may have been named before.
         is_shown: whether it is the one that the video shows.
         place: where it stands.
@@ -42,7 +42,7 @@ class Description(NamedTuple):
     is_definite: bool = False
     is_shown: bool = False
     place: Place | None = None
-    moment: Moment | None = None
+    moment: PlaceMoment | None = None
     under: Description | None = None
     like: Description | None = None
 
@@ -273,7 +273,7 @@ def _named(found: FoundPhrase) -> Description:
 def _number_by(determiner: str, *, is_plural: bool) -> int | None:
     """Return how many things words without a number mean: *a cube* is one; None if unclear."""
     if determiner in ("all", "each", "every", "both"):
-        return ALL
+        return ALL_OF_THEM
     if determiner in ("a", "an", "another", "the", "") and not is_plural:
         return 1
     return None
@@ -339,7 +339,7 @@ def _over(thing: Description, under: Description) -> Description | None:
     return thing._replace(noun="container", under=under._replace(noun="cube"))
 
 
-def _moment(*words: str) -> Moment | None:
+def _moment(*words: str) -> PlaceMoment | None:
     """Return the moment of a place: *now* is the last one, *was* and *at first* the first."""
     text = " ".join(words)
     if re.search(r"\b(?:now|currently|at the moment)\b", text):
