@@ -376,7 +376,7 @@ def test_a_dry_run_names_the_forms_it_counts(roboirg, tmp_path, words, caption):
     [
         (("--out", "{file}"), "Cannot write to {file}: {file} is not a folder"),
         (("--out", "{file}/deep/er"), "{file} is not a folder"),
-        (("--out", "{other}"), "language version 1.1"),
+        (("--out", "{other}"), "language version is 1.1"),
     ],
 )
 def test_a_dry_run_checks_what_a_run_checks(roboirg, tmp_path, words, sentence):
