@@ -9,7 +9,7 @@ from roboirg.core.episode import Goal
 from roboirg.core.errors import InvalidValueError
 from roboirg.language import instruct
 from roboirg.language.instruction import Utterance
-from roboirg.shortcuts.goal_learner import LEARNED_FLOORS, GoalLearner, Heard
+from roboirg.shortcuts.goal_learner import LEARNED_FLOORS, GoalLearner, LearnerInput
 from roboirg.shortcuts.goal_vocabulary import goal_vocabulary
 from roboirg.shortcuts.named_values import marked_text
 from roboirg.shortcuts.scene_facts import scene_facts
@@ -45,7 +45,7 @@ def shares(text_of, count=150):
     """The share of test texts whose color each floor gets right."""
     learner = GoalLearner(planted(text_of, 1000, count), planted(text_of, 5000, 50))
     tested = planted(text_of, 9000, 100)
-    heard = [Heard.of(episode) for episode in tested]
+    heard = [LearnerInput.of(episode) for episode in tested]
     found = {}
     for floor in LEARNED_FLOORS:
         right = 0
@@ -95,7 +95,7 @@ def test_a_cue_of_the_scene_is_found_without_words():
     """In the video, the robot moves the cube that the goal asks for."""
     learned, held_back, told = (said_of(1000, 100), said_of(5000, 40), said_of(9000, 80))
     learner = GoalLearner(learned, held_back)
-    heard = [Heard.of(episode)._replace(text="", candidates={}) for episode in told]
+    heard = [LearnerInput.of(episode)._replace(text="", candidates={}) for episode in told]
 
     guesses = learner.guesses("scene-only", heard)
 
@@ -124,7 +124,7 @@ def test_the_facts_of_a_scene_are_as_stored_and_do_not_follow_from_its_goal(snap
 
 def test_the_same_texts_teach_the_same():
     sets = planted(by_position, 1000, 40), planted(by_position, 5000, 15)
-    heard = [Heard.of(told) for told in planted(by_position, 9000, 20)]
+    heard = [LearnerInput.of(told) for told in planted(by_position, 9000, 20)]
 
     first = GoalLearner(*sets)
     second = GoalLearner(*sets)
@@ -136,7 +136,9 @@ def test_the_same_texts_teach_the_same():
 def test_a_learner_hears_the_same_whatever_the_goal():
     ((episode, said),) = planted(by_position, 9000, 1)
     for goal in get_task(TASK).goals(episode.scene):
-        assert Heard.of((replace(episode, goal=goal), said)) == Heard.of((episode, said))
+        assert LearnerInput.of((replace(episode, goal=goal), said)) == LearnerInput.of(
+            (episode, said)
+        )
 
 
 def test_rivals_are_candidates_in_the_order_of_mention():
@@ -146,7 +148,7 @@ def test_rivals_are_candidates_in_the_order_of_mention():
 
     said = instruct(episode, "direct-rival")
 
-    assert Heard.of((episode, said)).candidates == {
+    assert LearnerInput.of((episode, said)).candidates == {
         slot: tuple(values) for slot, values in said.metadata["candidates"].items()
     }
 

@@ -66,7 +66,7 @@ class ActionLog:
         return digest.hexdigest()
 
     def chunks(self) -> list[CheckedActions]:
-        """Return the rows of each answer of the policy; none if it gave none."""
+        """Return the actions (n, size) of each answer of the policy, in order; none without any."""
         if not len(self.requests):
             return []
         return np.split(self.rows, self.requests[1:])
@@ -97,7 +97,11 @@ def write_actions(log: ActionLog, folder: Path) -> str:
 
 
 def read_actions(folder: Path, digest: str) -> ActionLog:
-    """Read the actions with this digest from the folder of a run; the file is named after it.
+    """Return the actions of an episode, read from the folder of its run.
+
+    Args:
+        folder: of the run.
+        digest: SHA-256 of the actions, from the episode's record; the file is named after it.
 
     Raises:
         StoreError: the file is missing, is no action log, or has another content than its name
@@ -116,7 +120,7 @@ def read_actions(folder: Path, digest: str) -> ActionLog:
 
 
 def _pack(log: ActionLog) -> bytes:
-    """Return the content of a file of actions, compressed."""
+    """Return the content of a compressed NumPy file (.npz) with the actions of an episode."""
     file = io.BytesIO()
     # Column by column: the numbers of one joint resemble each other, so they take less space.
     rows = np.asfortranarray(log.rows)
@@ -137,7 +141,9 @@ def _shortest(numbers: NDArray[np.float64]) -> NDArray[np.floating]:
 
 
 def _unpack(content: bytes) -> ActionLog:
-    """Return the actions in the content of a file, the reverse of `_pack`; all of it is checked.
+    """Return the actions in the content of a NumPy file (.npz), the reverse of `_pack`.
+
+    The file may be a stranger's, so size, types and values are checked.
 
     Raises:
         ValueError: an array has another type, or the answers do not fit the rows.
@@ -168,7 +174,15 @@ def _unpack(content: bytes) -> ActionLog:
 
 
 def _check_requests(requests: NDArray[np.int32], row_count: int) -> None:
-    """Raise if the first rows of the policy's answers are not 0 and then ever later ones."""
+    """Raise if the rows with which the policy's answers begin are not 0 and then ever larger.
+
+    Args:
+        requests: index of the first row of each answer, (k,).
+        row_count: number of rows in all.
+
+    Raises:
+        ValueError: they are not.
+    """
     if requests.ndim != 1 or not np.array_equal(np.unique(requests), requests):
         raise ValueError("the answers of the policy are not in order.")
     if len(requests) and (requests[0] != 0 or requests[-1] > row_count):

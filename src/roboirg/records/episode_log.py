@@ -41,7 +41,7 @@ def log_path(folder: Path, slug: str) -> Path:
 
 
 def logged_slugs(folder: Path) -> frozenset[str]:
-    """Return the slugs of the episodes of a run that have a log, which is not empty."""
+    """Return the names (slugs) of a run's episodes that have a log that is not empty."""
     slugs = set()
     with contextlib.suppress(FileNotFoundError), os.scandir(folder / LOG_FOLDER) as entries:
         for entry in entries:
@@ -80,7 +80,7 @@ class EpisodeLog:
         self._thread = threading.Thread(target=self._watch, name="episode log", daemon=True)
 
     def trim(self) -> None:
-        """Shorten a log that is too long: its begin and end stay, with a note between them."""
+        """Shorten the file if it is too long: its begin and end stay, with a note between them."""
         size = os.fstat(self.descriptor).st_size
         if size <= self._limit:
             return
@@ -100,6 +100,7 @@ class EpisodeLog:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        """Trim the file, remove keys of services from it, and delete it if it is empty."""
         self._finished.set()
         self._thread.join()
         # A policy may have closed the descriptor; its log must not end the run.
@@ -123,10 +124,14 @@ class EpisodeLog:
 
 @contextlib.contextmanager
 def logged_output(path: Path, limit: int = MAX_LOG_BYTES) -> Iterator[None]:
-    """Write to a log what this process and its new children print while the block runs.
+    """Write to a file what this process and its new children print while the block runs.
 
     Covers `print`, `logging`, warnings, and native code: the descriptors of stdout and stderr lead
     to the file. They are those of the whole process, so only one log can be open this way.
+
+    Args:
+        path: of the file; an earlier one is replaced.
+        limit: size of the file, bytes; the middle of longer output is left out.
 
     Raises:
         RoboIRGError: the file cannot be created.

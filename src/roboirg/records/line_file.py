@@ -60,9 +60,14 @@ class LineFile:
         self.damage = ""
 
     def parse(self, parse_line: Callable[[bytes, Path, int], Parsed]) -> Iterator[Parsed]:
-        """Yield `parse_line` of each line, path and line number; nothing if there is no file.
+        """Yield what `parse_line` makes of each line; nothing if there is no file.
 
-        At the end a warning names the first damaged line; each process warns once of the same.
+        Damaged lines are skipped; a warning at the end names the first. An unfinished last line,
+        which a process may be writing, is kept in `torn`.
+
+        Args:
+            parse_line: gets the bytes of a line without its newline, the path, and the number of
+                the line from 1; raises `DamagedLineError` for a line that is no JSON.
 
         Raises:
             StoreError: the file cannot be read, or `parse_line` raises it.
@@ -84,9 +89,12 @@ class LineFile:
         self._describe_damage()
 
     def _whole_lines(self, file: BinaryIO) -> Iterator[bytes]:
-        """Yield the lines without newlines; `place` says where the yielded one is.
+        """Yield the lines of a file without newlines, and set `place` to where each is.
 
         A last line that is unfinished is not yielded, but kept in `torn`.
+
+        Raises:
+            StoreError: a line is too long.
         """
         start = 0
         read_line = functools.partial(file.readline, MOST_BYTES + 1)
@@ -107,9 +115,9 @@ class LineFile:
             yield content
 
     def _describe_damage(self) -> None:
-        """Describe damaged lines in `damage` and warn of them, or else describe an unfinished one.
+        """Set `damage` to a sentence on damaged lines, or else on an unfinished last line.
 
-        An unfinished line alone is no reason for a warning, as a run may be writing it.
+        Damaged lines are logged as a warning; an unfinished one is not, as a run may be writing it.
         """
         if self.torn:
             self.damage = (
@@ -172,7 +180,10 @@ class AppendFile:
             undo.pop_all()
 
     def extend(self, lines: Iterable[bytes]) -> None:
-        """Write lines, given without newlines; when this returns, all are on disk.
+        """Append lines to the file, given without newlines; when this returns, all are on disk.
+
+        If one cannot be written, the file is cut to its earlier size: all lines are written or
+        none.
 
         Raises:
             StoreError: they cannot be written, or `lines` raises it; the file is unchanged.
@@ -209,13 +220,17 @@ class AppendFile:
         os.pwrite(self._lock, f"{os.getpid()}\n".encode(), 0)
 
     def _repair_tail(self, torn: bytes) -> None:
-        """Move an unfinished last line into a file of its own, so that this one ends in a newline.
+        """Make the file end in a newline, so that lines can be appended.
+
+        An unfinished last line, of a writer that was killed, moves into a file of its own. If a
+        complete line lacks only its newline, that is added.
 
         Args:
-            torn: the unfinished line; empty if there is none.
+            torn: bytes of the unfinished line; empty if there is none.
         """
         size = os.fstat(self._file).st_size
         if torn:
+            # The copy is on disk before the original is cut off, so nothing can be lost.
             aside = os.open(self._torn_path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
             try:
                 _write_all(aside, torn + b"\n")

@@ -55,7 +55,14 @@ class MergeSummary(NamedTuple):
 
 @dataclass
 class _Destination:
-    """What a merged run holds so far, and how it came to that."""
+    """Which results a merge has kept so far, and counts of those that it has seen.
+
+    Attributes:
+        kept: the results of the merged run, by identity of their episodes.
+        added: number of episodes that were new.
+        duplicates: number of results whose episode was kept before.
+        conflicts: duplicates whose verdict differs from the one that is kept.
+    """
 
     kept: dict[RecordKey, Summary]
     added: int = 0
@@ -63,9 +70,10 @@ class _Destination:
     conflicts: list[Summary] = field(default_factory=list)
 
     def take(self, results: Iterable[Summary]) -> list[Summary]:
-        """Keep the results that are new, and verdicts in place of errors; return those kept.
+        """Keep results of one run; return those that must be copied into the merged run.
 
-        The first verdict of an episode stays; a different one is noted as a conflict.
+        They are those of new episodes, and verdicts (success or failure) that replace an error. The
+        first verdict of an episode stays; a different one is noted in `conflicts`.
         """
         taken = []
         for result in results:
@@ -77,8 +85,8 @@ class _Destination:
                 self.duplicates += 1
                 if {earlier.outcome, result.outcome} == {"success", "failure"}:  # one of each
                     self.conflicts.append(result)
-                is_better = earlier.outcome == "error" and result.outcome != "error"
-                if not is_better:
+                replaces_error = earlier.outcome == "error" and result.outcome != "error"
+                if not replaces_error:
                     continue
             self.kept[key] = result
             taken.append(result)
@@ -111,14 +119,19 @@ def merge_runs(folders: Sequence[Path], out: Path) -> MergeSummary:
         for folder, run in runs:
             taken = merged.take(run.newest)
             store.extend(_copied_lines(run, taken, folder, out))
-    told = [result for result in merged.kept.values() if result.arm == TOLD]
+    # Other arms are controls, in which words or seeds differ on purpose.
+    usual = [result for result in merged.kept.values() if result.arm == TOLD]
     return MergeSummary(
-        merged.added, merged.duplicates, tuple(merged.conflicts), tuple(mixtures(told))
+        merged.added, merged.duplicates, tuple(merged.conflicts), tuple(mixtures(usual))
     )
 
 
 def _keep_plans(folders: Sequence[Path], out: Path) -> None:
-    """Keep the plans of all runs, so that what is missing can be counted."""
+    """Copy the plans of all runs into the merged one, so that missing episodes can be counted.
+
+    Raises:
+        StoreError: a plan cannot be read.
+    """
     for folder in folders:
         for name in plan_names(folder):
             try:
@@ -142,14 +155,17 @@ class _Expected(NamedTuple):
 
 
 def _check_versions(runs: Iterable[tuple[Path, Iterable[Summary]]]) -> None:
-    """Raise if records of different folders cannot be in one run, because their versions differ.
+    """Raise if results cannot be in one run, because they were made with different versions.
 
-    What must be equal has an owner: the versions of environment and language belong to everything,
-    those of words to a task and pool, others to a policy or a scene. Each owner's versions are
-    compared with the first that were found.
+    The versions of environment and language must be equal in all results, that of words in those of
+    a task and pool of words, others in those of a policy or a scene. What shares versions is called
+    their owner here; each owner's versions are compared with the first that were found.
 
     Args:
         runs: folders, and the results in them.
+
+    Raises:
+        StoreError: versions differ.
     """
     known: dict[str, _Expected] = {}
     for folder, results in runs:
@@ -181,13 +197,14 @@ def _check_versions(runs: Iterable[tuple[Path, Iterable[Summary]]]) -> None:
 def _copied_lines(
     run: StoredRun[Summary], wanted: Sequence[Summary], source: Path, target: Path
 ) -> Iterator[bytes]:
-    """Yield the lines of records; copy the videos, logs and actions of each before its line.
+    """Yield the lines of records for another folder, and copy their files into it.
 
-    A video whose file is missing is removed from its line.
+    The videos, logs and actions of a record are copied before its line is yielded, so a stored line
+    has its files. If the file of a video is missing, the line is yielded without it.
 
     Args:
         run: with the records.
-        wanted: records of it.
+        wanted: those to copy.
         source: folder of the run.
         target: folder to copy to.
     """
@@ -210,9 +227,14 @@ def _copied_lines(
 
 
 def _copy(name: str, source: Path, target: Path) -> bool:
-    """Copy a file of a run by its path in it; return whether it exists.
+    """Copy a file of a run into another run, if it exists; return whether it does.
 
-    It replaces a file of that path, as a record that is an error may be replaced.
+    A file of that name is replaced, as it may belong to an error that a verdict replaces.
+
+    Args:
+        name: path of the file relative to the folder of a run.
+        source: folder of the run.
+        target: folder of the other run.
     """
     file = run_file(source, name)
     copy = run_file(target, name)

@@ -73,7 +73,10 @@ _PACKAGE = Trait(
 
 
 def _environment_traits() -> list[Trait]:
-    """Return the options of an environment that policies may have chosen differently."""
+    """Return a trait for each option of the environment that may differ between policies.
+
+    Those in `FAIRNESS` must not differ.
+    """
     fairness_paths = {trait.path for trait in FAIRNESS}
     traits = []
     for name in ENVIRONMENT_OPTIONS:
@@ -92,9 +95,11 @@ _OF_POLICY = (
 
 
 def mixtures(results: Collection[Summary]) -> list[str]:
-    """Return a sentence for each trait of which the results have several values.
+    """Return a warning for each property in which results differ that are compared or averaged.
 
-    Some traits should be the same in all results, others only in those of one policy.
+    For example ``Mixed splits: test, val. They are kept apart and cannot be compared.`` Some
+    properties, such as the split, should be the same in all results, others, such as a policy's
+    version, only in those of one policy.
     """
     sentences = [*differing(results, FAIRNESS), *differing(results, _COMMON)]
     if any(result.verdict_code is None for result in results):
@@ -108,14 +113,14 @@ def mixtures(results: Collection[Summary]) -> list[str]:
 def differing(
     results: Collection[Summary], traits: Iterable[Trait], of_whom: str = ""
 ) -> Iterator[str]:
-    """Yield a sentence for each of some traits of which the results have several values.
+    """Yield a sentence for each property that is not the same in all results.
 
     For example ``Mixed splits: test, val. They are kept apart and cannot be compared.``
 
     Args:
-        results: in which the traits should be the same.
-        traits: that are compared.
-        of_whom: stands behind the trait in a sentence, such as `` of mine``.
+        results: in which the properties should be the same.
+        traits: the properties; one with an owner only has to be the same in results of one owner.
+        of_whom: stands behind the property in a sentence, such as `` of mine``.
     """
     for trait in traits:
         value_of = operator.attrgetter(trait.path)

@@ -67,7 +67,7 @@ class PackManifest(BaseModel):
 
 @contextlib.contextmanager
 def opened_run(path: Path, folders: Collection[str] = PACKED_FOLDERS) -> Iterator[Path]:
-    """Yield the folder of a run: the path itself, or a pack unpacked for the while.
+    """Yield the folder of a run: the path itself, or a pack (zip) that is unpacked temporarily.
 
     Args:
         path: of a folder or a pack.
@@ -100,7 +100,15 @@ def opened_run(path: Path, folders: Collection[str] = PACKED_FOLDERS) -> Iterato
 
 
 def _manifest(archive: zipfile.ZipFile, path: Path) -> PackManifest:
-    """Return the manifest of a pack, which lists its files; `path` is the pack's, for the error."""
+    """Return the manifest of a pack, which lists the SHA-256 of its files.
+
+    Args:
+        archive: the pack.
+        path: of the pack, for the error.
+
+    Raises:
+        StoreError: there is none, or it cannot be read.
+    """
     try:
         if archive.getinfo(MANIFEST).file_size > _MAX_MANIFEST_BYTES:
             raise ValueError("it is too large")
@@ -110,15 +118,18 @@ def _manifest(archive: zipfile.ZipFile, path: Path) -> PackManifest:
 
 
 def _unpack(archive: zipfile.ZipFile, path: Path, folder: Path, folders: Collection[str]) -> None:
-    """Unpack what is wanted of an archive; what a stranger may have put into it is checked first.
+    """Unpack the wanted files of a pack, which may be a stranger's, so it is checked first.
 
-    It must hold exactly the files of its manifest, not too much in all, and only files of a run.
+    It must hold exactly the files of its manifest, not too many bytes, and only files of a run.
 
     Args:
         archive: the pack.
         path: of the pack, for errors.
         folder: where its files go.
-        folders: of `PACKED_FOLDERS`, what is wanted.
+        folders: those of `PACKED_FOLDERS` that are wanted, next to records and plans.
+
+    Raises:
+        StoreError: the pack is not what it should be.
     """
     digests = _manifest(archive, path).files
     entries = [entry for entry in archive.infolist() if entry.filename != MANIFEST]
@@ -136,7 +147,7 @@ def _unpack(archive: zipfile.ZipFile, path: Path, folder: Path, folders: Collect
 def _unpack_file(
     archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path, folder: Path, expected: str
 ) -> None:
-    """Unpack a file block by block.
+    """Unpack a file block by block, and raise if it is not the one of the manifest.
 
     Args:
         archive: the pack.
@@ -157,12 +168,12 @@ def _unpack_file(
 
 
 def _check_name(name: str, path: Path) -> None:
-    """Raise unless a name in a pack is that of a file of a run.
+    """Raise unless a file in a pack has the name of a file of a run, such as ``logs/a.txt``.
 
     A name such as ``../x`` would be written outside of the folder.
 
     Args:
-        name: of the file.
+        name: path of the file in the pack.
         path: of the pack, for the error.
     """
     known_folders = (EARLIER_PLANS, *PACKED_FOLDERS)

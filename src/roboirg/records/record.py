@@ -132,12 +132,12 @@ class Job(msgspec.Struct, frozen=True, kw_only=True, gc=False):
 
     @property
     def slug(self) -> str:
-        """Name of the episode for files, such as ``mine-PickXtimes-test-0-direct-implicit-1a2b3c``.
+        """Name for the files of an episode: ``mine-PickXtimes-test-0-direct-implicit-1a2b3c``.
 
-        It ends in a hash of the whole identity, as the readable part may be cut.
+        It ends in a hash of all fields that identify the job, as the readable part may be cut.
         """
         words = [self.policy, self.task, self.split, str(self.episode), self.setting, self.form]
-        # Only from the identity, so that a record (which is a job) has its job's slug.
+        # A record is a job with more fields; only those of the job count, so both have one slug.
         identity = {name: getattr(self, name) for name in IDENTITY}
         if self.arm == TOLD:
             del identity["arm"]  # files of runs without arms keep their names
@@ -389,16 +389,20 @@ class Summary(Job, frozen=False, kw_only=True, gc=False):  # type: ignore[misc]
 
     @property
     def policy_versions(self) -> Versions:
-        """What the policy is, with its server's version unless an error came before that."""
+        """Versions of the policy and its server, for comparisons.
+
+        The server's version is None if it is not known, as an error may have come before it.
+        """
         missing = None if self.outcome == "error" else NO_VERSION
         return self.ref.versions._replace(server_version=self.server_version or missing)
 
     @property
     def words_owner(self) -> str:
-        """What the words belong to, such as ``PickXtimes/test``: results of one owner share them.
+        """Which results must have the same words as this one, such as ``PickXtimes/test``.
 
-        It is the task and pool. A setting with words of its own begins their name with task and
-        pool and adds to it; then it is that name, up to the ``@``. A wording file is named behind.
+        Usually those of the task and the pool of words (train or test). For a setting with words of
+        its own it is the name of these words up to the ``@``, which begins with task and pool. A
+        wording file is named behind: ``PickXtimes/test of mine@…``.
         """
         usual = f"{self.task}/{self.pool}"
         owner, _, _ = self.words.partition("@")
@@ -474,7 +478,7 @@ class Record(Summary, kw_only=True, forbid_unknown_fields=True):  # type: ignore
         self.attribution = None
 
     def record_status(self, status: str, cause: str | None) -> bool:
-        """Record the final status. Returns False while the episode is running.
+        """Set outcome and cause from the status of the environment; return whether it was final.
 
         Args:
             status: as the environment reports it.

@@ -80,7 +80,14 @@ def read_summary(line: bytes, path: Path, number: int) -> Summary:
 
 
 def _read(decoder: msgspec.json.Decoder[Stored], line: bytes, path: Path, number: int) -> Stored:
-    """Read a line with a decoder; raises like `read_record`."""
+    """Return the record or summary in a line of JSON; raises like `read_record`.
+
+    Args:
+        decoder: of records or of summaries.
+        line: without its newline.
+        path: of the file, for the error.
+        number: of the line, from 1, for the error.
+    """
     try:
         stored = decoder.decode(line)
     except msgspec.ValidationError as error:
@@ -96,9 +103,15 @@ def _read(decoder: msgspec.json.Decoder[Stored], line: bytes, path: Path, number
 
 
 def _explain(line: bytes, path: Path, number: int, error: msgspec.ValidationError) -> StoreError:
-    """Return the error for a line that is JSON, but no record.
+    """Return the error to raise for a line that is JSON, but no record that can be read.
 
-    If it has another schema version, that explains all; else the fault is in a field.
+    It names the schema version of the line if that is another one, else the field that is wrong.
+
+    Args:
+        line: without its newline.
+        path: of the file.
+        number: of the line, from 1.
+        error: what msgspec raised.
     """
     try:
         version = _version_decoder.decode(line).schema_version
@@ -113,7 +126,10 @@ def _explain(line: bytes, path: Path, number: int, error: msgspec.ValidationErro
 
 
 def _words(error: Exception) -> str:
-    """Return what is wrong with a record; a regular expression is replaced by what it means."""
+    """Return msgspec's complaint about a record in plain words.
+
+    ``matching regex '...'`` becomes what the regular expression means.
+    """
     words = str(error)
     for pattern, meaning in _MEANINGS.items():
         words = words.replace(f"matching regex {pattern!r}", meaning)

@@ -40,16 +40,20 @@ def run_folder(path: str | Path) -> Path:
 
 
 def run_file(folder: Path, name: str) -> Path:
-    """Return the path of a file by its name in a run, such as ``videos/a.mp4``; it need not exist.
+    """Return the path of a file of a run, which need not exist; raise if it would be outside.
 
-    A record may be a stranger's, so its names are not trusted.
+    A record may be a stranger's, so the names in it are not trusted.
+
+    Args:
+        folder: of the run.
+        name: path relative to the folder, such as ``videos/a.mp4``.
 
     Raises:
         ForeignPathError: it is outside of the run's folder, perhaps by a symbolic link.
     """
     path = folder / name
-    is_plain = len(name) <= MOST_PATH_LETTERS and re.fullmatch(RELATIVE_PATH, name)
-    if not is_plain or not _is_below(path, folder):
+    is_valid = len(name) <= MOST_PATH_LETTERS and re.fullmatch(RELATIVE_PATH, name)
+    if not is_valid or not _is_below(path, folder):
         shown = printable(name[:MOST_PATH_LETTERS])
         raise ForeignPathError(
             f"{shown!r} is not a file below {folder}: its name is longer than "
@@ -60,7 +64,7 @@ def run_file(folder: Path, name: str) -> Path:
 
 
 def refuse_links(folder: Path) -> None:
-    """Refuse a run's folder with a symbolic link in it, as what is written would land elsewhere.
+    """Raise if there is a symbolic link below a run's folder, as a run would write through it.
 
     Raises:
         ForeignPathError: there is one. The folder itself may be a link.
@@ -84,7 +88,12 @@ def _is_below(path: Path, folder: Path) -> bool:
 
 
 def store_plan(content: bytes, folder: Path) -> None:
-    """Write the newest plan of a run; another one that was there goes to ``plans/``."""
+    """Write the newest plan of a run; a different one that was there moves to ``plans/``.
+
+    Args:
+        content: of the plan, JSON.
+        folder: of the run.
+    """
     newest = folder / PLAN_FILE
     if newest.is_file():
         earlier = newest.read_bytes()

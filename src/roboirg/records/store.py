@@ -74,7 +74,9 @@ class RecordStore:
         self.extend([encode(record)])
 
     def extend(self, lines: Iterable[bytes]) -> None:
-        """Write records as JSON lines, without newlines; when this returns, all are on disk.
+        """Append records, each a line of JSON without its newline; all are stored or none.
+
+        When this returns, they are on disk.
 
         Raises:
             StoreError: a record cannot be written, a line is not one, or a policy or its server is
@@ -84,9 +86,12 @@ class RecordStore:
         verdicts = dict(self._verdicts)
 
         def checked_lines() -> Iterator[bytes]:
-            """Yield each line once it was read and compared with the policy's last verdict."""
+            """Yield each line that is a record, of the same versions as the policy's last verdict.
+
+            An error is not compared, as it may come before the versions are known.
+            """
             for line in lines:
-                read_record(line, self.path, 0)  # whole: what is stored can be read
+                read_record(line, self.path, 0)  # raises if it could not be read later
                 result = read_summary(line, self.path, 0)
                 if result.outcome != "error":
                     earlier = verdicts.get(result.policy, result)
@@ -102,7 +107,7 @@ class RecordStore:
         self._verdicts = verdicts
 
     def _read(self, lines: LineFile) -> None:
-        """Take in the records that are there."""
+        """Read the summaries of the records that are in the file."""
         self.stored = {identity_key(result): result for result in lines.parse(read_summary)}
         self.torn = lines.torn
         self._verdicts = _last_verdicts(self.stored.values())
@@ -202,7 +207,7 @@ class StoredRun(Generic[Stored]):
         return dict(zip(keys, self._places_in_order, strict=True))
 
     def lines(self, wanted: Iterable[Stored]) -> Iterator[bytes]:
-        """Yield the lines of some records, without newlines."""
+        """Yield the lines of some records from the file, as bytes without newlines."""
         with self._path.open("rb", buffering=_BUFFER) as file:
             for result in wanted:
                 place = self._places[identity_key(result)]
@@ -222,21 +227,24 @@ class StoredRun(Generic[Stored]):
 
 
 def _last_verdicts(results: Iterable[Stored]) -> dict[str, Stored]:
-    """Return the last result of each policy that is no error: the server reported its version."""
+    """Return the last success or failure of each policy, by its name.
+
+    In contrast to an error, such a result has the version of the policy's server.
+    """
     return {result.policy: result for result in results if result.outcome != "error"}
 
 
 def check_same(
     what: str, found: Iterable[Mismatch], where: str = "now", end: str = "choose another --out"
 ) -> None:
-    """Refuse records that are not of the same versions as others, or not of the same policy.
+    """Raise if there is a difference between the versions of two records.
 
     For example ``runs/a holds episodes of mine whose policy version is 1, but now it is 2; choose
     another --out.``
 
     Args:
         what: has the first values; the message begins with it.
-        found: the differences.
+        found: the differences; without any, nothing is raised.
         where: the second values are found.
         end: of the message.
 
@@ -248,10 +256,10 @@ def check_same(
 
 
 def _with_server_versions(results: Collection[Stored]) -> tuple[Stored, ...]:
-    """Return results, in which errors have a server's version where that can be known.
+    """Return the results, with the version of the policy's server filled in where errors lack it.
 
     An error may come before the server reports its version; then it gets that of the policy's last
-    verdict.
+    success or failure, if there is one.
     """
     verdicts = _last_verdicts(results)
     completed = []

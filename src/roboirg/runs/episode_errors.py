@@ -64,9 +64,10 @@ def describe_error(source: ErrorSource, error: BaseException) -> EpisodeError:
 
 
 def _error_kind(source: ErrorSource, error: BaseException) -> ErrorKind:
-    """Return the kind of an exception in a record, such as ``timeout``; else it is its source.
+    """Return the kind of error that a record gets for an exception: ``timeout``, ``policy``, ….
 
-    A policy may be the client of a server, so its time-outs and lost connections have own kinds.
+    A policy may be the client of a server, so its time-outs and lost connections have kinds of
+    their own. For all other exceptions the kind is `source`, where they were raised.
     """
     if isinstance(error, InvalidActionError):
         return "invalid_action"

@@ -46,7 +46,7 @@ class PreparedJob:
 
 
 def instruct_job(job: Job) -> Instruction:
-    """Return the instruction of a job.
+    """Return the instruction of a job: what is said of its episode in its control arm.
 
     Raises:
         InvalidValueError: the setting and options cannot express the episode, or the job's
@@ -63,7 +63,10 @@ def _open_wordings(job: Job) -> None:
 
 
 def other_versions(record: Summary) -> list[Mismatch]:
-    """Return where a record's language, words or environment are not the installed ones."""
+    """Return in which versions, of language, words or environment, a record is not as installed.
+
+    Empty if it could have been made with what is installed now.
+    """
     words = installed_words(record)
     if words is None:
         # They are of a wording file that is gone: they cannot be compared, so they count as equal.
@@ -77,9 +80,10 @@ def other_versions(record: Summary) -> list[Mismatch]:
 
 
 def installed_words(job: Job) -> str | None:
-    """Return which words this package has for a job.
+    """Return the identity of the words that are installed for a job, with a hash of them.
 
-    None if some are those of a wording file that is not there as it was.
+    For example ``PickXtimes/test@1a2b3c4d5e6f``. None if the job uses a wording file that is
+    missing or has changed.
     """
     try:
         _open_wordings(job)

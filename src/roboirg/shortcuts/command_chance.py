@@ -16,24 +16,25 @@ from roboirg.tasks import get_task
 
 
 def understood_goals(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals that fit all of an instruction; none if it has no meaning."""
+    """Return the goals of the scene that fit a whole instruction; none if it has no meaning."""
     if instruction.meaning is None:
         return ()
     return meaning.meant_goals(instruction.meaning, episode)
 
 
 def goals_of_command(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals that fit its last utterance alone; none if it has no meaning."""
+    """Return the goals of the scene that fit the last utterance alone; none without a meaning."""
     if instruction.meaning is None:
         return ()
     return meaning.command_goals(instruction.meaning, episode)
 
 
 def blind_goals(instruction: Instruction, episode: Episode) -> tuple[Goal, ...]:
-    """Return the goals among which a guess is blind: those that fit the command alone.
+    """Return the goals of the scene among which a blind guesser chooses.
 
-    Where the context names the candidates, as with a rival, it is a guess among them: to pick one
-    of two takes no understanding of which one is meant. None are returned without a meaning.
+    They are those that fit the command, the last utterance. Where the text before it names
+    candidates, such as a color and its rival, only these count: to pick one of two takes no
+    understanding of which one is meant. Without a declared meaning there are none.
     """
     if instruction.meaning is None:
         return ()

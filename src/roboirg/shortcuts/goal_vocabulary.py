@@ -18,7 +18,7 @@ SPLIT: Split = "train"
 
 
 class SlotVocabulary(NamedTuple):
-    """What a slot may hold.
+    """What a slot of a goal, such as ``color``, may hold.
 
     Attributes:
         values: every value, in order.
@@ -37,9 +37,10 @@ GoalVocabulary = Mapping[str, SlotVocabulary]
 
 @functools.cache
 def goal_vocabulary(task: str) -> GoalVocabulary:
-    """Return the slots of a task's goals, with all values that occur in any scene of train.
+    """Return all values that each slot of a task's goals can have, by name of the slot.
 
-    PickXtimes -> ``color`` with blue, green and red, ``repeats`` with 1 to 5.
+    They are found in the goals of all scenes of the train split: PickXtimes -> ``color`` with blue,
+    green and red, ``repeats`` with 1 to 5.
     """
     contents: dict[str, set[SlotValue]] = {}
     for episode in split_episodes([task], [SPLIT]):
@@ -69,9 +70,10 @@ def _vocabulary(contents: set[SlotValue]) -> SlotVocabulary:
 
 
 def orders(goal: Goal) -> Iterator[Mapping[str, SlotValue]]:
-    """Yield the slots of a goal in every order that means the same.
+    """Yield the values of a goal by slot, in every order that means the same goal.
 
-    Amounts may come in any order: two red cubes and a blue one are a blue one and two red cubes.
+    Two red cubes and a blue one -> ``colors`` red, blue with ``counts`` 2, 1, then blue, red with
+    1, 2. A goal without counts is yielded once, as the order of its values matters.
     """
     slots = goal.as_mapping()
     if not {"colors", "counts"} <= set(slots):

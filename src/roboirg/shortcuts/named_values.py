@@ -63,17 +63,17 @@ class NamedValue(NamedTuple):
 
 
 def named_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[NamedValue, ...]:
-    """Return every mention of a slot's values in an instruction, in order.
+    """Return every value of a goal slot that an instruction names, in order, with repetitions.
 
     *There is a red cube. Take the blue one.* -> red, not stated, and blue, stated. The last
-    sentence is taken for the command.
+    sentence is taken for the command; only the command can state a value.
     """
     sentences = _sentences(text)
     found: list[NamedValue] = []
     for number, words in enumerate(sentences, start=1):
         is_command = number == len(sentences)
         for mention in _mentions(words, slot, vocabulary):
-            is_stated = is_command and _is_plain(words, mention)
+            is_stated = is_command and _is_stated_plainly(words, mention)
             found.append(NamedValue(mention.value, is_stated))
     return tuple(found)
 
@@ -85,19 +85,20 @@ def stated_values(text: str, slot: str, vocabulary: SlotVocabulary) -> tuple[Val
 
 
 def marked_text(text: str, slot: str, vocabulary: SlotVocabulary) -> str:
-    """Return a text in which the rank of mention stands for each named value of a slot.
+    """Return a text in which each value of a goal slot is replaced by its rank.
 
-    *Red and blue; not the blue one* becomes *rank0 and rank1; not the rank1 one*.
+    The value that is named first has rank 0: for the slot ``color``, *Red and blue; not the blue
+    one* becomes *rank0 and rank1 not the rank1 one*.
     """
-    found: list[str] = []
+    marked_words: list[str] = []
     ranks: dict[Value, int] = {}
     for sentence in _sentences(text):
         words = list(sentence)
         for mention in _mentions(sentence, slot, vocabulary):
             rank = ranks.setdefault(mention.value, len(ranks))
             words[mention.place] = f"rank{rank}"
-        found += words
-    return " ".join(found)
+        marked_words += words
+    return " ".join(marked_words)
 
 
 # Cached: every slot and every rule reads the same text.
@@ -112,18 +113,19 @@ def command_words(text: str) -> Sentence:
     return sentences[-1] if sentences else ()
 
 
-def pointed_value(text: str) -> int | None:
-    """Return which of two values the words before the command point at, 0 or 1; None if neither.
+def pointed_index(text: str) -> int | None:
+    """Return at which of two named values the sentences before the command point.
 
-    *I mean the latter.* -> 1, *It is not the second one.* -> 0.
+    0 is the first, 1 the second, None neither: *I mean the latter.* -> 1, *It is not the second
+    one.* -> 0.
 
-    The last pointer decides; under *other*, *not* or *no* it is the opposite. That is no grammar:
-    *not the former but the latter* has a *not*, too.
+    The last such word decides. *Other*, *not* or *no* anywhere in its sentence reverse it; that is
+    a heuristic, which misreads *not the former but the latter*.
     """
     before_command = _sentences(text)[:-1]
     for words in reversed(before_command):
         pointed = [POINTERS[word] for word in words if word in POINTERS]
-        # "First" and "last" alone point at nothing.
+        # Without "one", as in "first, listen", these words point at no value.
         if pointed and _has_pointer(words):
             is_opposite = not OPPOSITES.isdisjoint(words)
             return 1 - pointed[-1] if is_opposite else pointed[-1]
@@ -140,11 +142,16 @@ def _has_pointer(words: Sentence) -> bool:
     return False
 
 
-def part_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
-    """Return how many things a command seems to ask for, by its ranks, values and nouns.
+def thing_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
+    """Return how many things a command seems to ask for: the largest of several counts.
 
-    *Take the red cube and the blue cube* -> 2, but at most as many as a goal can have. `thing` is
-    the noun for what the task handles.
+    It counts words such as *the second one*, stated values, and nouns: *Take the red cube and the
+    blue cube* -> 2. A goal's largest number of values is the limit.
+
+    Args:
+        text: an instruction, whose last sentence is the command.
+        thing: noun for what the task handles, in the singular.
+        vocabulary: of the task's goals.
     """
     counts = [1, len(command_ranks(text))]
     for slot, slot_vocabulary in vocabulary.items():
@@ -158,9 +165,10 @@ def part_count(text: str, thing: str, vocabulary: GoalVocabulary) -> int:
 
 
 def command_ranks(text: str) -> tuple[int, ...]:
-    """Return the places of introduced things that the command takes.
+    """Return which of the things that were named before a command asks for, from 0.
 
-    *Take the former* -> 0; *take the second one and the third one* -> 1 and 2.
+    *Take the former* -> 0; *take the second one and the third one* -> 1 and 2; *take the red one*
+    -> none.
     """
     words = command_words(text)
     found: list[int] = []
@@ -174,12 +182,15 @@ def command_ranks(text: str) -> tuple[int, ...]:
 
 
 def _is_place_in_list(words: Sentence, place: int) -> bool:
-    """Return whether an ordinal is that of an introduced thing: *the second one*."""
+    """Return whether an ordinal counts things that were named before: *the second one*.
+
+    `place` is the index of the ordinal. *The second visit* does not count, as it names a value.
+    """
     following = words[place + 1 : place + 2]
-    return _before(words, place) == "the" and not _RANKED.isdisjoint(following)
+    return _word_before(words, place) == "the" and not _RANKED.isdisjoint(following)
 
 
-def _before(words: Sentence, place: int) -> str:
+def _word_before(words: Sentence, place: int) -> str:
     """Return the word before a place; empty at the beginning."""
     return words[place - 1] if place > 0 else ""
 
@@ -192,23 +203,26 @@ class _Mention(NamedTuple):
 
 
 def _mentions(words: Sentence, slot: str, vocabulary: SlotVocabulary) -> Iterator[_Mention]:
-    """Yield the mentions of a slot's values in a sentence; all values of a slot have one type."""
+    """Yield where a sentence names values of a goal slot, in order.
+
+    All values of a slot have one type, so the first loop finds numbers, the second other words.
+    """
     if all(isinstance(value, int) for value in vocabulary.values):
-        yield from _numbers(words, slot)
+        yield from _number_mentions(words, slot)
         return
     for place, word in enumerate(words):
         value = color_of(word) or word
         around = words[max(0, place - 1) : place + 2]
-        # "Before or after" names neither.
+        # "Before or after" leaves open which of the two it is.
         if value in vocabulary.values and "or" not in around:
             yield _Mention(place, value)
 
 
-def _numbers(words: Sentence, slot: str) -> Iterator[_Mention]:
-    """Yield the numbers that count things, and for visits and placements the ordinals, too.
+def _number_mentions(words: Sentence, slot: str) -> Iterator[_Mention]:
+    """Yield where a sentence names a number that could be the value of a goal slot.
 
-    *Three times* -> 3, *twice* -> 2, *two more times* -> none: it is a difference. *The second
-    visit* -> 2 where visits are counted, *the second one* -> none.
+    *Three times* -> 3, *twice* -> 2; *two more times* -> none, as it is a difference. In slots for
+    visits and placements ordinals count, too: *the second visit* -> 2, *the second one* -> none.
     """
     has_ordinals = SLOT_TYPE_NAMES.get(slot) in ORDINAL_TYPES
     for place, word in enumerate(words):
@@ -227,22 +241,22 @@ def _numbers(words: Sentence, slot: str) -> Iterator[_Mention]:
 
 
 def _is_factor(following: Sequence[str]) -> bool:
-    """Return whether an adverb multiplies what follows it: *twice as many*, *twice three*."""
+    """Return whether *twice* multiplies the words after it: *twice as many*, *twice three*."""
     return any(word in ("as", "that", "the") or number_of(word) is not None for word in following)
 
 
 def _counts_things(words: Sentence, place: int, slot: str) -> bool:
-    """Return whether a cardinal says how many, and is no pronoun and no difference.
+    """Return whether the cardinal at an index says how many: *three cubes*, *these three times*.
 
-    *Three cubes* and *these three times* count; *the one there*, *those two* and *one time fewer*
-    do not. Where cubes are counted, *one of them* is one cube; elsewhere it points at a thing.
+    Pronouns, *the one there* and *those two*, and differences, *one time fewer*, do not. In the
+    slot ``counts`` *one of them* is one cube; elsewhere it points at a thing.
     """
-    before = _before(words, place)
+    before = _word_before(words, place)
     following = words[place + 1 : place + 3]
     is_of_times = following[:1] == ("times",)  # "we tried this three times"
     if ordinal_of(before) is not None or (before in POINTING and not is_of_times):
         return False
-    is_part = following[:1] == ("of",) and not PRONOUNS.isdisjoint(following)
+    is_part = following[:1] == ("of",) and not PRONOUNS.isdisjoint(following)  # "one of them"
     if is_part and slot != "counts":
         return False
     is_ordinal = SLOT_TYPE_NAMES.get(slot) in ORDINAL_TYPES
@@ -250,7 +264,7 @@ def _counts_things(words: Sentence, place: int, slot: str) -> bool:
     return differences.isdisjoint(following)
 
 
-def _is_plain(words: Sentence, mention: _Mention) -> bool:
+def _is_stated_plainly(words: Sentence, mention: _Mention) -> bool:
     """Return whether a command says a value without excluding it or counting from it.
 
     *Not the red one* excludes red; *two more than three* counts from three.

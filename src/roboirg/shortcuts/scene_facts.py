@@ -19,15 +19,19 @@ SceneFacts = Mapping[str, float]
 
 
 def scene_facts(scene: Scene) -> SceneFacts:
-    """Return the facts of a scene: counts, colors, places, and what the video shows."""
+    """Return what can be seen in a scene and its video, as features for a model.
+
+    For example ``{"red cube × 1": 1.0, "x of red cube": 0.12, "acts × 2": 1.0}``; positions are
+    in meters in the world frame.
+    """
     return {**dict(_standing(scene)), **dict(_moving(scene)), **dict(_shown(scene))}
 
 
 def _standing(scene: Scene) -> Iterator[tuple[str, float]]:
-    """Yield how many things of each kind and color there are, where, and what is nearest.
+    """Yield features of the objects: how many look alike, where they are, and what is nearest.
 
-    A scene with one red cube has ``red cube × 1``, ``x of red cube`` and so on. Only objects that
-    look like no other have a place of their own.
+    A scene with one red cube has ``("red cube × 1", 1.0)``, ``("x of red cube", 0.12)`` (meters)
+    and so on. Objects that look like others have no position, as a viewer cannot name one of them.
     """
     counts = Counter(map(_look, scene.objects))
     for look, count in counts.items():
@@ -43,7 +47,7 @@ def _standing(scene: Scene) -> Iterator[tuple[str, float]]:
 
 
 def _nearest(item: SceneObject, others: Iterable[SceneObject]) -> SceneObject | None:
-    """Return the nearest other object that has a color; None if there is none."""
+    """Return the other object with a color that is nearest on the table; None if there is none."""
     colored = [other for other in others if other.color and other is not item]
 
     def distance(other: SceneObject) -> float:
@@ -53,7 +57,10 @@ def _nearest(item: SceneObject, others: Iterable[SceneObject]) -> SceneObject | 
 
 
 def _moving(scene: Scene) -> Iterator[tuple[str, float]]:
-    """Yield what moves by itself: how many movements of a kind, of which colors, how fast."""
+    """Yield features of what moves by itself: ``("Swap × 2", 1.0)``, ``("interval 30", 1.0)``, ….
+
+    Intervals between the ends of a way are in control steps.
+    """
     kinds = Counter(type(motion).__name__ for motion in scene.motions)
     for kind, count in kinds.items():
         yield f"{kind} × {count}", 1.0
@@ -66,10 +73,10 @@ def _moving(scene: Scene) -> Iterator[tuple[str, float]]:
 
 
 def _shown(scene: Scene) -> Iterator[tuple[str, float]]:
-    """Yield the acts of the video: at which rank each comes, that it comes, and how often.
+    """Yield features of the video's acts: the rank of each, that it occurs, and how often.
 
-    A video with two presses has ``act 0: …``, ``act 1: …``, ``shown: …``, ``shown: … × 2`` and
-    ``acts × 2``.
+    A video that shows a button pressed twice has ``act 0: pressed button``, ``act 1: pressed
+    button``, ``shown: pressed button``, ``shown: pressed button × 2`` and ``acts × 2``, each 1.0.
     """
     acts = [_act(scene, fact) for fact in scene.past]
     for rank, act in enumerate(acts):
@@ -86,7 +93,10 @@ def _act(scene: Scene, fact: Fact) -> str:
 
 
 def _seen_as(scene: Scene, name: str | None) -> str:
-    """Return the look of the object of a name, with the color of the cube that it covers."""
+    """Return how the object of this name looks, with the color of the cube that it covers.
+
+    For example ``red cube`` or ``container over red``; empty if there is no such object.
+    """
     if name is None or all(item.name != name for item in scene.objects):
         return ""
     look = _look(scene[name])

@@ -33,14 +33,17 @@ class ShortcutScore(NamedTuple):
 
 
 def hidden_slots(instructed: InstructedEpisode) -> tuple[str, ...]:
-    """Return the slots that the command leaves out, in the order of the goal."""
+    """Return the goal slots whose values the command does not name, in the order of the goal."""
     episode, instruction = instructed
     hidden = hidden_in(instruction, episode.goal)
     return _in_order(hidden, episode.goal)
 
 
 def counted_slots(instructed: InstructedEpisode) -> tuple[str, ...]:
-    """Return the slots that count: those that the instruction names as touched, or all hidden."""
+    """Return the goal slots by which an instruction is scored.
+
+    They are those that its metadata list as ``touched``, or else all that its command leaves out.
+    """
     episode, instruction = instructed
     touched = cast("list[str]", instruction.metadata.get("touched", []))
     return _in_order(touched, episode.goal) or hidden_slots(instructed)
@@ -52,10 +55,10 @@ def _in_order(slots: Collection[str], goal: Goal) -> tuple[str, ...]:
 
 
 def counted_places(instructed: InstructedEpisode) -> Mapping[str, Sequence[int]]:
-    """Return the places of each slot that count, from 0: all, or those that only the scene gives.
+    """Return which values of each goal slot are scored, by their index in the slot.
 
-    *The container next to the button, and the one over the red cube*: of the two colors, only the
-    first counts -> ``{"colors": [0]}``.
+    All are, unless the text names some of them: of *the container next to the button, and the one
+    over the red cube* only the first color has to be found in the scene -> ``{"colors": [0]}``.
     """
     episode, instruction = instructed
     goal = episode.goal.as_mapping()
@@ -63,7 +66,7 @@ def counted_places(instructed: InstructedEpisode) -> Mapping[str, Sequence[int]]
     for slot in counted_slots(instructed):
         places = range(len(values_in(goal[slot])))
         counted[slot] = places
-        # Amounts may be said in another order than the goal has.
+        # Amounts may be said in another order than the goal has, so their indices do not match.
         if len(places) > 1 and "counts" not in goal:
             meaning = instruction.meaning
             described = [place for place in places if _is_described(meaning, f"{slot}.{place}")]
@@ -72,19 +75,20 @@ def counted_places(instructed: InstructedEpisode) -> Mapping[str, Sequence[int]]
 
 
 def _is_described(meaning: Meaning | None, field: str) -> bool:
-    """Return whether a value is that of a thing that words describe by its place or history.
+    """Return whether the words describe a thing by its place or history instead of its value.
 
-    `field` names the value in the meaning: ``"colors.1"`` is the second color.
+    `field` names the value in the meaning: ``"colors.1"`` is the second color. None, an instruction
+    without a known meaning, describes nothing.
     """
     term = meaning.terms.get(field) if meaning else None
     return term is not None and isinstance(picked_operand(term), Described)
 
 
 def score_chance(instructed: InstructedEpisode) -> ShortcutScore:
-    """Score a blind guess among the goals that command and scene leave; see `blind_goals`.
+    """Return the expected score of a blind guess among the goals that command and scene allow.
 
     With three colors and nothing known, it gets a third of the slot right, and a third of the
-    goals. Of a slot of which a part does not count, that part is known to the guesser.
+    goals. Values that are not scored are known to the guesser; see `counted_places`.
     """
     episode, instruction = instructed
     goals = blind_goals(instruction, episode)
@@ -101,10 +105,15 @@ def score_chance(instructed: InstructedEpisode) -> ShortcutScore:
 def _slot_chance(
     guesses: Sequence[Sequence[Value]], meant: Sequence[Value], places: Sequence[int]
 ) -> Fraction:
-    """Return the expected share of right values at some places of a slot.
+    """Return the expected share of right values if one of some guesses of a slot is drawn.
 
-    Guesses red-blue, red-green and blue-red where red-blue is meant and place 1 counts: place 0 is
-    known, so the first two are possible, and one of them is right -> 1/2.
+    Guesses red-blue, red-green and blue-red where red-blue is meant and place 1 is scored: place 0
+    is known, so only the first two are possible, and one of them is right -> 1/2.
+
+    Args:
+        guesses: values of the slot, all equally likely.
+        meant: the right values.
+        places: indices of the values that are scored; the guesser knows all others.
     """
     known_places = set(range(len(meant))).difference(places)
     numbers_right: list[int] = []
@@ -117,7 +126,7 @@ def _slot_chance(
 
 
 def score_guess(guess: TextGuess, instructed: InstructedEpisode) -> ShortcutScore:
-    """Score a guess of the whole goal: each slot that counts, and all of the goal."""
+    """Return the shares of a guess that are right: of each slot that is scored, and of the goal."""
     episode, _ = instructed
     slots: dict[str, Fraction] = {}
     for slot, places in counted_places(instructed).items():
@@ -126,7 +135,7 @@ def score_guess(guess: TextGuess, instructed: InstructedEpisode) -> ShortcutScor
 
 
 def score_rule(rule: str, instructed: InstructedEpisode) -> ShortcutScore:
-    """Score a surface rule, which sees the text of the instruction only."""
+    """Return the score of a surface rule, which sees only the text of the instruction."""
     episode, instruction = instructed
     return score_guess(guess_goal(rule, instruction.text, episode.task), instructed)
 

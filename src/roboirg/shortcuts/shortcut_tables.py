@@ -16,7 +16,12 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.plain_text import counted
 from roboirg.language.settings import settings_of
 from roboirg.language.variants import instructions
-from roboirg.shortcuts.goal_learner import LEARNED_FLOORS, GoalLearner, Heard, InstructedEpisode
+from roboirg.shortcuts.goal_learner import (
+    LEARNED_FLOORS,
+    GoalLearner,
+    InstructedEpisode,
+    LearnerInput,
+)
 from roboirg.shortcuts.shortcut_scores import (
     CHANCE,
     ShortcutScore,
@@ -108,7 +113,12 @@ class _Tally:
     goals: dict[str, list[float]] = field(default_factory=dict)
 
     def add(self, scores: Mapping[str, ShortcutScore], slots: Sequence[str]) -> None:
-        """Add an instruction: its scores by shortcut, and the slots of it that count here."""
+        """Add the scores of one instruction.
+
+        Args:
+            scores: by shortcut.
+            slots: the goal slots of the instruction that count in this row.
+        """
         self.sizes.append(len(slots))
         for name, score in scores.items():
             right = sum(score.slots[slot] for slot in slots)
@@ -116,7 +126,7 @@ class _Tally:
             self.goals.setdefault(name, []).append(float(score.goal))
 
     def row(self, group: Group) -> ShortcutRow:
-        """Return the mean scores of all instructions that were added."""
+        """Return a row of the table with the mean scores of all instructions that were added."""
         slot_count = sum(self.sizes)
         text_count = len(self.sizes)
         shares: dict[str, ShortcutShares] = {}
@@ -127,10 +137,11 @@ class _Tally:
         return ShortcutRow(group, text_count, shares, self._excess())
 
     def _excess(self) -> Excess | None:
-        """Return by how much text-only exceeds the better of chance and majority; see `Excess`.
+        """Return by how much a learner of the words exceeds the better of chance and majority.
 
-        The value is a ratio of sums over instructions, right slots by slots, so its standard error
-        follows from what each instruction deviates from the ratio.
+        None if no slot counts or there are no learners. The value is a ratio of sums over
+        instructions, slots more right by slots, so its standard error is that of a ratio estimator:
+        from the residual of each instruction.
         """
         slot_count = sum(self.sizes)
         if not slot_count or "text-only" not in self.slots:
@@ -141,14 +152,15 @@ class _Tally:
         more_right = np.subtract(self.slots["text-only"], baseline)
         value = float(more_right.sum()) / slot_count
         residuals = more_right - value * np.array(self.sizes)
+        # Made-up texts keep the error above 0 where all instructions agree.
         squares = (residuals**2).sum() + _MADE_UP_TEXTS
         return Excess(value, float(np.sqrt(squares)) / (slot_count + _MADE_UP_TEXTS))
 
 
 def _share(right: Sequence[float], count: int) -> float:
-    """Return the share that is right of a number of things.
+    """Return the share of `count` things that is right.
 
-    Shares are fractions: what floats add to their sum could change a rounding.
+    It is rounded to 12 digits, as the error of a sum of floats could change a later rounding.
     """
     return round(sum(right) / count, 12)
 
@@ -163,7 +175,9 @@ def shortcut_rows(
     by: Grouping | None = None,
     learning: int | None = None,
 ) -> list[ShortcutRow]:
-    """Score all shortcuts on the instructions of some splits, and of random scenes.
+    """Return the table's rows: the mean scores of all shortcuts by setting.
+
+    A shortcut is a rule or a learner that guesses goals without understanding.
 
     Args:
         tasks: names.
@@ -181,7 +195,10 @@ def shortcut_rows(
 
 
 def tabulate(scored: Iterable[Scored], groups_of: GroupsOf) -> list[ShortcutRow]:
-    """Return the rows of scored instructions, in the order in which their groups occur."""
+    """Return a row of mean scores for each group of instructions, in order of first occurrence.
+
+    `groups_of` returns the rows in which an instruction counts, each with its slots to count there.
+    """
     tallies: dict[Group, _Tally] = {}
     for instructed, scores in scored:
         for group, slots in groups_of(instructed):
@@ -192,7 +209,11 @@ def tabulate(scored: Iterable[Scored], groups_of: GroupsOf) -> list[ShortcutRow]
 def _groups_of(
     instructed: InstructedEpisode, by: Grouping | None
 ) -> Iterator[tuple[Group, Sequence[str]]]:
-    """Yield the rows in which an instruction counts, and those of its slots that count there."""
+    """Yield the rows in which an instruction counts, and those of its slots that count there.
+
+    One row, by its setting: ``("direct",)``; with ``task`` ``("direct", "PickXtimes")``. By
+    ``slot`` there is a row for each slot that counts.
+    """
     episode, instruction = instructed
     setting = instruction.setting
     slots = counted_slots(instructed)
@@ -216,9 +237,9 @@ def score_texts(
     seeds: int = 0,
     learning: int | None = None,
 ) -> Iterator[Scored]:
-    """Yield every instruction with its scores, task by task; arguments as of `shortcut_rows`.
+    """Yield every instruction with its score by shortcut, task by task.
 
-    Settings that a task does not have are left out.
+    Settings that a task does not have are left out. The arguments are those of `shortcut_rows`.
     """
     check_whole("seeds", seeds, least=0)
     for task in tasks:
@@ -248,10 +269,15 @@ def _instructed(
 
 
 def learn_goals(task: str, options: InstructionOptions, scenes: int) -> GoalLearner:
-    """Return the floors that learn from the words of train, in the setting of `options`.
+    """Return baselines of a task that have learned to guess goals, in the setting of `options`.
 
-    What they learn from are the train split and random scenes; what is best is chosen on the val
-    split and a quarter as many random scenes, in the words of test.
+    They are fitted on the train split and random scenes, in the words of train. The best models are
+    chosen on the val split and a quarter as many random scenes, in the words of test.
+
+    Args:
+        task: name of the task.
+        options: of the instructions; a wording file in them replaces the words of train and test.
+        scenes: number of random scenes to learn from.
     """
     to_learn = range(FIRST_LEARNED, FIRST_LEARNED + scenes)
     to_judge = range(FIRST_JUDGED, FIRST_JUDGED + scenes // 4)
@@ -271,19 +297,34 @@ def _add_learned(
     options: InstructionOptions,
     scenes: int,
 ) -> None:
-    """Add to each instruction's scores those of the learned floors; all have a task and setting."""
+    """Add to each instruction's scores those of the learned baselines.
+
+    Args:
+        scores: by shortcut, for each instruction; changed in place.
+        texts: the instructions, all of one task and setting.
+        options: of the instructions.
+        scenes: number of random scenes to learn from.
+    """
     episode, instruction = texts[0]
     options = replace(options, setting=instruction.setting)
     learner = learn_goals(episode.task, options, scenes)
-    heard = [Heard.of(pair) for pair in texts]
+    inputs = [LearnerInput.of(pair) for pair in texts]
     for floor in LEARNED_FLOORS:
-        guesses = learner.guesses(floor, heard)
+        guesses = learner.guesses(floor, inputs)
         for text_scores, instructed, guess in zip(scores, texts, guesses, strict=True):
             text_scores[floor] = score_guess(guess, instructed)
 
 
 def shortcut_table(rows: Sequence[ShortcutRow], title: str, by: Grouping | None = None) -> Table:
-    """Return the rows as a table for the terminal: slots that count, and goals, in percent."""
+    """Return a table for the terminal, with a column for each shortcut.
+
+    Its cells are percents of slots and of whole goals that are right: ``44 / 43``.
+
+    Args:
+        rows: of the table.
+        title: above it.
+        by: what the second column groups by; None for none.
+    """
     table = Table(title=title, title_justify="left", title_style="bold", caption_justify="left")
     table.caption = "Percent of hidden slots right / of whole goals right."
     table.add_column("setting")
@@ -292,6 +333,7 @@ def shortcut_table(rows: Sequence[ShortcutRow], title: str, by: Grouping | None 
     table.add_column("texts", justify="right")
     for shortcut in rows[0].shares if rows else ():
         table.add_column(shortcut, justify="right")
+    # As many intervals are shown, for which they are adjusted.
     compared = sum(row.excess is not None for row in rows)
     if compared:
         table.add_column("text-only over chance", justify="right")
@@ -308,9 +350,10 @@ def shortcut_table(rows: Sequence[ShortcutRow], title: str, by: Grouping | None 
 
 
 def excess_text(excess: Excess | None, count: int) -> str:
-    """Return an excess in points with its interval, Bonferroni-adjusted for `count` of them.
+    """Return an excess over chance in percent points, with its 95 % interval.
 
-    For example ``+53.1 (+47.8 to +58.5)``.
+    For example ``+53.1 (+47.8 to +58.5)``; ``–`` for None. The interval is Bonferroni-adjusted for
+    `count` intervals that are shown together.
     """
     if excess is None:
         return "–"

@@ -24,8 +24,8 @@ ONLY_ORDINAL = frozenset({"before", "after", "following", "preceding"})
 REST = frozenset({"other", "others", "left", "remaining"})
 """Words for what remains when one of two is taken."""
 PAIR = 2
-_REACH = 2
-"""Words between a difference and its number: *two visits before*."""
+_NUMBER_REACH = 2
+"""A difference may have a number among so many words before it: *two visits before*."""
 
 
 @dataclass(frozen=True)
@@ -35,11 +35,12 @@ class SlotWords:
     Attributes:
         slot: its name.
         vocabulary: the values that it may take.
-        named: the values that the text names, in order.
+        named: the values that the text names, in order, with repetitions.
         command: the words of the last sentence.
         parts: the number of values to find.
-        pointed: which of two named values the words before the command point at.
-        ranks: the places of named values at which the command points.
+        pointed_index: at which of two named values the words before the command point, 0 or 1;
+            None if at neither.
+        ranks: indices of named values at which the command points: 0 for *the former*.
     """
 
     slot: str
@@ -47,7 +48,7 @@ class SlotWords:
     named: tuple[Value, ...]
     command: Sentence
     parts: int
-    pointed: int | None = None
+    pointed_index: int | None = None
     ranks: tuple[int, ...] = ()
 
     @property
@@ -56,7 +57,7 @@ class SlotWords:
         return tuple(dict.fromkeys(self.named))
 
     @property
-    def not_last(self) -> tuple[Value, ...]:
+    def all_but_last(self) -> tuple[Value, ...]:
         """The named values, each once, without the one that is named last."""
         return tuple(value for value in self.different if value != self.named[-1])
 
@@ -100,7 +101,7 @@ def take_unnamed(words: SlotWords) -> list[Candidates]:
 
 
 def take_by_cues(words: SlotWords) -> list[Candidates]:
-    """Choose a rule by key words; the first row that fits decides.
+    """Return the values that key words of the text suggest; the first row that fits decides.
 
     | the words | the values |
     | --- | --- |
@@ -121,15 +122,18 @@ def take_by_cues(words: SlotWords) -> list[Candidates]:
         return take_first(words)
 
     if set(words.vocabulary.values) <= set(words.named):
-        return [words.not_last]
-    return [*take_unnamed(words)[:1], words.not_last]
+        return [words.all_but_last]
+    return [*take_unnamed(words)[:1], words.all_but_last]
 
 
 def _pointed_values(words: SlotWords) -> list[Candidates]:
-    """Return the named values at which the words point; none if they point at none.
+    """Return the named values at which words such as *latter* point; none without such words.
 
-    *Red and blue* before *take the latter* -> blue; before *red is gone; take the one that is left*
-    -> blue; after *I mean the latter* -> blue, then red.
+    For a text that begins with *Red and blue*:
+
+    - *Take the latter.* -> blue
+    - *Red is gone; take the one that is left.* -> blue
+    - *I mean the latter. Take both.* -> blue, then red
     """
     values = words.different
     if words.ranks and not words.is_number and max(words.ranks) < len(values):
@@ -137,16 +141,19 @@ def _pointed_values(words: SlotWords) -> list[Candidates]:
 
     is_one_named_again = words.parts == 1 and len(values) < len(words.named)
     if is_one_named_again and not REST.isdisjoint(words.command):
-        return certain(words.not_last[:1])
+        return certain(words.all_but_last[:1])
 
-    if words.pointed is not None and len(values) == PAIR:
-        other = 1 - words.pointed
-        return certain((values[words.pointed], values[other]))
+    if words.pointed_index is not None and len(values) == PAIR:
+        other = 1 - words.pointed_index
+        return certain((values[words.pointed_index], values[other]))
     return []
 
 
 def _changed_number(words: SlotWords) -> list[Candidates]:
-    """Return the numbers that are named first, changed as the command says."""
+    """Return the numbers that are named first, changed as the command says.
+
+    *Bob pressed it three times. Press it twice as often.* -> 6.
+    """
     change = _change(words)
     if change is None:
         return take_first(words)
@@ -154,9 +161,9 @@ def _changed_number(words: SlotWords) -> list[Candidates]:
 
 
 def _change(words: SlotWords) -> Callable[[int], int] | None:
-    """Return how the command changes a number that was named; None if it does not.
+    """Return a function from the number that was named to the one that the command asks for.
 
-    *Twice as often* doubles it; *two times fewer* subtracts 2.
+    *Twice as often* doubles it; *two times fewer* subtracts 2. None if the command changes nothing.
     """
     if "half" in words.command:
         return lambda number: number // 2
@@ -167,7 +174,7 @@ def _change(words: SlotWords) -> Callable[[int], int] | None:
 
 
 def _difference(words: SlotWords) -> int | None:
-    """Return the first difference in a command; None without any.
+    """Return by how much a command changes a number; None if it names no difference.
 
     *Two times more* -> 2, *one time fewer* -> -1, *the visit right before* -> -1.
     """
@@ -176,9 +183,9 @@ def _difference(words: SlotWords) -> int | None:
             continue
         if word in ONLY_ORDINAL and not words.is_ordinal:
             continue
-        words_before = words.command[max(0, place - _REACH) : place]
+        words_before = words.command[max(0, place - _NUMBER_REACH) : place]
         numbers = [number for number in map(number_of, words_before) if number is not None]
-        size = numbers[-1] if numbers else 1
+        size = numbers[-1] if numbers else 1  # "the visit before" is one before
         size = max(size, 1)  # "zero times fewer" is once fewer
         return size if word in MORE else -size
     return None

@@ -24,9 +24,9 @@ from roboirg.shortcuts.named_values import (
     command_ranks,
     command_words,
     named_values,
-    part_count,
-    pointed_value,
+    pointed_index,
     stated_values,
+    thing_count,
 )
 from roboirg.shortcuts.surface_rules import SURFACE_RULES, Candidates, SlotWords, certain
 from roboirg.tasks import get_task, goals_of
@@ -37,17 +37,23 @@ TextGuess = Mapping[str, tuple[Candidates, ...]]
 
 @functools.lru_cache(maxsize=1024)
 def guess_goal(rule: str, text: str, task: str) -> TextGuess:
-    """Return what one of `SURFACE_RULES` makes of a whole prompt of a task.
+    """Return the goal that a rule guesses from a prompt, by goal slot, without the scene.
 
-    ``first-mention`` of *Red and blue are fine. Pick one of them twice.* -> ``{"color":
+    Each slot has one or several places, and each place its candidates, equally likely. The rule
+    ``first-mention`` for *Red and blue are fine. Pick one of them twice.* -> ``{"color":
     (("red",),), "repeats": ((2,),)}``.
+
+    Args:
+        rule: name of one of `SURFACE_RULES`.
+        text: the whole prompt.
+        task: name of the task.
     """
     check_names("rule", [rule], SURFACE_RULES)
     vocabulary = goal_vocabulary(task)
-    thing_count = part_count(text, get_task(task).things.handled, vocabulary)
+    thing_total = thing_count(text, get_task(task).things.handled, vocabulary)
     guess: dict[str, tuple[Candidates, ...]] = {}
     for slot, slot_vocabulary in vocabulary.items():
-        parts = thing_count if slot_vocabulary.several else 1
+        parts = thing_total if slot_vocabulary.several else 1
         candidates = _candidates(rule, text, slot, slot_vocabulary, parts)
         # Where a rule has nothing to go by, every value is as likely.
         candidates += [slot_vocabulary.values] * parts
@@ -58,7 +64,17 @@ def guess_goal(rule: str, text: str, task: str) -> TextGuess:
 def _candidates(
     rule: str, text: str, slot: str, vocabulary: SlotVocabulary, parts: int
 ) -> list[Candidates]:
-    """Return the values that the command states, or those that a rule finds, for each place."""
+    """Return the possible values for each place of a goal slot.
+
+    Values that the command states are certain; else the rule decides.
+
+    Args:
+        rule: its name.
+        text: the whole prompt.
+        slot: name of the goal slot.
+        vocabulary: of the slot.
+        parts: number of values to find.
+    """
     stated = stated_values(text, slot, vocabulary)
     if stated:
         return certain(stated)
@@ -69,7 +85,7 @@ def _candidates(
         named=tuple(mention.value for mention in named),
         command=command_words(text),
         parts=parts,
-        pointed=pointed_value(text),
+        pointed_index=pointed_index(text),
         ranks=command_ranks(text),
     )
     found = SURFACE_RULES[rule](words)
@@ -77,7 +93,14 @@ def _candidates(
 
 
 def slot_share(guess: TextGuess, slot: str, content: SlotValue, places: Sequence[int]) -> Fraction:
-    """Return the expected share of some places of a slot that a guess gets right."""
+    """Return the expected share of a slot's values that a guess gets right.
+
+    Args:
+        guess: of the whole goal.
+        slot: name of the slot.
+        content: the right value or values of the slot.
+        places: indices of the values that are scored.
+    """
     values = values_in(content)
     guessed = guess[slot]
     total = Fraction(0)
@@ -88,9 +111,10 @@ def slot_share(guess: TextGuess, slot: str, content: SlotValue, places: Sequence
 
 
 def goal_share(guess: TextGuess, episode: Episode) -> Fraction:
-    """Return the probability that a guess is the right goal.
+    """Return the probability that a goal drawn from a guess is right.
 
-    Several goals of the scene may be right, as they have the same stages: their probabilities add.
+    Several goals of the scene may be right, as they have the same stages. Their probabilities add,
+    and so do those of the orders in which a goal can be said.
     """
     total = Fraction(0)
     for goal in goals_of(episode):
@@ -103,7 +127,10 @@ def goal_share(guess: TextGuess, episode: Episode) -> Fraction:
 
 
 def draw_goal(guess: TextGuess, episode: Episode, rng: np.random.Generator) -> Goal | None:
-    """Draw a value for each place of a guess, and return the goal; None if the scene lacks it."""
+    """Return a goal of the scene that is drawn at random from a guess.
+
+    None if no goal of the scene has the values that were drawn.
+    """
     drawn: dict[str, tuple[Value, ...]] = {}
     for slot, places in guess.items():
         values = [candidates[int(rng.integers(len(candidates)))] for candidates in places]
@@ -117,7 +144,10 @@ def draw_goal(guess: TextGuess, episode: Episode, rng: np.random.Generator) -> G
 
 
 def _probability(guess: TextGuess, slots: Mapping[str, SlotValue]) -> Fraction:
-    """Return the probability that a guess is exactly these values: one of two, and sure -> 1/2."""
+    """Return the probability that a draw from a guess gives exactly these values.
+
+    One of two colors and a certain number -> 1/2.
+    """
     probability = Fraction(1)
     for slot, places in guess.items():
         values = values_in(slots[slot])

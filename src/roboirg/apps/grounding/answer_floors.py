@@ -23,7 +23,7 @@ from roboirg.language.generator import instruct_with
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.shortcuts import SURFACE_RULES, draw_goal, guess_goal
 from roboirg.shortcuts.command_chance import goals_of_command
-from roboirg.shortcuts.goal_learner import Heard
+from roboirg.shortcuts.goal_learner import LearnerInput
 from roboirg.shortcuts.shortcut_tables import learn_goals
 from roboirg.shortcuts.text_guess import TextGuess
 from roboirg.tasks import goals_of
@@ -140,7 +140,7 @@ def _learn(items: Sequence[GroundingItem]) -> dict[str, TextGuess]:
     found: dict[str, TextGuess] = {}
     for (task, options), of_group in groups.items():
         learner = learn_goals(task, options, scenes=0)
-        heard = [Heard(item.text, item.hidden_slots) for item in of_group]
+        heard = [LearnerInput(item.text, item.hidden_slots) for item in of_group]
         guesses = learner.guesses("text-only", heard)
         for item, guess in zip(of_group, guesses, strict=True):
             found[item.id] = guess

@@ -139,7 +139,7 @@ def score_shortcuts(
 
 
 def _sources(splits: Sequence[str], seeds: int) -> str:
-    """Return from where scenes are: ``test and 200 random scenes per task``."""
+    """Return which scenes are scored, for a title: ``test and 200 random scenes per task``."""
     sources = list(splits)
     if seeds:
         sources.append(f"{seeds:,} random scenes per task")
@@ -147,9 +147,11 @@ def _sources(splits: Sequence[str], seeds: int) -> str:
 
 
 def _check_learning(split: str, splits: Sequence[str]) -> None:
-    """Check that learners can learn here, and are tested on other splits than they learn from.
+    """Raise if scikit-learn is missing, or learners would be tested on what they learn from.
 
-    `split` is what was typed for these splits.
+    Args:
+        split: what was typed, for the error.
+        splits: that it stands for.
     """
     from roboirg.shortcuts.goal_learner import check_learning_support
     from roboirg.shortcuts.shortcut_tables import JUDGING_SPLIT, TRAINING_SPLIT
@@ -199,7 +201,15 @@ def check_scenario_file(
 
 
 def _check_explicit(words: TaskScenarios, task: str) -> int:
-    """Print what is found about a file's explicit words; return how many rules they break."""
+    """Check what a file says in the explicit setting, and print a report.
+
+    Args:
+        words: what the file says for the task.
+        task: its name.
+
+    Returns:
+        How many rules the words break; 0 if the file has no explicit words of its own.
+    """
     from roboirg.apps.language_lab.scenarios.explicit_check import (
         check_explicit,
         has_explicit_words,
@@ -217,7 +227,7 @@ def _check_explicit(words: TaskScenarios, task: str) -> int:
 def _check_scenarios(
     words: TaskScenarios, task: str, frame: str | None, seeds: int, path: Path
 ) -> int:
-    """Print what is found about a file's scenarios of a task; return how many rules they break.
+    """Check the scenarios of a file for a task, print a report on each, and count broken rules.
 
     Args:
         words: of the task.

@@ -16,10 +16,13 @@ ClassCounts = Mapping[str, Mapping[str, int]]
 def by_setting(
     instructions: Iterable[Instruction], size_of: Callable[[str], int]
 ) -> dict[str, list[int]]:
-    """Return the sizes of the prompts by setting: ``{"direct": [18, 23]}``, in the settings' order.
+    """Return the size of each prompt by setting, such as ``{"direct": [18, 23]}``.
 
-    `size_of` gives the size of a text, for example in words. Settings without instructions are left
-    out.
+    Settings are in their usual order; those without instructions are left out.
+
+    Args:
+        instructions: whose texts are the prompts.
+        size_of: returns the size of a text, for example its number of words.
     """
     found: dict[str, list[int]] = {name: [] for name in setting_names()}
     for instruction in instructions:
@@ -28,9 +31,10 @@ def by_setting(
 
 
 def expression_counts(instructions: Iterable[Instruction]) -> ClassCounts:
-    """Count the scenes with each class of expression, by setting: ``{"direct": {"it": 50}}``.
+    """Return in how many scenes each class of referring expression occurs, by setting.
 
-    A scene counts once for a setting, even if it has several instructions there.
+    For example ``{"direct": {"it": 50}}``: in 50 scenes, the text in ``direct`` refers back with
+    *it*. A scene counts once for a setting, even if it has several instructions there.
     """
     scenes: set[tuple[str, str, str]] = set()
     for instruction in instructions:
@@ -58,9 +62,10 @@ def classes_in(counts: ClassCounts) -> set[str]:
 
 
 def metadata_counts(instructions: Iterable[Instruction], name: str) -> ClassCounts:
-    """Count the values of an entry of the metadata by task: ``{"StopCube": {"one later": 7}}``.
+    """Return how often each value of a metadata entry occurs, by task.
 
-    If the entry is a list, each of its values counts; None does not.
+    For the entry ``relation``: ``{"StopCube": {"one later": 7}}``. If an entry is a list, each of
+    its values counts; None does not.
     """
     counts: dict[str, Counter[str]] = {}
     for instruction in instructions:

@@ -62,7 +62,10 @@ def _jsonl(rows: Sequence[ExportRow]) -> bytes:
 
 
 def _parquet(rows: Sequence[ExportRow]) -> bytes:
-    """Return the rows as Parquet; all rows have the columns of the first one."""
+    """Return the content of a Parquet file with the rows; all have the columns of the first one.
+
+    Columns are texts unless `_NUMBERS` or a list of columns next to it names them.
+    """
     check_parquet_support()
     import pyarrow as pa
     from pyarrow import parquet
@@ -82,7 +85,7 @@ def _parquet(rows: Sequence[ExportRow]) -> bytes:
             "value": text,
         }
     )
-    types = dict.fromkeys(rows[0], text)  # of each column, unless another one follows
+    types = dict.fromkeys(rows[0], text)  # later lines replace the type of some columns
     types |= dict.fromkeys(_NUMBERS, number)
     types |= dict.fromkeys(_NUMBER_LISTS, pa.list_(number))
     types |= dict.fromkeys(_TEXT_LISTS, pa.list_(text))

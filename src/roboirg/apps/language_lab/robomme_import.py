@@ -48,7 +48,15 @@ def import_robomme(root: Path, name: str = ROBOMME_NAME) -> tuple[str, Wordings]
 
 
 def _wording_text(function: SentenceFunction, name: str) -> str:
-    """Return a wording file, TOML, with the function's sentence for each goal."""
+    """Return the text of a wording file, TOML, with RoboMME's sentence for each goal.
+
+    Each goal has an entry such as ``[[literal]]``, ``task = "PickXtimes"``, ``when = { color =
+    "red", repeats = 2 }``, ``text = "Pick up the red cube twice."``.
+
+    Args:
+        function: RoboMME's, which returns the sentences.
+        name: of the wordings.
+    """
     tasks = all_tasks()
     source = f"The first sentences of {FUNCTION} in RoboMME's repository."
     lines = [
@@ -70,7 +78,11 @@ def _wording_text(function: SentenceFunction, name: str) -> str:
 
 
 def _load_function(root: Path) -> SentenceFunction:
-    """Load the function from a clone of RoboMME's repository."""
+    """Return the function `get_language_goal` of a clone of RoboMME's repository.
+
+    Raises:
+        InvalidValueError: the folder lacks its file, or the file cannot be loaded or lacks it.
+    """
     path = root / FILE
     if not path.is_file():
         raise InvalidValueError(
@@ -87,13 +99,17 @@ def _load_function(root: Path) -> SentenceFunction:
 
 
 def _sentences(function: SentenceFunction, task: Task) -> dict[Goal, str]:
-    """Return RoboMME's sentence for every goal that the published scenes of a task allow."""
+    """Return RoboMME's sentence for every goal that the published scenes of a task allow.
+
+    Raises:
+        InvalidValueError: the function gives two sentences for a goal, or none.
+    """
     found: dict[Goal, str] = {}
     for episode in _published_episodes(task):
-        number = len(goal_fields(episode.goal))
+        field_count = len(goal_fields(episode.goal))
         for goal in task.goals(episode.scene):
-            # A difficulty has as many picks or colors as its episodes.
-            if len(goal_fields(goal)) != number:
+            # The difficulty decides how many picks or colors a goal has: others do not occur.
+            if len(goal_fields(goal)) != field_count:
                 continue
             said = _ask(function, task.name, goal, episode.difficulty)
             if found.setdefault(goal, said) != said:
@@ -114,7 +130,11 @@ def _published_episodes(task: Task) -> Iterator[PublishedEpisode]:
 
 
 def _ask(function: SentenceFunction, task: str, goal: Goal, difficulty: str) -> str:
-    """Return the first sentence that RoboMME's function gives for a goal."""
+    """Return the first sentence that RoboMME's function gives for a goal of a task.
+
+    Raises:
+        InvalidValueError: the function raises, or does not return sentences.
+    """
     words = describe_goal(goal.as_mapping())
     about = f"RoboMME's {FUNCTION}, asked for a goal of {task} ({words}),"
     try:
@@ -140,9 +160,10 @@ _ATTRIBUTES = {
 
 
 def stand_in(goal: Goal, difficulty: str) -> SimpleNamespace:
-    """Return an object with what RoboMME's function reads of a task, for a goal of ours.
+    """Return a stand-in for RoboMME's task object, with the attributes that its function reads.
 
-    The color red becomes ``target_color_name = "red"``.
+    The value of a goal of ours becomes an attribute with RoboMME's name: the color red becomes
+    ``target_color_name = "red"``.
     """
     slots = goal.as_mapping()
     task = SimpleNamespace(difficulty=difficulty)
@@ -159,7 +180,7 @@ def stand_in(goal: Goal, difficulty: str) -> SimpleNamespace:
     for slot, value in slots.items():
         if slot in _ATTRIBUTES:
             setattr(task, _ATTRIBUTES[slot], value)
-    # The function may reach the task through wrappers: here, it is its own.
+    # The function may reach the task through wrappers of an environment: here, all are the same.
     task.env = task
     task.unwrapped = task
     return task

@@ -25,7 +25,10 @@ _BY_TASK = {
 
 
 def overview_tables(instructions: Sequence[Instruction]) -> Iterator[Table]:
-    """Yield tables of lengths, expressions, patterns, relations and landmark classes."""
+    """Yield tables for the terminal: lengths of the texts, and how often each kind of words occurs.
+
+    A table that would be empty is left out.
+    """
     yield _lengths(instructions)
     yield _tokens(instructions)
     yield expression_table(corpus_statistics.expression_counts(instructions))
@@ -46,7 +49,7 @@ def expression_table(counts: ClassCounts) -> Table:
 
 
 def _lengths(instructions: Sequence[Instruction]) -> Table:
-    """Return the lengths of the instructions in words, by setting."""
+    """Return a table of the mean, smallest and largest number of words, by setting."""
     table = _table("Words per instruction", "setting", ("mean", "fewest", "most"))
     found = corpus_statistics.by_setting(instructions, lambda text: len(text.split()))
     for setting, words in found.items():
@@ -60,7 +63,10 @@ def _lengths(instructions: Sequence[Instruction]) -> Table:
 
 
 def _tokens(instructions: Sequence[Instruction]) -> Table:
-    """Return the lengths of the instructions in tokens, by setting, and how many are too long."""
+    """Return a table of the median and largest number of tokens, by setting.
+
+    Two more columns have the share of instructions that exceed usual limits of policies.
+    """
     columns = ("median", "most", f"over {SHORT_LIMIT}", f"over {USUAL_LIMIT}")
     table = _table("Tokens per instruction (vocabulary of 32,000)", "setting", columns)
     found = corpus_statistics.by_setting(instructions, count_tokens)
@@ -83,9 +89,14 @@ def _share_over(counts: Sequence[int], limit: int) -> str:
 def _count_table(
     title: str, kind: str, counts: ClassCounts, rows: Sequence[str], columns: Sequence[str]
 ) -> Table:
-    """Return a table of counts by group, whose name is in the first column, and by class.
+    """Return a table of counts, such as how often each setting uses each class of expression.
 
-    It has the rows and columns that are counted, in the order in which they are given.
+    Args:
+        title: above the table.
+        kind: heads the first column: what the rows are.
+        counts: by row, then by column.
+        rows: names of all rows in order; those without counts are left out.
+        columns: names of all columns in order; those without counts are left out.
     """
     counted = corpus_statistics.classes_in(counts)
     used = [name for name in columns if name in counted]

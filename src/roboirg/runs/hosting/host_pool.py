@@ -41,10 +41,13 @@ class HostSettings:
 
 @contextlib.contextmanager
 def open_hosts(play: Any) -> Iterator[Connect | None]:  # noqa: ANN401 - what plays jobs
-    """Open the hosts that a function needs on this machine, if it has ``hosting`` settings.
+    """Open processes for policies (hosts) on this machine while the block runs.
+
+    Args:
+        play: plays jobs; it needs hosts if it has ``hosting`` settings.
 
     Yields:
-        What connects a process to them; None if it needs none.
+        Returns a new line to the hosts when it is called; None if none are needed.
     """
     settings: HostSettings | None = getattr(play, "hosting", None)
     if settings is None:
@@ -90,7 +93,7 @@ class HostPool:
         threading.Thread(target=self._serve, args=(line,), name="hosted world", daemon=True).start()
 
     def close(self) -> None:
-        """End all processes, and close the lines."""
+        """End the processes of all policies, and close all lines; worlds then see their ends."""
         with self._lock:
             self._is_closed = True
             children = list(self._children.values())
@@ -113,14 +116,16 @@ class HostPool:
     def _serve(self, line: socket.socket) -> None:
         """Do what a world (a process with a simulator) asks for until it hangs up.
 
-        It first passes the end of a line to its policy, on which a child process serves that.
+        For each episode it asks for the process of a policy, and passes the end of a line, which is
+        given to that process. Later it may ask whether the process lives, or to kill it.
         """
         child: PolicyChild | None = None
         try:
             with contextlib.suppress(EOFError, OSError):
                 while True:
                     request, passed = receive_request(line)
-                    if request.method in ("open", "leave"):  # a world may have given up an episode
+                    # With "open" a new episode begins, even if the last one was not ended.
+                    if request.method in ("open", "leave"):
                         self._leave(child)
                         child = None
                     if passed is not None and request.policy is not None:
@@ -137,15 +142,20 @@ class HostPool:
             line.close()
 
     def _leave(self, child: PolicyChild | None) -> None:
-        """Note that a process, if there is one, serves a world less."""
+        """Note that a policy's process serves one world less; None for no process."""
         if child is not None:
             with self._lock:
                 child.worlds -= 1
 
     def _enter(self, policy: PolicyRef, passed: socket.socket) -> PolicyChild:
-        """Let a process of a policy serve one more episode; of several, that with the fewest.
+        """Return the process that is to play one more episode of a policy.
 
-        There is one for each of the devices, and all are started with the first episode.
+        A policy has one process on each device; the one with the fewest episodes is chosen. Missing
+        processes are started.
+
+        Args:
+            policy: of the episode.
+            passed: end of the line to the episode's world, for the process.
 
         Raises:
             EOFError: the run is ending.
@@ -161,21 +171,24 @@ class HostPool:
         child.serve(passed, self._settings.batch)
         return child
 
-    def _child(self, place: _Slot) -> PolicyChild:
-        """Return the process at a place, a new one if there is none or it has died."""
-        child = self._children.get(place)
+    def _child(self, slot: _Slot) -> PolicyChild:
+        """Return the process of a policy on a device; start it if there is none or it has died.
+
+        The process gets no salt of private splits, which would give their scenes away.
+        """
+        child = self._children.get(slot)
         if child is None or child.is_over:
-            environment = environment_for(place.policy, self._settings.variables)
+            environment = environment_for(slot.policy, self._settings.variables)
             environment.pop(SALT_VARIABLE, None)
-            if place.device is not None:
-                environment["CUDA_VISIBLE_DEVICES"] = place.device
+            if slot.device is not None:
+                environment["CUDA_VISIBLE_DEVICES"] = slot.device
             child = self._starter.submit(PolicyChild, environment).result()
-            self._children[place] = child
+            self._children[slot] = child
         return child
 
     def _end_others(self, policy: PolicyRef) -> None:
-        """End what has no episodes: a run plays one policy after the other."""
-        for place, child in tuple(self._children.items()):
-            if place.policy != policy and not child.worlds:
-                del self._children[place]
+        """End the idle processes of other policies: a run plays one policy after the other."""
+        for slot, child in tuple(self._children.items()):
+            if slot.policy != policy and not child.worlds:
+                del self._children[slot]
                 threading.Thread(target=child.end, name="policy end", daemon=True).start()

@@ -84,8 +84,11 @@ class HostedEpisode:
     space: ActionSpace = JOINT_ANGLE
     alone: bool = False
 
-    def joins(self, call: Call) -> bool:
-        """Return whether a call can be carried out together with those of others."""
+    def can_join(self, call: Call) -> bool:
+        """Return whether a call can be carried out in a batch with those of other episodes.
+
+        Only `act` can, of a policy with the method `act_together`.
+        """
         if self.alone or call.method != "act":
             return False
         return callable(getattr(self.policy, "act_together", None))
@@ -122,7 +125,9 @@ class HostProcess:
                     self._carry_out(self._gather())
 
     def _collect(self, seconds: float | None) -> None:
-        """Take in calls of worlds and requests of the supervisor.
+        """Receive what is on the lines: calls of worlds, and requests of the supervisor.
+
+        A call is added to those that wait. If a line was closed, that counts as a call of `close`.
 
         Args:
             seconds: how long to wait for the first one; None for ever.
@@ -130,15 +135,19 @@ class HostProcess:
         for key, _ in self._ready.select(seconds):
             episode: HostedEpisode | None = key.data
             if episode is None:
-                self._obey()
+                self._take_request()
             elif episode not in self._waiting:
                 try:
                     self._waiting[episode] = receive_call(episode.line)
                 except (EOFError, OSError):  # its world is gone
                     self._waiting[episode] = Call("close")
 
-    def _obey(self) -> None:
-        """Do what the supervisor wants: serve an episode, or answer that this process is alive."""
+    def _take_request(self) -> None:
+        """Carry out a request of the supervisor.
+
+        It asks to serve a new episode, whose line to its world comes with the request, or whether
+        this process is alive.
+        """
         request, line = receive_request(self._supervisor)
         if line is None:  # a request without a line only asks for that answer
             self._supervisor.send(b"!")
@@ -152,24 +161,24 @@ class HostProcess:
         self._ready.register(line, selectors.EVENT_READ, episode)
 
     def _gather(self) -> dict[HostedEpisode, Call]:
-        """Return the calls to carry out now, and remove them from those that wait.
+        """Return the calls to carry out now, by episode, and remove them from those that wait.
 
-        That is the oldest one; if it is an `act` that can be carried out together with others, up
-        to `_batch` calls of that kind.
+        That is the oldest call. If it can be carried out in a batch, others that can are added, up
+        to `_batch` calls in all.
         """
         oldest, call = next(iter(self._waiting.items()))
         gathered = {oldest: call}
-        if oldest.joins(call):
+        if oldest.can_join(call):
             self._wait_for_others()
             for episode, other_call in self._waiting.items():
-                if len(gathered) < self._batch and episode.joins(other_call):
+                if len(gathered) < self._batch and episode.can_join(other_call):
                     gathered[episode] = other_call
         for episode in gathered:
             del self._waiting[episode]
         return gathered
 
     def _wait_for_others(self) -> None:
-        """Wait a moment, `GATHER_S` at most, until as many calls wait as fit into a batch."""
+        """Receive calls for a batch until it is full, for `GATHER_S` seconds at most."""
         joinable = [episode for episode in self._episodes if not episode.alone]
         wanted = min(self._batch, len(joinable))
         until = time.monotonic() + GATHER_S
@@ -180,7 +189,10 @@ class HostProcess:
             self._collect(seconds_left)
 
     def _carry_out(self, calls: Mapping[HostedEpisode, Call]) -> None:
-        """Carry out calls, alone or all together, and send their outcomes to their worlds."""
+        """Carry out one call, or several in a batch, and send each world the outcome of its call.
+
+        Before, each world gets a message that its call begins, from when its time limit counts.
+        """
         with contextlib.suppress(OSError):
             os.chdir(self._home)  # an earlier episode may have changed it
         are_together = len(calls) > 1
@@ -194,13 +206,13 @@ class HostProcess:
         self._under_way = ()
         output = self._printed()
         for (episode, call), outcome in zip(calls.items(), outcomes, strict=True):
-            outcome.output = output  # what a call for several episodes prints is of all of them
+            outcome.output = output  # what a batch prints is in the log of each of its episodes
             _reply(episode, outcome)
             if call.method == "close":
                 self._forget(episode)
 
     def _printed(self) -> bytes:
-        """Return what the call under way has printed."""
+        """Return what this process has printed since it was last asked, and forget it."""
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(Exception):  # a policy may have closed or replaced it
                 stream.flush()
@@ -216,29 +228,30 @@ class HostProcess:
         episode.line.close()
 
     def _outcome(self, episode: HostedEpisode, call: Call) -> Outcome:
-        """Carry out one call alone; whatever it raises becomes its outcome."""
+        """Return the outcome of one call, which is carried out alone; an exception becomes one."""
         try:
             if call.method == "describe":
-                ref = opened(_policy(call))
+                ref = opened(_policy_of(call))
                 needs = ref.needs or PolicyNeeds()
                 return Outcome(message=ref.problem or "", needs=needs, version=ref.version)
             if call.method == "open":
                 return self._open(episode, call)
             return self._call(episode, call)
         except BaseException as error:  # noqa: BLE001 - policies may raise anything
-            return _failure(error)
+            return _failure_outcome(error)
 
     def _open(self, episode: HostedEpisode, call: Call) -> Outcome:
-        """Make the policy of an episode; return what the world must know: needs and version.
+        """Make the policy of an episode; return its needs, version, and the video fields it reads.
 
-        Random numbers of its constructor are those of the episode.
+        Random numbers of its constructor follow from the seed of the call.
         """
-        ref = _policy(call)
+        ref = _policy_of(call)
         episode.random = RandomState(call.seed)
         episode.alone = call.alone
         self._random_turns.begin(episode.random)
         policy: Any = make_policy(ref, call.seed)
-        # Pixels of subgoals are for privileged policies, and those have no process of their own.
+        # `grounded` asks for pixels of subgoals. Only privileged policies get those, and privileged
+        # policies have no process of their own.
         needs = replace(PolicyNeeds.of(policy), grounded=False)
         episode.policy = policy
         episode.space = needs.action_space
@@ -246,7 +259,10 @@ class HostProcess:
         return Outcome(needs=needs, version=_undeclared_version(ref), reads=reads)
 
     def _call(self, episode: HostedEpisode, call: Call) -> Outcome:
-        """Call a method of a policy; `reset` and `hear` return its metadata."""
+        """Return the outcome of a method of a policy: actions, costs or metadata.
+
+        The global random generators have the state of the episode meanwhile.
+        """
         policy = episode.policy
         self._random_turns.begin(episode.random)
         match call.method:
@@ -260,7 +276,7 @@ class HostProcess:
             case "hear":
                 tell_policy(policy, call.value)
             case "act":
-                return _acted(episode, policy.act(_observation(call)))
+                return _action_outcome(episode, policy.act(_observation(call)))
             case "usage":
                 return Outcome(usage=policy_usage(policy))
             case "close":
@@ -274,21 +290,27 @@ class HostProcess:
         return FetchedDemonstration(call.value["fields"], call.value["arrays"], fetch)
 
     def _act_together(self, calls: Mapping[HostedEpisode, Call]) -> list[Outcome]:
-        """Ask a policy about several episodes at once; if that fails, all get the failure.
+        """Return the outcomes of `act` for several episodes, which the policy gets as one batch.
 
-        Their worlds then play them again, each alone, to see whose failure it is.
+        If that fails, all get the failure. Their worlds then play the episodes again, each alone,
+        to see whose failure it is.
         """
         try:
             policies = [episode.policy for episode in calls]
             observations = [_observation(call) for call in calls.values()]
             self._random_turns.end()
             answers = policies[0].act_together(policies, observations)
-            return [_acted(episode, rows) for episode, rows in zip(calls, answers, strict=True)]
+            return [
+                _action_outcome(episode, rows) for episode, rows in zip(calls, answers, strict=True)
+            ]
         except BaseException as error:  # noqa: BLE001 - policies may raise anything
-            return [_failure(error)] * len(calls)
+            return [_failure_outcome(error)] * len(calls)
 
     def _fetch(self, episode: HostedEpisode, fields: Sequence[str]) -> Mapping[str, NDArray[Any]]:
-        """Return fields of the video of an episode whose call is under way, drawn by its world.
+        """Return arrays of the demonstration video by field, which the episode's world draws now.
+
+        A policy gets this as a function, so it may call it at any time and from any thread; only
+        during a call of its episode can the world answer.
 
         Raises:
             RuntimeError: no call of this episode is under way in this thread, or the world is gone.
@@ -310,7 +332,10 @@ class HostProcess:
         return arrays
 
     def _wait_for_drawing(self, line: socket.socket) -> None:
-        """Wait until a world has drawn; meanwhile obey the supervisor, as nothing hangs.
+        """Wait until a world has drawn pictures for the call under way.
+
+        Meanwhile requests of the supervisor are answered, so that it does not take this process for
+        one that hangs.
 
         Raises:
             TimeoutError: the world takes too long.
@@ -322,7 +347,7 @@ class HostProcess:
                 return
             if not ready:
                 raise TimeoutError
-            self._obey()
+            self._take_request()
 
 
 def _reply(episode: HostedEpisode, message: Begun | Outcome) -> None:
@@ -330,7 +355,7 @@ def _reply(episode: HostedEpisode, message: Begun | Outcome) -> None:
         send(episode.line, message)
 
 
-def _policy(call: Call) -> PolicyRef:
+def _policy_of(call: Call) -> PolicyRef:
     """Return the policy that a call names."""
     if call.policy is None:
         raise ValueError(f"{call.method} names no policy")
@@ -350,15 +375,23 @@ def _observation(call: Call) -> Any:  # noqa: ANN401 - an `Observation`
     return call.value
 
 
-def _acted(episode: HostedEpisode, rows: Any) -> Outcome:  # noqa: ANN401
-    """Return what a policy's `act` returned, checked, for a message."""
+def _action_outcome(episode: HostedEpisode, rows: Any) -> Outcome:  # noqa: ANN401
+    """Return the outcome of `act` with the policy's actions, which are checked.
+
+    Args:
+        episode: of the call.
+        rows: what the policy returned; must be (n, size) numbers.
+    """
     chunk = check_rows(rows, episode.space)
     subgoal = policy_subgoal(episode.policy)
     return Outcome(rows=chunk.tobytes(), size=chunk.shape[1], subgoal=subgoal)
 
 
-def _failure(error: BaseException) -> Outcome:
-    """Return kind, message and traceback of an exception that is being handled."""
+def _failure_outcome(error: BaseException) -> Outcome:
+    """Return the outcome of a call that raised an exception, which is being handled.
+
+    It has kind, message and traceback.
+    """
     if isinstance(error, MissingDependencyError):
         return Outcome("missing", one_line(error))
     try:

@@ -79,15 +79,19 @@ class HostedPolicy:
             self._line.close()
             raise
         self.version = outcome.version
-        self._reads = outcome.reads  # fields of videos that the policy is known to read
+        self._known_reads = outcome.reads  # fields of videos that the policy is known to read
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin the episode; pictures that its policy reads travel with the call."""
+        """Begin the episode in the policy's process, and take its metadata and version.
+
+        Of the demonstration, poses travel with the call, and only such pictures as this policy has
+        read in earlier episodes; it can ask for all others.
+        """
         self._demonstration = demonstration
         fields = list(demonstration)
         # Pictures are slow to draw: those that the policy has not read so far wait until it does.
-        undrawn = {field for field in _drawn(fields) if field not in self._reads}
-        arrays = self._values([field for field in fields if field not in undrawn])
+        undrawn = {field for field in _drawn_fields(fields) if field not in self._known_reads}
+        arrays = self._arrays([field for field in fields if field not in undrawn])
         value = {"instruction": instruction, "fields": fields, "arrays": arrays}
         outcome = self._call(Call("reset", value=value))
         self._take_metadata(outcome)
@@ -96,6 +100,7 @@ class HostedPolicy:
 
     def act(self, observation: Observation) -> NDArray[np.float64]:
         """Return the next actions (n, 8) or (n, 7)."""
+        # The rows come as bytes of float64, one after the other.
         outcome = self._call(Call("act", value=observation))
         self.subgoal = outcome.subgoal
         row_bytes = _FLOAT_BYTES * outcome.size
@@ -123,7 +128,10 @@ class HostedPolicy:
             self._line.close()
 
     def _call(self, call: Call) -> Outcome:
-        """Call the policy, draw what it asks for, and return the outcome.
+        """Carry out a call in the policy's process and return its outcome, without an error.
+
+        Meanwhile the process may ask for pictures of the demonstration, which are drawn here. What
+        the policy prints is printed here, so that it gets into the log of the episode.
 
         Raises:
             EpisodeError: the policy raised, or broke its process; or the world cannot draw.
@@ -132,7 +140,7 @@ class HostedPolicy:
         """
         self._failure = None
         try:
-            outcome = self._line.call(call, self._draw)
+            outcome = self._line.call(call, self._answer)
         finally:
             _print(self._line.output)
         if self._failure is not None:
@@ -141,20 +149,20 @@ class HostedPolicy:
             return outcome
         if outcome.error != "missing":
             raise EpisodeError(outcome.error, outcome.message, outcome.details)
-        # Only our own code can ask the user to install something.
+        # A policy of the user's may not end the run by asking to install something.
         if self._ref.is_foreign:
             raise EpisodeError("policy", outcome.message, outcome.details)
         raise MissingDependencyError(outcome.message)
 
-    def _draw(self, question: Question) -> Call:
-        """Return the answer to a policy that asks for fields of the video.
+    def _answer(self, question: Question) -> Call:
+        """Return the answer to a policy's process that asks for pictures of the demonstration.
 
-        If they cannot be drawn, the answer is that the video is gone; the error is kept in
-        `_failure`, and raised once the policy has returned.
+        If they cannot be drawn, the answer is that the demonstration is gone. The error is kept in
+        `_failure`, which `_call` raises once the policy has returned.
         """
         fields = [field for field in self._demonstration if field in question.fields]
         try:
-            return Call("answer", value=self._values(fields))
+            return Call("answer", value=self._arrays(fields))
         except EndOfRunError as error:
             self._failure = error
         except Exception as error:  # noqa: BLE001 - the world's, whatever it is
@@ -168,12 +176,12 @@ class HostedPolicy:
         except (InvalidValueError, ValueError) as error:
             raise EpisodeError("policy", str(error), "") from error
 
-    def _values(self, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
-        """Return fields of the demonstration; pictures are drawn now."""
+    def _arrays(self, fields: Sequence[str]) -> dict[str, NDArray[Any]]:
+        """Return arrays of the demonstration by field, each (frames, …); pictures are drawn now."""
         draw = getattr(self._demonstration, "draw", None)
-        every = _drawn(self._demonstration)
+        all_drawn = _drawn_fields(self._demonstration)
         # Reading one field replays the episode for its camera; to draw all takes one replay.
-        if draw is not None and len(every) > 1 and len(_drawn(fields)) == len(every):
+        if draw is not None and len(all_drawn) > 1 and len(_drawn_fields(fields)) == len(all_drawn):
             draw()
         return {field: self._demonstration[field] for field in fields}
 
@@ -195,7 +203,7 @@ class HostedPlanner(HostedPolicy):
         return self.subgoal
 
 
-def _drawn(fields: Iterable[str]) -> list[str]:
+def _drawn_fields(fields: Iterable[str]) -> list[str]:
     """Return the fields of a demonstration that are drawn when they are read."""
     return [field for field in fields if field.endswith(_DRAWN_SUFFIXES)]
 

@@ -185,7 +185,7 @@ def receive_request(line: socket.socket) -> tuple[HostRequest, socket.socket | N
 
 
 def send(line: socket.socket, message: object, time_left: TimeLeft | None = None) -> None:
-    """Send a message, led by its size and followed by the bytes of its arrays.
+    """Send a message: its size, the message as msgpack, and the bytes of its arrays.
 
     Args:
         line: a socket.
@@ -197,6 +197,7 @@ def send(line: socket.socket, message: object, time_left: TimeLeft | None = None
         TypeError: it holds something other than plain data and arrays.
     """
     parts = _message_parts(message)
+    # Small parts are sent at once, so that the receiver wakes only once.
     if sum(len(part) for part in parts) <= _MOST_JOINED:
         parts = [b"".join(parts)]
     for part in parts:
@@ -204,7 +205,11 @@ def send(line: socket.socket, message: object, time_left: TimeLeft | None = None
 
 
 def _message_parts(message: object) -> list[bytes | memoryview]:
-    """Return what is sent of a message: its size, the message, and the bytes of its arrays."""
+    """Return the parts of a message as they are sent, one after the other.
+
+    They are the size of the message, the message itself, in which an array is replaced by its type
+    and shape, and the bytes of each array.
+    """
     arrays: list[memoryview] = []
 
     def set_aside(value: object) -> Ext:
@@ -225,7 +230,11 @@ def _size_bytes(data: bytes) -> bytes:
 
 
 def _send_all(line: socket.socket, part: bytes | memoryview, time_left: TimeLeft | None) -> None:
-    """Send bytes piece by piece, as the other end takes them in."""
+    """Send bytes piece by piece, as the other end takes them in.
+
+    `time_left` returns how long the next piece may take, in seconds, and raises `TimeoutError` when
+    the time is over; None for no limit.
+    """
     unsent = memoryview(part)
     while unsent:
         if time_left is not None:
@@ -238,7 +247,7 @@ def _send_all(line: socket.socket, part: bytes | memoryview, time_left: TimeLeft
 def receive(
     line: socket.socket, limit: int | None = None, time_left: TimeLeft | None = None
 ) -> bytearray:
-    """Return the next message of a line, which has no arrays.
+    """Return the bytes of the next message of a line.
 
     Args:
         line: a socket.
@@ -261,9 +270,11 @@ def receive(
 
 
 def receive_call(line: socket.socket) -> Call:
-    """Return the next call of a line, with its arrays in memory of their own.
+    """Return the next call of a line, with its arrays.
 
-    The sender is our own code, so sizes are trusted.
+    The message has only the type and the shape of an array; its bytes follow on the line, in the
+    same order, and are received while the message is decoded. The sender is our own code, so sizes
+    are trusted.
 
     Raises:
         EOFError: the line was closed.
@@ -283,6 +294,9 @@ def _fill(
     line: socket.socket, buffer: bytearray | memoryview, time_left: TimeLeft | None = None
 ) -> None:
     """Receive bytes from a line until a buffer is full.
+
+    `time_left` returns how long the next piece may take, in seconds, and raises `TimeoutError` when
+    the time is over; None for no limit.
 
     Raises:
         EOFError: the line was closed.

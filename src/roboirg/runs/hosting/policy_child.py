@@ -61,9 +61,13 @@ class _LifeCheck:
         self._has_started = False
 
     def passes(self, limit_s: float) -> bool:
-        """Ask the process, and return whether it answers in time.
+        """Return whether the process answers a question in time, which it does between two calls.
 
-        A process that has not started gets `GRACE_S` at least.
+        Several threads may ask: an answer that comes after a thread began to wait counts for it.
+
+        Args:
+            limit_s: how long a call may take; a process that has not started yet gets `GRACE_S` at
+                least.
         """
         asked_at = time.monotonic()
         with self._asking, contextlib.suppress(OSError):
@@ -131,15 +135,15 @@ class PolicyChild:
             ask(self._line, HostRequest("open", batch=batch), passed)
 
     def check(self, limit_s: float) -> float | None:
-        """Kill it unless it is between two calls at some time before the limit.
+        """Kill the process if it hangs: if it does not come to the end of its call in time.
 
         Args:
             limit_s: how long a call may take.
 
         Returns:
-            How long a call may wait for its turn in all: the process carries out the one that has
-            waited longest, so at most one of each world comes before, in which that may have to
-            draw. None if the process is over.
+            How long, in seconds, a call may wait for its turn in all; None if the process is over.
+            The process carries out the call that has waited longest, so at most one call of each
+            world comes first, and each may take its limit and the time in which its world draws.
         """
         if self._life_check.passes(limit_s):
             return self._most_worlds * (limit_s + DRAW_S)
@@ -157,7 +161,10 @@ class PolicyChild:
         return self._wait(GRACE_S if has_hung_up else 0.0) is not None
 
     def loss(self) -> Loss:
-        """Let the process exit by hanging up, kill it after `GRACE_S`; return how it ended."""
+        """End the process, and return how it ended: kind of error, words, and what it printed.
+
+        It exits when its line is closed; after `GRACE_S` it is killed.
+        """
         # Read first, as `kill` sets it: whether another world has had the process killed before.
         was_ended = self._was_ended
         with contextlib.suppress(OSError):
@@ -199,7 +206,10 @@ class PolicyChild:
         return self._guard.poll()
 
     def _bound_output(self) -> None:
-        """Cut off what it prints in a call without end, as long as it lives."""
+        """Keep the file with the process's output small, as long as the process lives.
+
+        Output is taken after each call; this is for a call that prints without end.
+        """
         while self._guard.poll() is None:
             time.sleep(PERIOD_S)
             if os.fstat(self._output).st_size > 2 * MAX_OUTPUT:

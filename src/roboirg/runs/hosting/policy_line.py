@@ -98,7 +98,7 @@ class PolicyLine:
             ask(hosts, HostRequest("open", policy), theirs)
 
     def call(self, call: Call, answer: AnswerQuestion | None = None) -> Outcome:
-        """Call the policy and return the outcome, which may be an error of the policy.
+        """Carry out a call in the policy's process; return its outcome, maybe the policy's error.
 
         Args:
             call: of the policy.
@@ -120,9 +120,9 @@ class PolicyLine:
             words = f"the {phase} did not return within {self._limit_s:g} s"
             if begun is None:  # an honest process begins the call that has waited longest
                 words = f"the process did not begin the {phase}, though it was its turn"
-            raise self._lost(begun or Begun(), phase, _Fault("timeout", words)) from None
+            raise self._loss_error(begun or Begun(), phase, _Fault("timeout", words)) from None
         except (EOFError, OSError):
-            raise self._lost(begun, phase) from None
+            raise self._loss_error(begun, phase) from None
         except (KeyboardInterrupt, SystemExit):  # the call goes on, so none can follow
             self.close()
             raise
@@ -132,7 +132,7 @@ class PolicyLine:
             if begun is None:  # a call of another episode may be under way
                 self.close()
                 raise EpisodeLostError("policy", words) from None
-            raise self._lost(begun, phase, _Fault("policy", words)) from None
+            raise self._loss_error(begun, phase, _Fault("policy", words)) from None
         self.output = outcome.output
         if outcome.error is not None and begun.together:
             words = "a call for several episodes failed"
@@ -152,7 +152,10 @@ class PolicyLine:
                 ask(self._hosts, HostRequest("leave"))
 
     def _begin(self, call: Call) -> Begun:
-        """Send a call, and wait until the process begins it.
+        """Send a call, and wait until the process begins it, as other episodes may come first.
+
+        Returns:
+            Whether the call was begun alone or in a batch with those of other episodes.
 
         Raises:
             ValueError: the process has sent something else.
@@ -160,18 +163,18 @@ class PolicyLine:
         self._sent_at = time.monotonic()
         self._until = self._sent_at + self._limit_s
         with waiting("its turn in the policy's process", is_queue=True):
-            send(self._line, call, self._turn_left)
-            begun = read_child(receive(self._line, MAX_BEGUN, self._turn_left))
+            send(self._line, call, self._seconds_for_turn)
+            begun = read_child(receive(self._line, MAX_BEGUN, self._seconds_for_turn))
         if not isinstance(begun, Begun) or (begun.together and self._alone):
             raise ValueError("a message that was not asked for")
         return begun
 
-    def _turn_left(self) -> float:
-        """Return the seconds for which a call may still wait for its turn.
+    def _seconds_for_turn(self) -> float:
+        """Return the seconds for which a call may still wait until its process begins it.
 
-        Once the limit of a call is over, the supervisor checks the process. If it is between two
-        calls, others came first, and the wait goes on: for the limit again, but not beyond the
-        time that the supervisor allows in all.
+        When the limit of a call is over, the supervisor checks that the process does not hang. If
+        it does not, calls of other episodes came first. Then the wait is extended: by the limit
+        again, but not beyond the time that the supervisor allows in all.
 
         Raises:
             EOFError: the process is over.
@@ -183,17 +186,20 @@ class PolicyLine:
             if most_s is None:
                 raise EOFError
             self._until = min(time.monotonic() + self._limit_s, self._sent_at + most_s)
-        return self._time_left()
+        return self._seconds_left()
 
     def _outcome(self, answer: AnswerQuestion | None) -> Outcome:
-        """Return the outcome of a call that has begun; meanwhile answer the process's questions.
+        """Wait for the outcome of a call that has begun, and return it.
+
+        Meanwhile the process may ask for pictures of the demonstration, which `answer` draws. The
+        time for that does not count for the limit of the call.
 
         Raises:
             ValueError: the process sends something else, or asks too often.
         """
         self._until = time.monotonic() + self._limit_s
         for _ in range(MOST_QUESTIONS + 1):
-            reply = read_child(receive(self._line, MAX_MESSAGE, self._time_left))
+            reply = read_child(receive(self._line, MAX_MESSAGE, self._seconds_left))
             if isinstance(reply, Outcome):
                 return reply
             if answer is None or not isinstance(reply, Question):
@@ -201,10 +207,10 @@ class PolicyLine:
             asked_at = time.monotonic()
             answered = answer(reply)
             self._until += time.monotonic() - asked_at  # drawing is not the policy's time
-            send(self._line, answered, self._time_left)
+            send(self._line, answered, self._seconds_left)
         raise ValueError("it asked for the video again and again")
 
-    def _time_left(self) -> float:
+    def _seconds_left(self) -> float:
         """Return the seconds until the limit.
 
         Raises:
@@ -215,14 +221,16 @@ class PolicyLine:
             raise TimeoutError
         return left_s
 
-    def _lost(self, begun: Begun | None, phase: str, fault: _Fault | None = None) -> Exception:
-        """Return the error for a process that was lost during a call; the line is closed.
+    def _loss_error(
+        self, begun: Begun | None, phase: str, fault: _Fault | None = None
+    ) -> Exception:
+        """Return the error to raise for a process that was lost during a call; close the line.
 
-        Only a call that has begun, alone, is to blame: that is an `EpisodeError`. Otherwise the
-        episode can be played again: an `EpisodeLostError`.
+        A call is to blame if the process had begun it, and it alone: then the episode ends with an
+        `EpisodeError`. Otherwise the episode can be played again: an `EpisodeLostError`.
 
         Args:
-            begun: what the process has said of the call; None if it has not begun.
+            begun: the process's message that the call begins; None if it has not begun.
             phase: of the call, in words.
             fault: of the process, which is killed for it; None if it has ended by itself.
         """

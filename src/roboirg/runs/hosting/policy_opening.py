@@ -23,10 +23,10 @@ LIMIT_S = 600.0
 def open_policy(
     ref: PolicyRef, limit_s: float = LIMIT_S, settings: HostSettings | None = None
 ) -> PolicyRef:
-    """Return a policy with its version and its needs.
+    """Return a policy's reference with the version and the needs that the policy declares.
 
-    One of the user's is made in a process of its own and begins a synthetic episode, because it may
-    set its version until its ``reset`` ends. Of ours, both are known.
+    A policy of the user's is made in a process of its own and begins a synthetic episode, because
+    it may set its version until its ``reset`` ends. Those of roboirg are returned as they are.
 
     Args:
         ref: as it was named.
@@ -60,7 +60,16 @@ def open_policy(
 
 
 def _describe(ref: PolicyRef, limit_s: float, settings: HostSettings) -> Outcome:
-    """Start a process for a policy, and return what it says of it; raises like `open_policy`."""
+    """Return what a policy declares, opened in a new process of its own that ends here.
+
+    Args:
+        ref: the policy.
+        limit_s: seconds that this may take.
+        settings: of the process, which is on the first of the devices.
+
+    Raises:
+        InvalidValueError: the process is lost, or takes too long.
+    """
     hosted = ref.hosted_part
     settings = replace(settings, devices=settings.devices[:1])
     try:

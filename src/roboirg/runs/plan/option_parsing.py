@@ -36,7 +36,9 @@ _EPISODES_HINT = f"{_NUMBERS_HINT}, or all"
 
 
 def parse_names(kind: str, given: object) -> Names:
-    """Parse names, in a text separated by commas; repeated names count once.
+    """Return the names in a text separated by commas or in a list; repeated ones count once.
+
+    ``"a, b"`` and ``["a,b", "a"]`` are ``("a", "b")``.
 
     Args:
         kind: what the names are, for the error.
@@ -52,7 +54,14 @@ def parse_names(kind: str, given: object) -> Names:
 
 
 def _words(kind: str, given: object) -> list[str]:
-    """Split at commas: ``"a, b"``, ``["a", "b"]`` and ``["a,b"]`` all become ``["a", "b"]``."""
+    """Return the words of a typed value, split at commas.
+
+    ``"a, b"``, ``["a", "b"]`` and ``["a,b"]`` all become ``["a", "b"]``; None has no words.
+
+    Args:
+        kind: what the words are, for the error.
+        given: as typed, a list of these, or a number.
+    """
     if given is None:
         return []
     if isinstance(given, Mapping):
@@ -85,7 +94,10 @@ def parse_arms(given: object) -> Names:
 
 
 def parse_policies(given: Iterable[str]) -> Names:
-    """Parse policies; one text may hold several names separated by commas.
+    """Return policies as they are typed, each once: ``NAME``, ``NAME=SPEC`` or an address.
+
+    A text may hold several, separated by commas: ``"oracle,mine=lab:Walk"`` has two. Addresses and
+    what has options stand in texts of their own.
 
     Raises:
         InvalidValueError: there is none, or ``NAME=SPEC`` has a name that is not allowed.
@@ -141,7 +153,7 @@ def parse_splits(text: str) -> tuple[Split, ...]:
 
 
 def parse_episodes(given: object, split: str, tasks: Collection[str]) -> Numbers:
-    """Parse episodes: a list of positions, ranges and difficulties, or how many of the first.
+    """Return the positions of episodes in a split, from what was typed.
 
     | typed | selects |
     | --- | --- |
@@ -151,9 +163,13 @@ def parse_episodes(given: object, split: str, tasks: Collection[str]) -> Numbers
     | ``hard,7`` | both |
     | ``all`` | every one |
 
-    Difficulties and ``all`` need a split of fixed episodes. A list of Python or YAML has the same
-    items. Its positions are not compared with the size of the split: only those who know the salt
-    of private episodes can draw it.
+    A list of Python or YAML has the same items. Its positions are not compared with the size of the
+    split: that of a private one is not known everywhere.
+
+    Args:
+        given: as typed, or a list.
+        split: name of the split; difficulties and ``all`` need one with fixed episodes.
+        tasks: whose episodes must have the difficulty.
 
     Raises:
         UnknownNameError: there is no such split.
@@ -166,7 +182,7 @@ def parse_episodes(given: object, split: str, tasks: Collection[str]) -> Numbers
     positions = [word for word in words if word not in DIFFICULTIES]
 
     ranges: list[range] = []
-    # A number alone, even a negative one, which is then refused, is a count and no position.
+    # A number alone is how many, and no position; a negative one is refused as such.
     if re.fullmatch(rf"-?{_NUMBER}", str(given).strip()):
         ranges = [_first_episodes(positions[0])]
     elif positions:
@@ -196,7 +212,13 @@ def _first_episodes(count: str) -> range:
 
 
 def _episodes_of_levels(levels: Collection[str], split: str, tasks: Collection[str]) -> Numbers:
-    """Return the episodes of a fixed split whose difficulty is one of these in every task."""
+    """Return the positions of the episodes with one of these difficulties in every task.
+
+    Args:
+        levels: difficulties, such as ``hard``.
+        split: name of a split with fixed episodes.
+        tasks: names.
+    """
     size = splits.split_size(split)
     if split not in SPLITS:
         raise InvalidValueError(
@@ -217,7 +239,7 @@ def parse_stages(given: object) -> Numbers:
 
 
 def parse_stage_sets(given: object) -> tuple[Numbers, ...]:
-    """Parse several sets of stages: ``"1,5; 1-3"`` gives ``((1, 5), (1, 2, 3))``.
+    """Return sets of stages of a discourse: ``"1,5; 1-3"`` gives ``((1, 5), (1, 2, 3))``.
 
     A list has a set in each item, as ``[[1, 5], "1-3"]``, but a list of numbers is one set.
     """
@@ -236,7 +258,7 @@ def parse_numbers(kind: str, given: object) -> Numbers:
 
 
 def _parse_ranges(kind: str, given: object, hint: str) -> list[range]:
-    """Return numbers and ranges as ranges: ``"3,5-9"`` becomes 3 to 3 and 5 to 9.
+    """Return a range for each item of a typed list: ``"3,5-9"`` becomes 3 to 3 and 5 to 9.
 
     Args:
         kind: what the numbers are, for the error.
@@ -246,7 +268,7 @@ def _parse_ranges(kind: str, given: object, hint: str) -> list[range]:
     ranges = []
     for part in parse_names(kind, given):
         found = _RANGE.fullmatch(part)
-        numbers = range(0)
+        numbers = range(0)  # empty, as is 9-5: both are refused
         if found is not None:
             last = found["last"] or found["first"]
             numbers = range(int(found["first"]), int(last) + 1)

@@ -49,7 +49,10 @@ class Plan(PlanFields):
         return not SETTING_GROUPS.keys().isdisjoint(self.settings)
 
     def checked(self) -> Plan:
-        """Return this plan with opened policies and its words, if all of it can be played.
+        """Return this plan, completed, if all of it can be played; else raise.
+
+        Added are the versions and needs of its policies, for which each is opened, and which words
+        its instructions have.
 
         Raises:
             UnknownNameError: a policy, task, setting, … does not exist; the message suggests the
@@ -78,14 +81,14 @@ class Plan(PlanFields):
         return self.model_copy(update=found)
 
     def _check_options(self) -> None:
-        """Raise if a policy, a name or an option is wrong, which no episode is needed to see."""
+        """Raise if a name or an option is wrong, as far as that can be seen without episodes."""
         tasks.find_tasks(self.tasks)
         find_settings(self.settings)
         _check_policy_names(self.policies)
         for form, stages in itertools.product(self.forms, self.stages):
             check_options(replace(self.instruction, form=form, stages=stages))
         self.environment.check()
-        # Only a setting that reads the option `delivery` can be said in turns.
+        # Only in settings that use the option `delivery` can utterances come one after another.
         in_turns = [name for name, rule in all_settings().items() if "delivery" in rule.reads]
         check_names("setting in turns", self.in_turns, in_turns)
         if is_private(self.split) and self.hosting.policy_process == "shared":
@@ -108,11 +111,12 @@ class Plan(PlanFields):
     def jobs(self, played: Iterable[Summary] = ()) -> tuple[Job, ...]:
         """Return every job, ordered by policy, task, episode, setting, form, stages and seed.
 
-        Of a scene, what leaves the goal implicit comes first: a policy that keeps what it heard
-        has not heard the explicit command of the scene yet.
+        In each scene, instructions that state the goal outright come last: a policy that remembers
+        earlier episodes must not know the goal when it gets the others.
 
         Args:
-            played: results, to save time: what was said can be said.
+            played: stored results, to save time: their instructions need no check that the setting
+                can express them.
         """
         said = {
             (result.task, result.episode, result.setting)
@@ -132,13 +136,16 @@ class Plan(PlanFields):
         return tuple(jobs)
 
     def left_out(self, jobs: Iterable[Job]) -> Mapping[str, int]:
-        """Return how many jobs each arm lacks, because it has no other goal or cannot be said.
+        """Return how many jobs each control arm lacks, because its words cannot be made.
+
+        For example ``{"other-goal": 4}`` if 4 scenes have no second goal. Arms that lack none are
+        left out.
 
         Args:
             jobs: of this plan.
         """
-        # By arm, what is played in it: the keys of its jobs as if they were of the usual arm, so
-        # that jobs which differ only in the arm have the same.
+        # The keys of each arm's jobs, as if they were of the usual arm: then jobs that differ only
+        # in the arm have equal keys, and missing ones can be counted.
         trials = {arm: set[RecordKey]() for arm in self.arms}
         for job in jobs:
             trials[job.arm].add(identity_key(msgspec.structs.replace(job, arm=TOLD)))
@@ -146,10 +153,10 @@ class Plan(PlanFields):
         return {arm: total - len(keys) for arm, keys in trials.items() if len(keys) < total}
 
     def drawable_jobs(self, played: Iterable[Summary] = ()) -> tuple[Job, ...]:
-        """Return the jobs whose words can be made here, for counting what a stored run lacks.
+        """Return the jobs that this computer can make, to count what a stored run lacks.
 
-        There are none if the episodes are private and their salt is not known. Tasks and settings
-        whose package is not installed are left out.
+        There are none if the episodes are private and the salt that they are drawn with is not
+        known. Tasks and settings whose package is not installed are left out.
 
         Args:
             played: results of the run, as in `jobs`.
@@ -170,13 +177,13 @@ class Plan(PlanFields):
     ) -> Names:
         """Return the settings in which an episode is played.
 
-        Named settings are all played. Of a group such as ``all``, only those are that the task has
-        and that can express this episode.
+        If the plan names settings, these are all. If it has a group such as ``all``, they are those
+        that the task has and that can express the episode.
 
         Args:
             task: name of its task.
             episode: its position in the split.
-            said: task, episode and setting of what is known to be expressible.
+            said: task, episode and setting of instructions that are known to be possible.
         """
         if not self._has_groups:
             return self.setting_names
@@ -186,7 +193,7 @@ class Plan(PlanFields):
         for setting in settings_of(tasks.get_task(task)):
             if setting not in chosen:
                 continue
-            # Explicit stays, so that a task without words is refused and not left out.
+            # Explicit is kept unchecked: a task without words should be refused, not left out.
             is_sure = setting == EXPLICIT or (task, episode, setting) in said
             if is_sure or find_refusal(scene, InstructionOptions(setting)) is None:
                 playable.append(setting)
@@ -195,20 +202,20 @@ class Plan(PlanFields):
     def _instructions(
         self, task: str, episode: int, said: Collection[tuple[str, int, str]] = ()
     ) -> Iterator[Job]:
-        """Yield a job without a policy for each instruction that an episode is played with.
+        """Yield a job for each instruction that an episode is played with; it names no policy yet.
 
-        Instructions that leave the goal implicit come first.
+        Instructions that state the goal outright come last.
 
         Args:
             task: name of its task.
             episode: its position in the split.
             said: as in `settings_of`.
         """
-        ways: list[InstructionOptions] = []
+        variants: list[InstructionOptions] = []
         for setting in self.settings_of(task, episode, said):
-            ways += self._options_of(setting)
-        ways.sort(key=_states_goal)
-        for options in ways:
+            variants += self._options_of(setting)
+        variants.sort(key=_states_goal)  # False comes before True
+        for options in variants:
             if self._is_left_out(task, episode, options):
                 continue
             yield Job(
@@ -222,7 +229,14 @@ class Plan(PlanFields):
             )
 
     def _trials(self, policy: PolicyRef, instruction: Job) -> Iterator[Job]:
-        """Yield the jobs of a policy with an instruction, one for each arm and seed."""
+        """Yield the jobs of a policy with an instruction, one for each control arm and seed.
+
+        Arms whose words cannot be made from the instruction are left out.
+
+        Args:
+            policy: that plays.
+            instruction: a job without a policy.
+        """
         for arm in self.arms:
             if arm != TOLD and not _has_arm(instruction, arm):
                 continue
@@ -233,11 +247,12 @@ class Plan(PlanFields):
                 )
 
     def _options_of(self, setting: str) -> Iterator[InstructionOptions]:
-        """Yield the options of each instruction to play in a setting.
+        """Yield the options of each instruction that is played in a setting.
 
-        There is one for each form and set of stages of the plan, and for some settings the same
-        once more in turns. A setting names the options that change its words (`reads`); all others
-        keep their defaults, so that no two jobs have the same words.
+        There is one for each form and set of stages of the plan, and for settings in `in_turns` the
+        same once more with utterances one after another. Options that do not change the words of
+        the setting (those not in its `reads`) keep their defaults, so that no two jobs have the
+        same words.
         """
         rule = all_settings()[setting]
         usual = InstructionOptions(setting)
@@ -252,11 +267,11 @@ class Plan(PlanFields):
                 yield replace(options, delivery=TURNS)
 
     def _is_left_out(self, task: str, episode: int, options: InstructionOptions) -> bool:
-        """Return whether a plan leaves an instruction out, because the scene is too simple for it.
+        """Return whether the scene of an episode is too simple for an instruction.
 
-        Such a setting is a harder version of a *plain* one and needs more, such as a second color.
-        If the plain one cannot express the episode either, that is an error, and nothing is left
-        out.
+        Some settings are harder versions of a *plain* one and need more of a scene, such as a
+        second color. The answer is yes if only the plain one can express the episode; if neither
+        can, that is an error, which is found later.
         """
         plain_setting = all_settings()[options.setting].plain
         if plain_setting is None:
@@ -267,7 +282,7 @@ class Plan(PlanFields):
         return find_refusal(scene, replace(options, setting=plain_setting)) is None
 
     def _instructions_to_check(self) -> Iterator[Job]:
-        """Yield a job for each instruction to check, as the language may not express it."""
+        """Yield a job for each instruction of which `checked` must see that it can be said."""
         episodes = self.episodes
         has_usual_words = self.instruction.frame == DEFAULT_FRAME and self.wordings is None
         if self._has_groups and has_usual_words:
@@ -280,7 +295,7 @@ class Plan(PlanFields):
 
 
 def _check_policy_names(policies: Iterable[PolicyRef]) -> None:
-    """Raise if a name is not fit for records, or two policies have the same."""
+    """Raise if a policy's name is not fit for records, or two policies have the same name."""
     specs: dict[str, str] = {}
     for policy in policies:
         check_policy_name(policy.name)
@@ -298,7 +313,12 @@ def _states_goal(options: InstructionOptions) -> bool:
 
 @functools.lru_cache(maxsize=65_536)
 def _has_arm(job: Job, arm: str) -> bool:
-    """Return whether an instruction, a job without a policy, has an arm."""
+    """Return whether words of a control arm can be made from an instruction.
+
+    Args:
+        job: the instruction, a job without a policy.
+        arm: name of the arm.
+    """
     try:
         instruct_job(msgspec.structs.replace(job, arm=arm))
     except InvalidValueError:

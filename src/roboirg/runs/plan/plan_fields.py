@@ -64,9 +64,10 @@ _UNDERSCORED_NUMBER = re.compile(r"[\d._]*_[\d._]*")
 
 
 def _read_policies(given: object) -> object:
-    """Read policies that are typed, such as ``"oracle,mine=lab:Walk"``, into references.
+    """Return references of policies that are typed, such as ``"oracle,mine=lab:Walk"``.
 
-    What is no text is returned as it is: pydantic takes references and refuses anything else.
+    Anything that is no text or list of texts is returned unchanged: pydantic calls this first, then
+    accepts references and refuses the rest.
     """
     texts = [given] if isinstance(given, str) else given
     if not isinstance(texts, list | tuple) or not all(isinstance(text, str) for text in texts):
@@ -89,7 +90,8 @@ def _read_tasks(given: object) -> Names:
 def _read_settings(given: object) -> Names:
     """Return the names of settings, and of groups of them, in a typed text or list.
 
-    A group that means all that is named stands alone: ``"direct,All"`` becomes ``("all",)``.
+    If a group, such as ``all``, contains all others that are named, it alone is returned:
+    ``"direct,All"`` becomes ``("all",)``.
     """
     words = []
     for name in parse_names("setting", given):
@@ -116,7 +118,10 @@ class ChosenWordings(NamedTuple):
 
 
 def _open_wordings(given: object) -> object:
-    """Open the wordings that a text or a path names; stored ones are taken as they are."""
+    """Return the wordings that a text or a path names: a wording file, or a pool of our words.
+
+    None and wordings that are stored in a plan are returned as they are, for pydantic.
+    """
     if given == REQUIRED:
         raise InvalidValueError(
             "This plan needs RoboMME's sentences: make a wording file with `roboirg language "
@@ -212,10 +217,11 @@ class PlanFields(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _nest(cls, given: object) -> object:
-        """Put options that stand alone into their sections, before pydantic checks the values.
+        """Return the given options with those that stand alone moved into their sections.
 
-        ``{"max_steps": 600}`` becomes ``{"environment": {"max_steps": 600}}``. `FLAT` has the
-        section of each such option.
+        ``{"max_steps": 600}`` becomes ``{"environment": {"max_steps": 600}}``; `FLAT` has the
+        section of each such option. Pydantic calls this before it checks the values, and refuses
+        later what is no mapping.
         """
         if not isinstance(given, Mapping):
             return given
@@ -232,7 +238,7 @@ class PlanFields(BaseModel):
                     f"{option} is {value!r}; write the number without underscores."
                 )
             options = nested.get(section, {})
-            if is_dataclass(options) and not isinstance(options, type):
+            if is_dataclass(options) and not isinstance(options, type):  # given from Python
                 options = asdict(options)
             if isinstance(options, Mapping):  # pydantic refuses what is no section
                 nested[section] = {**options, option: value}
@@ -258,7 +264,7 @@ class PlanFields(BaseModel):
 
     @model_validator(mode="after")
     def _check_text(self) -> Self:
-        """Refuse a text that cannot be printed or stored, wherever it stands."""
+        """Raise if a text anywhere in the plan cannot be printed or stored as UTF-8."""
         for name, value in self.model_dump().items():
             for text in _texts(value):
                 if re.search(rf"[{CONTROLS}\ud800-\udfff]", text):
@@ -270,7 +276,7 @@ class PlanFields(BaseModel):
 
     @model_validator(mode="after")
     def _check_size(self) -> Self:
-        """Refuse a plan of more jobs than a run can hold, before any is made."""
+        """Raise if the plan may have more jobs than a run can hold, before any is made."""
         scenes = len(self.tasks) * len(self.episodes)
         instructions = len(self.setting_names) * len(self.forms) * len(self.stages)
         trials = len(self.policies) * len(self.policy_seeds) * len(self.arms)
@@ -288,7 +294,7 @@ class PlanFields(BaseModel):
 
     @property
     def fingerprint(self) -> str:
-        """Hash of all fields but names of variables and what follows from the others."""
+        """Hash of the plan, for records, without the names of variables and what is derived."""
         excluded: Mapping[str, Any] = {
             "hosting": {"policy_env"},
             "policies": {"__all__": {"makeup"}},
@@ -345,9 +351,10 @@ class PlanOption(NamedTuple):
 
 
 def plan_options() -> Iterator[PlanOption]:
-    """Yield all options of a plan in order; in the place of a section, the options that it has.
+    """Yield all options that may be typed for a plan, in order, with their defaults and help.
 
-    Of a section whose options never stand alone, the section itself is yielded.
+    A section, such as ``environment``, is replaced by its options, as each may stand alone in a
+    plan; one whose options may not is yielded itself.
     """
     for name, field in PlanFields.model_fields.items():
         if field.description is None:  # nothing to choose
@@ -366,7 +373,7 @@ def plan_options() -> Iterator[PlanOption]:
 
 
 def _check_sections(options: Mapping[str, Any]) -> None:
-    """Raise if a section has an unknown option, or one that also stands outside of it."""
+    """Raise if a section has an unknown option, or one that also stands outside of the section."""
     for section, keys in SECTION_KEYS.items():
         inside = options.get(section)
         if not isinstance(inside, Mapping):
@@ -380,7 +387,7 @@ def _check_sections(options: Mapping[str, Any]) -> None:
 
 
 def _texts(value: object) -> list[str]:
-    """Return all texts in a value, keys of mappings included."""
+    """Return all texts in a value, at any depth: ``{"a": ("b", 1)}`` has ``["a", "b"]``."""
     if isinstance(value, str):
         return [value]
     if isinstance(value, Mapping):

@@ -45,7 +45,7 @@ def named_plans() -> tuple[str, ...]:
 
 
 def read_plan_file(name: str, section: str = "") -> dict[str, Any]:
-    """Read a plan file as options of `make_plan`.
+    """Return the options in a plan file, as `make_plan` takes them.
 
     Args:
         name: name of a plan that comes with the package, or path of a YAML file, or of the
@@ -96,10 +96,10 @@ class _PlanLoader(yaml.SafeLoader):
     """
 
     def compose_scalar_node(self, anchor: dict[str, yaml.Node]) -> yaml.ScalarNode:
-        """Read a value that is no list or mapping, and refuse what YAML reads in surprising ways.
+        """Return the node of a value that is no list or mapping; raise if YAML reads it oddly.
 
-        ``yes`` stays a text, though YAML takes it for true; ``1_000`` and ``2024-01-01`` are
-        refused, and so is a key without a value.
+        ``yes`` stays a text, though YAML takes it for true; ``1_000`` (1000) and ``2024-01-01`` (a
+        date) are refused, and so is a key without a value.
         """
         node = super().compose_scalar_node(anchor)
         text = node.value
@@ -136,7 +136,11 @@ class _PlanLoader(yaml.SafeLoader):
 
 
 def _load(name: str) -> object:
-    """Return what a plan file holds; a file that cannot be read is refused in one sentence."""
+    """Return what a plan file holds, usually a mapping.
+
+    Raises:
+        InvalidValueError: it cannot be read or is not valid YAML; the message is one sentence.
+    """
     file = _find(name)
     try:
         # A safe loader, with more checks.
@@ -159,7 +163,7 @@ def _text(file: Path | Traversable) -> str:
 
 
 def _find(name: str) -> Path | Traversable:
-    """Return the file of a path, of a plan of another package, or of one that comes with ours."""
+    """Return the file of a plan: a path, or by name one of this package or of another."""
     path = Path(name)
     if path.suffix in _SUFFIXES:
         return path
@@ -177,14 +181,14 @@ def _folder() -> Traversable:
 
 
 def plan_text(plan: Plan) -> str:
-    """Return a plan as YAML that `read_plan_file` reads; the comments explain each option."""
+    """Return a plan as YAML, with a comment on each option; `read_plan_file` reads it."""
     comments = textwrap.TextWrapper(_WIDTH, initial_indent="# ", subsequent_indent="# ")
     as_typed = {
         "policies": [policy.text for policy in plan.policies],
         "episodes": _ranges(plan.episodes),
         "wordings": plan.wordings and plan.wordings.file,
     }
-    # Each option below its help, in the form in which it is typed.
+    # Each option stands below its help, in the form in which it is typed.
     texts = []
     for option in plan_options():
         value = as_typed.get(option.name, option.value_in(plan))

@@ -31,7 +31,9 @@ def make_plan(policies: str | Iterable[str | PolicyRef], **options: object) -> P
 
 
 def word_options(**options: object) -> InstructionOptions:
-    """Return options of instructions as in a plan, one value each; opens the wording file.
+    """Return options of instructions that are typed as in a plan, with one value each.
+
+    A wording file among them is opened, and named by the hash of its content.
 
     Raises:
         InvalidValueError: a value is out of range, or there are several sets of stages.
@@ -57,12 +59,16 @@ def as_typed_field(name: str, kind: Any, value: object) -> Any:  # noqa: ANN401 
 
 
 def _unchecked(**options: object) -> Plan:
-    """Return a plan whose values have the right types, but which may not be playable."""
+    """Return a plan whose values have the right types; whether it can be played is not checked.
+
+    Raises:
+        InvalidValueError: a value has a wrong type; the message is one plain sentence.
+    """
     try:
         return Plan.model_validate(options)
     except ValidationError as error:
         fault = error.errors()[0]
-        # An error of ours inside of pydantic's says more than that.
+        # If one of our validators raised the error, its message is better than pydantic's.
         cause = fault.get("ctx", {}).get("error")
         if isinstance(cause, InvalidValueError):
             raise cause from error
@@ -71,7 +77,7 @@ def _unchecked(**options: object) -> Plan:
 
 
 def _typed_name(path: Sequence[str]) -> str:
-    """Return the name of an option by its place in the plan.
+    """Return the name of an option as a user types it, given its path in the plan.
 
     An option that may stand alone is named without its section: ``["environment", "max_steps"]``
     is ``max_steps``; ``["cluster", "cpus"]`` is ``cluster.cpus``.

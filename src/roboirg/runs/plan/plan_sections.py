@@ -38,7 +38,7 @@ def names_of(kind: str) -> BeforeValidator:
 
 
 def _error_kinds(given: object) -> Names:
-    """Return kinds of errors in their usual order; ``none`` is an empty list of them."""
+    """Return the kinds of errors that are typed, in their usual order; ``none`` gives none."""
     names = _names_if_any("kind of error", given)
     if {name.lower() for name in names} <= {"none"}:
         return ()
@@ -149,10 +149,12 @@ class WorkerNeeds:
     working_dir: str | None = None
 
     def slots(self, node: Mapping[str, Any]) -> int:
-        """Return how many workers a machine has room for; 0 if it lacks one of the labels.
+        """Return how many workers fit on a machine by its CPUs, GPUs and memory.
+
+        It is 0 if the machine lacks one of the labels.
 
         Args:
-            node: what Ray says of the machine.
+            node: what Ray reports of the machine.
         """
         if not self.labels.items() <= node.get("Labels", {}).items():
             return 0

@@ -30,9 +30,9 @@ def read_plan(folder: Path) -> Plan | None:
 
 
 def read_plans(folder: Path) -> tuple[Plan, ...]:
-    """Return the plans whose episodes a folder should hold.
+    """Return the plans whose episodes the folder of a run should hold.
 
-    That is the newest, or in a merged run, which has no newest, those of its parts.
+    That is the newest plan; a merged run has none, but the plans of its parts.
     """
     newest = read_plan(folder)
     if newest is not None:
@@ -46,7 +46,7 @@ def read_kept_plans(folder: Path) -> tuple[Plan, ...]:
 
 
 def _plans(paths: Iterable[Path]) -> Iterator[Plan]:
-    """Yield the plans of the files that hold one; a warning names a file that holds none."""
+    """Yield the plan in each file; a missing file is skipped, an unreadable one with a warning."""
     for path in paths:
         try:
             yield Plan.model_validate_json(read_regular(path, MOST_PLAN_BYTES))

@@ -62,10 +62,10 @@ class CallGuard:
 
     @contextlib.contextmanager
     def _timed(self, name: str) -> Iterator[None]:
-        """Add the seconds that the block takes to a timing, but not those in a queue.
+        """Add the seconds that the block takes to the timing of this name.
 
-        Waiting for one's turn, as at a shared model, is not the policy's time; it is added to
-        ``policy_queue``.
+        Time in a queue, as for a model that another episode uses, is not the policy's; it is added
+        to the timing ``policy_queue`` instead.
         """
         start = time.perf_counter()
         queued_before = queued_seconds()
@@ -96,7 +96,8 @@ def attribute_errors(source: ErrorSource) -> Iterator[None]:
     except (EndOfRunError, EpisodeError, EpisodeLostError, Terminated):
         raise
     except (Exception, SystemExit, GeneratorExit, KeyboardInterrupt) as error:
-        # Policies may raise anything. Where Ctrl-C is ignored, as in workers, it is not the user's.
+        # Policies may raise anything, even KeyboardInterrupt. It is the policy's if this process
+        # ignores Ctrl-C, as workers do; else it may be the user's.
         if isinstance(error, KeyboardInterrupt):
             is_ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
             if not is_ignored:

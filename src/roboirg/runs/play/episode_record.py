@@ -55,10 +55,10 @@ class CodeFingerprints(NamedTuple):
 
 
 def begin_record(prepared: PreparedJob) -> Record:
-    """Return the record of an episode that has not begun; needs no simulator.
+    """Return the record of an episode that has not begun, to be filled in; needs no simulator.
 
-    It has the words that are to be said, and the policy without its needs, as those with which it
-    is played are a field of their own.
+    It has the words that are to be said. Its outcome is an error until the episode ends. The policy
+    in it lacks its needs: those with which it is played are a field of their own.
     """
     job = prepared.job
     words = prepared.words
@@ -93,38 +93,40 @@ def begin_record(prepared: PreparedJob) -> Record:
 
 
 def lost_record(job: Job, kind: ErrorKind, message: str) -> Record:
-    """Return the record of an episode of which nothing is known but why it ended."""
+    """Return the record of an error for an episode of which nothing else is known."""
     record = begin_record(PreparedJob(job))
     record.record_error(kind, format_cause(kind, message))
     return record
 
 
-def utterances_at(prepared: PreparedJob, heard: Sequence[int]) -> tuple[UtteranceRecord, ...]:
-    """Return the utterances of a job, each with the step at which it was heard.
+def utterances_at(prepared: PreparedJob, heard_steps: Sequence[int]) -> tuple[UtteranceRecord, ...]:
+    """Return the utterances of a job, each with the control step at which the policy heard it.
+
+    If the job's words are not delivered in turns, all are heard at step 0.
 
     Args:
-        prepared: the job. Unless its delivery is in turns, all are heard at step 0.
-        heard: the steps of those heard so far; the step of all others is None.
+        prepared: the job.
+        heard_steps: steps of the utterances heard so far, in order; that of all others is None.
     """
     in_turns = prepared.job.options.delivery == TURNS
     records = []
     for number, utterance in enumerate(prepared.words.instruction.utterances):
         step: int | None = 0
         if in_turns:
-            step = heard[number] if number < len(heard) else None
+            step = heard_steps[number] if number < len(heard_steps) else None
         records.append(UtteranceRecord(**asdict(utterance), step=step))
     return tuple(records)
 
 
 def audit_record(record: Record, prepared: PreparedJob, limit: PromptLimit) -> None:
-    """Record what of the instruction fits into the limit of a policy's model.
+    """Record how much of the instruction fits into what a policy's language model reads.
 
     If the episode ended before anything was said, all utterances count as said.
 
     Args:
         record: gets the audit and its verdict.
         prepared: its job.
-        limit: that the policy declares.
+        limit: most tokens of a prompt, as the policy declares it.
 
     Raises:
         InvalidValueError: the policy's tokenizer does not read this text.
@@ -154,7 +156,8 @@ def conclude(
         prepared: its job.
         start: control steps of the episode before the policy's turn.
         timed_out: whether the policy used up its steps.
-        original: how it ended for the scene's own goal, if the words state another one.
+        original: status of the scene's own goal at the end, such as ``success``, if the words of
+            the episode state another goal; else None.
     """
     if not record.events:
         return
@@ -168,8 +171,8 @@ def conclude(
         return
 
     attempts = judged_events(record.attempts or (), start)
-    # What the words would mean if left and right were mistaken, which may explain the failure. A
-    # text that mentions nothing, such as a scrambled one, has no sides to exchange.
+    # The objects that the words would mean if left and right were mistaken: taking one of them
+    # explains the failure. A text that mentions nothing, such as a scrambled one, has no sides.
     mirrored = None
     if words.instruction.mentions:
         mirrored = language.mirrored_objects(words.episode, words.instruction)
@@ -195,13 +198,13 @@ def _until(step: int, events: Iterable[Event]) -> list[Event]:
 
 
 def declared_intent(record: Record) -> DeclaredIntent | None:
-    """Return what a policy declared that it would do; None if it declared nothing.
+    """Return what a policy declared that it would do in an episode; None if it declared nothing.
 
-    A listener says in its metadata which goal it has understood (``understood``), or None for no
-    goal; other policies name subgoals. As metadata may hold anything, a mapping counts as a goal
-    only if it has one of the goal's slots.
+    A policy with a language reader reports the goal that it has understood in its metadata, as
+    ``{"understood": {"color": "red"}}``, or None for no goal. Other policies name subgoals. As
+    metadata may hold anything, a mapping counts as a goal only if it has one of the goal's slots.
     """
-    # The default is a text, which is no goal: None means that no goal was understood.
+    # The default cannot be None, which means that no goal was understood.
     understood = record.policy_metadata.get("understood", "")
     is_goal = isinstance(understood, Mapping) and understood.keys() & record.goal
     if understood is None or is_goal:
@@ -219,7 +222,10 @@ def utc_now() -> str:
 
 @functools.cache
 def code_fingerprints() -> CodeFingerprints:
-    """Return the fingerprints of the code that this process runs."""
+    """Return hashes of the package's files that this process runs: of all, and of some.
+
+    The second hash is of the files that can change a verdict.
+    """
     package = hashlib.sha256()
     verdict = hashlib.sha256()
     root = Path(__file__).parents[2]

@@ -15,11 +15,12 @@ from roboirg.records.record import EventRecord, GoalOutcomes, OriginalStatus
 
 
 def judged_events(events: Iterable[EventRecord], start: int) -> list[Event]:
-    """Return recorded events as the judge takes them.
+    """Return the events of a record, facts that became true or false, as the judge takes them.
 
     Args:
-        events: of a record, whose steps count from the begin of the policy's turn.
-        start: step of the episode at which that began; the judge's steps count from the episode's.
+        events: their control steps count from the begin of the policy's turn.
+        start: control step at which that turn began; steps for the judge count from the begin of
+            the episode, which may show a video first.
     """
     judged = []
     for event in events:
@@ -29,7 +30,12 @@ def judged_events(events: Iterable[EventRecord], start: int) -> list[Event]:
 
 
 def recorded_events(events: Iterable[Mapping[str, Any]], start: int) -> tuple[EventRecord, ...]:
-    """Return the events of an environment for records, the reverse of `judged_events`."""
+    """Return the events that an environment reports, facts that changed, for a record.
+
+    Args:
+        events: with ``step``, ``kind``, ``subject``, ``place`` and ``holds``.
+        start: control step at which the policy's turn began; recorded steps count from there.
+    """
     recorded = []
     for event in events:
         place = event.get("place")
@@ -51,17 +57,17 @@ def find_goal_outcomes(
     decision: Decision,
     original: str | None = None,
 ) -> GoalOutcomes:
-    """Return which goals of the scene were reached, and which would fit the act that was wrong.
+    """Return which goals of the scene a trajectory reached, and which a wrong act agrees with.
 
-    If an act decided the failure, another goal may have been meant: one that the act reached, or
-    that was still possible after it.
+    If an act made the episode fail, the policy may have followed another goal: one that the act
+    reached, or that was still possible after it. The act agrees with those.
 
     Args:
         words: of the trial, with the scene's goals.
         events: all facts that changed, in order; steps count since the world began.
         elapsed_steps: steps of the world in all.
-        decision: the verdict, which may have fallen before the end.
-        original: how it ended for the scene's own goal, if the episode has another one.
+        decision: the verdict on the stated goal, which may have fallen before the end.
+        original: status of the scene's own goal at the end, if the words state another one.
     """
     reached = []
     agrees = []
@@ -89,9 +95,15 @@ def find_goal_outcomes(
 def name_other_goal(
     found: FailureAttribution, original: Episode, goals: GoalOutcomes
 ) -> FailureAttribution:
-    """Return ``other_goal`` for a failure of a policy that followed the scene's own goal instead.
+    """Return the failure ``other_goal`` if a policy followed the scene's own goal instead.
 
-    That is, it reached that goal, or its first wrong act agrees with it.
+    In such an episode the words state another goal than the scene's own. The policy followed the
+    latter if it reached it, or if its first wrong act agrees with it.
+
+    Args:
+        found: why the policy failed, which is returned if it did not follow the other goal.
+        original: the episode with the scene's own goal.
+        goals: which goals were reached.
     """
     if goals.original != "success" and goal_name(original.goal) not in goals.agrees:
         return found

@@ -97,7 +97,7 @@ class GuardedLoop(EpisodeLoop):
         return self._last_info
 
     def conclude(self) -> None:
-        """Record how the episode ended and why, if it came to its end."""
+        """Record the verdict of the episode and its reasons, if it came to its end."""
         info = self._last_info
         if info is None:
             return
@@ -116,8 +116,10 @@ class GuardedLoop(EpisodeLoop):
     def begin(self) -> Moment:
         """Start the episode and the policy, and record what is known now.
 
-        Each part is guarded: what fails in the first is the environment's fault, in the second the
-        policy's.
+        An error in the first block counts as the environment's, in the second as the policy's.
+
+        Returns:
+            The first observation and its info.
         """
         env = self.env
         record = self._record
@@ -137,13 +139,20 @@ class GuardedLoop(EpisodeLoop):
             self._note_version()
             self._read_metadata()
             record.inference = inference_facts(self.policy)
+        # Choices are carried out by motions that are planned from the simulator's state.
         if self._space is CHOICE:
             record.ref = dataclasses.replace(record.ref, is_privileged=True)
         self.has_begun = True
         return observation, info
 
     def _reset_env(self, first_words: str) -> Moment:
-        """Start the episode, whose first words stand below the video."""
+        """Start the environment; return the first observation and its info.
+
+        If there is a video, it gets the frames of the demonstration from now on.
+
+        Args:
+            first_words: what is said first, shown below the video.
+        """
         writer = self._writer
         if writer is None:
             return self.env.reset()
@@ -178,7 +187,7 @@ class GuardedLoop(EpisodeLoop):
         self._record.instruction = utterances_at(self._prepared, steps)
 
     def _note_version(self) -> None:
-        """Record the version that a policy of the user's has now that its `reset` has ended.
+        """Record the version of a policy of the user's, which may be set until `reset` ends.
 
         Raises:
             InvalidValueError: it is no version, or not the one with which the run began.
@@ -209,7 +218,8 @@ class GuardedLoop(EpisodeLoop):
     def _note_ends(self) -> None:
         """Record how subgoals ended since the last call, as the hands report it.
 
-        A refused subgoal may have been replaced before this could note it, so it is noted here.
+        The hands are the part of a policy that carries out subgoals of a planner. A subgoal that
+        they refuse may be replaced at once, before `act` sees it, so it is recorded here.
         """
         if not self._has_our_hands:
             return
@@ -227,10 +237,12 @@ class GuardedLoop(EpisodeLoop):
         self._noted_ends = len(ends)
 
     def _note_subgoal(self, subgoal: str) -> None:
-        """Record a subgoal with the stage that is due and a verdict, unless it is recorded already.
+        """Record a subgoal of a planner, and whether it is what is due now.
+
+        Nothing is recorded if the subgoal is the last one that was, and still goes on.
 
         Args:
-            subgoal: in words, perhaps with a point.
+            subgoal: in words, perhaps with a point in the front picture.
         """
         stage = self.env.due_stage
         due = None if stage is None else plain_subgoal(stage)
@@ -248,9 +260,10 @@ class GuardedLoop(EpisodeLoop):
         self._record.subgoals += (noted,)
 
     def _is_noted(self, subgoal: str, due: str | None) -> bool:
-        """Return whether a subgoal is recorded already: it is the last one, and goes on.
+        """Return whether a subgoal is the last one that was recorded, and still goes on.
 
-        It does not go on if another stage is due, or if it has failed and is tried again.
+        It does not go on if another stage is due, or if it has failed and is tried again. Where the
+        hands report how subgoals end, it goes on in any case until they do.
 
         Args:
             subgoal: in words.
@@ -266,7 +279,14 @@ class GuardedLoop(EpisodeLoop):
         return last.due == due and last.ended not in ("missed", "blocked", "time-out")
 
     def execute(self, actions: ArrayLike) -> Moment:
-        """Execute actions, and keep those that were executed."""
+        """Execute actions until the episode ends, and keep those that were executed.
+
+        Args:
+            actions: (n, size).
+
+        Returns:
+            The observation after them and its info.
+        """
         rows = np.asarray(actions)
         with self._guard.environment("env_step"):
             executed_before = self.env.executed_actions
@@ -290,9 +310,10 @@ class GuardedLoop(EpisodeLoop):
             self._read_metadata()
 
     def keep_actions(self) -> None:
-        """Keep the executed actions with the end state of the world; record its hash and attempts.
+        """Make the log of the executed actions, and record the hash of the world's end state.
 
-        The log has all actions in one array, and for each answer of the policy its first row.
+        The log has all actions in one array, (n, size), and the index at which each answer of the
+        policy begins. Attempts, which the environment knows only at the end, are recorded, too.
         """
         numbers, state_hash = self.env.end_state()
         self._record.end_state = state_hash

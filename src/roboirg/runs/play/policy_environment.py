@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 
 def job_needs(policy: Policy, job: Job) -> PolicyNeeds:
-    """Return what the policy needs, with the values that the job prescribes in place of its own.
+    """Return what the policy needs of the environment, such as pictures or an action space.
+
+    Values that the job prescribes replace the policy's own, but not its action space.
 
     Raises:
         InvalidValueError: an attribute of the policy has an invalid value, or the job prescribes

@@ -131,9 +131,14 @@ class EpisodeRunner:
         return record
 
     def _play(self, job: Job, writer: VideoWriter | None) -> PlayedJob:
-        """Play a job; again from its beginning if the policy's process is lost, but not too often.
+        """Play a job, and again from its beginning if the policy's process is lost meanwhile.
 
-        Once it was lost in a call about several episodes, this one is played alone.
+        After `MAX_LOSSES` losses it ends with an error. If the process was lost in a call about a
+        batch of episodes, this one is not put into a batch again.
+
+        Args:
+            job: what to play.
+            writer: gets the frames of a video; None for no video.
         """
         is_alone = False
         attempt = 1
@@ -170,7 +175,7 @@ class EpisodeRunner:
             InvalidValueError: the job's wording file is missing or has changed.
         """
         prepared = PreparedJob(job)
-        # A policy of the user's plays in a process of its own (is hosted), ours in this one.
+        # A policy of the user's plays in a process of its own (is hosted), one of roboirg in this.
         hosts = self.hosts if job.ref is not None and job.ref.is_hosted else None
         record = begin_record(prepared)
         guard = CallGuard(record.timings, self.policy_timeout_s, is_hosted=hosts is not None)
@@ -223,7 +228,9 @@ def play_with(
     guard: CallGuard,
     writer: VideoWriter | None = None,
 ) -> GuardedLoop:
-    """Play one job with a loaded policy, which is not closed; its errors end up in the record.
+    """Play one job with a loaded policy, and fill in the record; errors end up in it, too.
+
+    The policy is not closed, and the end of the episode is not recorded yet.
 
     Args:
         policy: answers the observations.
@@ -266,8 +273,8 @@ def load_hosted_policy(
 ) -> HostedPolicy | HierarchicalPolicy:
     """Return a policy of the user's, whose code runs in a process of its own.
 
-    Of a user's planner with scripted hands only the planner does: the hands need the world, which
-    is in this process.
+    If a user's planner names subgoals for our scripted hands, only the planner is in that process:
+    the hands need the simulator, which is in this one.
 
     Args:
         hosts: the line on which to ask for the process.
@@ -299,7 +306,12 @@ def _seed_of(prepared: PreparedJob) -> int:
 
 
 def _close_policy(policy: Policy, record: Record, guard: CallGuard) -> None:
-    """Read the policy's costs and close it; errors there do not change the outcome.
+    """Record the policy's costs and close it; an error there does not change the outcome.
+
+    Args:
+        policy: that has played.
+        record: gets the costs, and details of an error.
+        guard: attributes errors to the policy.
 
     Raises:
         EpisodeLostError: the policy's process was lost before it reported the costs.

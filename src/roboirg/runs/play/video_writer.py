@@ -69,13 +69,16 @@ def compose_frame(
     is_demonstration: bool = False,
     longest_caption: str = "",
 ) -> Pixels:
-    """Return one frame with the pictures side by side and a line between them.
+    """Return a frame of a video: pictures side by side, and a caption below them.
 
     Args:
         pictures: uint8 (height, width, 3), all of one height.
         caption: text below the pictures, wrapped into lines.
         is_demonstration: draw the border that marks the demonstration.
         longest_caption: text for which there is room, as all frames of a video have one size.
+
+    Returns:
+        uint8 (height, width, 3), with the height of the pictures if there is no caption.
     """
     height = pictures[0].shape[0]
     black_line = np.zeros((height, GAP, 3), np.uint8)
@@ -94,9 +97,10 @@ def compose_frame(
 
 
 def with_ring(picture: Pixels, point: Point) -> Pixels:
-    """Return a copy of a picture with a ring around a point, in which the picture stays visible.
+    """Return a copy of a picture, uint8 (height, width, 3), with a ring around a point.
 
-    A pixel is of the ring if its distance from the point is the radius, give or take half a width.
+    `point` is (row, column), pixels. Pixels are colored whose distance from it differs from the
+    radius by half the ring's width at most.
     """
     row, column = point
     rows, columns = np.indices(picture.shape[:2])
@@ -198,7 +202,10 @@ class VideoWriter:
             self._abandon(error)
 
     def finish(self) -> bool:
-        """Complete the video. Returns False if it has no frame or could not be written."""
+        """Complete the video and write its poster; return whether that was possible.
+
+        It is not if there is no frame, or the file could not be written.
+        """
         if self._last_frame is None or self._video is None:
             return False
         poster = Path(poster_name(str(self.path)))
@@ -206,7 +213,7 @@ class VideoWriter:
             for _ in range(LAST_FRAME_REPEATS):
                 self._encode(self._last_frame)
             poster.write_bytes(encode_jpeg(self._last_frame))
-            remaining = self._video.stream.encode(None)
+            remaining = self._video.stream.encode(None)  # packets that the encoder still holds
             self._video.container.mux(remaining)
             self._video.container.close()
             self.partial.replace(self.path)
@@ -248,7 +255,7 @@ class VideoWriter:
         self._video.container.mux(packets)
 
     def _open(self, frame: Pixels) -> _OpenVideo:
-        """Begin the file of a video whose frames have the size of this one."""
+        """Begin the file of a video; its frames, uint8 (height, width, 3), have this one's size."""
         import av
 
         self.path.parent.mkdir(parents=True, exist_ok=True)

@@ -105,9 +105,10 @@ class Watchdog:
         self._shared.deadline = 0.0 if limit_s is None else time.monotonic() + limit_s
 
     def write_wait(self, wait: Wait | None) -> None:
-        """Write what is waited for from now on; None for nothing.
+        """Write to the shared memory what this process waits for from now on; None for nothing.
 
-        Time in a queue does not count for the limit of the phase: when it ends, the deadline moves.
+        Time in a queue does not count for the time limit of the phase: when the wait ends, the
+        deadline is moved by it.
         """
         now = time.monotonic()
         if self._shared.queued_since:
@@ -149,9 +150,10 @@ class Watchdog:
 
     @property
     def overdue(self) -> Overdue | None:
-        """What has exceeded its limit; None if nothing has.
+        """The phase or native code that has exceeded its time limit; None if none has.
 
-        While native code of the environment runs, only its own limit counts.
+        While native code runs (drawing or physics), only its own limit counts. In a queue, none
+        does.
         """
         shared = self._shared
         now = time.monotonic()
@@ -161,17 +163,18 @@ class Watchdog:
                 return Overdue(code, NATIVE_LIMIT_S) if since < now - NATIVE_LIMIT_S else None
         if shared.queued_since:
             return None
-        # The order matters, as another process writes: it moves the deadline before it ends the
-        # queue, so a deadline that is read after the queue has moved.
+        # The order matters, as the watched process writes meanwhile: at the end of a queue it moves
+        # the deadline first. So if no queue was read above, the deadline read here has been moved.
         if not 0.0 < shared.deadline < now:
             return None
         return Overdue(PHASES[int(shared.phase)], float(shared.limit_s))
 
 
 def _new_memory() -> IO[bytes]:
-    """Return a file without a name that processes can share, filled with zeros.
+    """Return an open file without a name, filled with zeros, which processes can map as memory.
 
-    It is not multiprocessing's memory, which is in /dev/shm: containers lack that, or it is full.
+    It is not multiprocessing's shared memory, which is in /dev/shm: containers may lack that, or it
+    is full.
     """
     if hasattr(os, "memfd_create"):  # not in every build of Python
         file: IO[bytes] = os.fdopen(os.memfd_create("roboirg"), "r+b", 0)

@@ -77,10 +77,10 @@ class LocalProcesses:
     episode_timeout_s: float = NO_TIMEOUT_S
 
     def run(self, jobs: deque[Job], play: PlayJob, _warn: Warn = print, /) -> Records:
-        """Yield one record for each job as they finish.
+        """Play jobs in worker processes, and yield one record for each job as they finish.
 
-        Workers are processes. Each plays one job after the other until none is left; one that dies
-        is replaced while there are jobs.
+        Each worker plays one job after the other until none is left; one that dies is replaced
+        while there are jobs. When the generator is closed, all workers are killed.
 
         Args:
             jobs: the queue; the caller may change it meanwhile.
@@ -105,6 +105,7 @@ class LocalProcesses:
                         record = worker.poll(self.episode_timeout_s)
                         if record is None:
                             continue
+                        # A stillborn worker died before it played anything.
                         failed_starts = failed_starts + 1 if worker.is_stillborn else 0
                         if failed_starts >= MAX_FAILED_STARTS * self.workers:
                             raise RoboIRGError(f"No worker process can start ({record.cause}).")
@@ -126,10 +127,11 @@ class LocalProcesses:
 
 
 def take_job(jobs: deque[Job], others: Iterable[Worker]) -> Job:
-    """Remove the next job for a worker from the queue and return it.
+    """Remove a job from the queue for a worker, and return it.
 
-    It is the first one of a scene that no other worker plays with the same policy, so that the
-    demonstration of a scene is planned and drawn once. If there is none, it is the first of all.
+    It is the first job of the next policy whose scene no other worker plays now: workers keep the
+    demonstration of a scene, so two of them would plan and draw the same one. If there is none, it
+    is the first job of all.
 
     Args:
         jobs: the queue, not empty; the jobs of a scene are next to each other.

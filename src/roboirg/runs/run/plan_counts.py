@@ -10,7 +10,7 @@ from roboirg.runs.job_instruction import PreparedJob
 
 
 def cell_sizes(jobs: Iterable[Job]) -> Mapping[tuple[str, str], Mapping[str, Counter[str]]]:
-    """Return how many episodes there are: by policy and task, in each by setting and by form.
+    """Return the number of episodes by policy and task, and in these by setting and by form.
 
     ``{("mine", "PickXtimes"): {"direct": {"implicit": 50}}}`` are 50 in all.
     """
@@ -23,10 +23,11 @@ def cell_sizes(jobs: Iterable[Job]) -> Mapping[tuple[str, str], Mapping[str, Cou
 
 
 def least_calls(jobs: Iterable[Job]) -> Mapping[tuple[str, str], int]:
-    """Return the least calls of models by policy and setting, for policies that ask one.
+    """Return how often policies at least call a language model, by policy and setting.
 
-    A listener asks once an episode. A planner that names the right subgoals asks at least once for
-    each of them; many ask more often, before every chunk of their hands.
+    Policies that call none are left out. One that reads the whole instruction calls once an
+    episode. A planner, which names one subgoal after the other, calls at least once for each stage
+    of the goal; many call more often, before every chunk of actions.
     """
     calls: Counter[tuple[str, str]] = Counter()
     for job in jobs:

@@ -70,11 +70,11 @@ class ConsoleReporter(Reporter):
             self._console.print(f"{done} of {counted(total, 'episode')} already stored.")
 
     def advance(self, record: Record, *, is_new: bool = True) -> None:
-        """Count a record; show that on the bar, or in a line where there is no terminal.
+        """Count a stored record, and show it on the bar, or in a line where there is no terminal.
 
         Args:
             record: that was stored.
-            is_new: whether its episode had not been played before in this run.
+            is_new: whether it is the first of its episode in this run, and not of a retry.
         """
         if is_new:
             self._done += 1
@@ -109,9 +109,9 @@ class ConsoleReporter(Reporter):
         return Group(self._bar, Text(self._score(), "dim"))
 
     def _score(self) -> str:
-        """Return the successes per setting, of the valid episodes, and the errors in one line.
+        """Return the outcomes so far in one line: ``explicit 3/4 · direct 1/2 · errors 1``.
 
-        For example ``explicit 3/4 · direct 1/2 · errors 1``.
+        These are successes of the episodes of a setting that were judged, and all errors.
         """
         parts = []
         errors = 0

@@ -91,12 +91,16 @@ def import_ray() -> ModuleType:
 
 @contextlib.contextmanager
 def _connected(ray: ModuleType, address: str | None, folder: str | None) -> Iterator[None]:
-    """Join a cluster while the block runs; Ray copies a folder to all its machines.
+    """Join a Ray cluster while the block runs, unless this process has joined one before.
 
     Args:
         ray: the module.
         address: of the cluster; None to start one on this machine.
-        folder: that is copied; None for none.
+        folder: that Ray copies to all machines of the cluster; None for none.
+
+    Raises:
+        InvalidValueError: a folder is given, but this process has joined a cluster before.
+        RoboIRGError: the cluster cannot be joined.
     """
     if ray.is_initialized():
         if folder is not None:
@@ -117,7 +121,7 @@ def _connected(ray: ModuleType, address: str | None, folder: str | None) -> Iter
 
 
 def _join(ray: ModuleType, address: str | None, folder: str | None) -> None:
-    """Join a cluster; the arguments are those of `_connected`."""
+    """Join a cluster; raise in one sentence if that fails. The arguments are as of `_connected`."""
     _check_reachable(address)
     try:
         ray.init(
@@ -135,10 +139,10 @@ def _join(ray: ModuleType, address: str | None, folder: str | None) -> None:
 
 
 def _runtime_environment(needs: WorkerNeeds) -> dict[str, Any]:
-    """Return Ray's runtime environment of the actors: their environment variables.
+    """Return the environment variables of Ray's actors, in the form in which Ray takes them.
 
     These are the variables that the plan names, and the path on which Python finds the user's
-    policies.
+    policies: ``{"env_vars": {"PYTHONPATH": "/home/me/lab", …}}``.
     """
     check_variables(needs.variables, "workers")
     variables = {name: os.environ[name] for name in needs.variables}
@@ -153,7 +157,10 @@ def _runtime_environment(needs: WorkerNeeds) -> dict[str, Any]:
 
 
 def _check_reachable(address: str | None) -> None:
-    """Check that the address accepts connections; Ray would wait minutes and then exit."""
+    """Raise if a cluster's address accepts no connection; Ray would wait minutes and then exit.
+
+    Only ``host:port``, maybe after ``ray://``, is checked.
+    """
     if address is None:
         return
     host, _, port = address.removeprefix("ray://").rpartition(":")

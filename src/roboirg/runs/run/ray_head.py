@@ -37,13 +37,13 @@ class ClusterHead:
         return True
 
     def wait(self, left: int) -> None:
-        """Wait until it answers, unless it has within `POLL_S`.
+        """Return when the head of the cluster answers, or at once if it did a moment ago.
 
         Args:
-            left: episodes that were not played.
+            left: number of episodes that were not played, for the error.
 
         Raises:
-            RoboIRGError: it has not answered for too long.
+            RoboIRGError: it has not answered for `HEAD_LOST_S` seconds.
         """
         while time.monotonic() - self._answered_at > POLL_S and not self.answers():
             if time.monotonic() - self._answered_at > HEAD_LOST_S:

@@ -59,7 +59,10 @@ class MachineVersions:
     installed: Versions = _INSTALLED
 
     def difference(self, there: MachineVersions) -> str | None:
-        """Return the first difference of another machine, in words; None if there is none."""
+        """Return in what another machine differs from this one, in words; None if in nothing.
+
+        Only the first difference is named. A policy whose version is not known here may have any.
+        """
         for what, mine, theirs in self.installed.differences(there.installed):
             return f"the {what} is {theirs} there and {mine} here"
         for policy, other in zip(self.policies, there.policies, strict=True):
@@ -131,7 +134,11 @@ class MachineAgent:
         threading.Thread(target=self._open_lines, args=(self._address.key,), daemon=True).start()
 
     def check(self, versions: MachineVersions) -> CheckedMachine:
-        """Check that the machine has the same versions as the driver and can load the policies."""
+        """Return whether this machine can play: its policies load, and versions are as expected.
+
+        Args:
+            versions: those of the driver, the process that started the run.
+        """
         try:
             policies = []
             for policy in versions.policies:
@@ -152,16 +159,17 @@ class MachineAgent:
             os.kill(pid, signal.SIGKILL)
 
     def close(self) -> None:
-        """End the hosts and remove the files of the run."""
+        """End the policies' processes on this machine, and remove the files of the run."""
         if self._address is not None:
             self._door.close()
             self._pool.close()
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def _open_lines(self, key: bytes) -> None:
-        """Serve each line that begins with the key; others, as of another user, are closed.
+        """Accept connections to the policy hosts of this machine until their socket is closed.
 
-        The key has to come within `KEY_S`.
+        A client has to send the key of the run within `KEY_S` seconds; others are disconnected, as
+        they may be of another user.
         """
         while True:
             try:
@@ -226,10 +234,10 @@ class RemoteWorker:
         return 0.0 if playing is None else playing.spent_s
 
     def play(self, job: Job) -> RemoteResult:
-        """Play a job in a child process, which is kept for the next job unless it dies.
+        """Play a job in a child process; return its record and the files of the episode.
 
-        The result has the record and the files of the episode; without a record, why no job can be
-        played on this machine.
+        The child process is kept for the next job unless it dies. Without a record, the result has
+        the reason why no job can be played on this machine.
         """
         record = None
         try:
@@ -254,7 +262,7 @@ class RemoteWorker:
         return self._worker
 
     def _taken_files(self) -> dict[str, bytes]:
-        """Return the files of the episode by path, and remove them here."""
+        """Return the bytes of the episode's files by path in the run's folder, and delete them."""
         files = {}
         for path in sorted(self._folder.rglob("*")):
             if path.is_file():

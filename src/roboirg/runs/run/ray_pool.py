@@ -40,7 +40,7 @@ BEAT_S = 10.0
 """How often a process is asked whether it is alive."""
 SILENCE_S = 60.0
 """After this time without an answer a process is killed."""
-LATE_S = 30.0
+OVERTIME_S = 30.0
 """How much longer than the time limit of an episode its worker may take."""
 WAIT_S = 10.0
 """How long a run waits for CPUs before the user is warned."""
@@ -152,15 +152,15 @@ class RayPool:
         self._lost_on: dict[Job, set[str]] = {}  # the nodes where a job was lost
 
         now = time.monotonic()
-        self._looked_at = 0.0  # for machines
+        self._listed_at = 0.0  # for machines
         self._played_at = now  # something
         self._warned_at = now  # the user, that nothing is played
 
     def play_all(self, jobs: deque[Job]) -> Iterator[Record]:
-        """Yield one record for each job as they finish.
+        """Play jobs on the machines of the cluster; yield one record for each as they finish.
 
-        Each round looks for machines, starts workers, gives them jobs, and takes in what has ended.
-        While the head of the cluster does not answer, all of that waits: calls would block.
+        Each round looks for machines, starts workers, gives them jobs, and receives what has ended.
+        While the head of the cluster does not answer, all of that waits: calls of Ray would block.
         """
         policies = dict.fromkeys(job.ref for job in jobs if job.ref is not None)
         versions = MachineVersions(tuple(policies))
@@ -193,7 +193,7 @@ class RayPool:
         return sum(worker.job is not None for worker in self._workers)
 
     def _finished(self) -> list[Any]:
-        """Wait for a call to end; return those that have."""
+        """Return calls of actors that have finished; waits `POLL_S` seconds for one at most."""
         if not self._calls:
             time.sleep(POLL_S)
             return []
@@ -202,11 +202,18 @@ class RayPool:
         return finished
 
     def _look_for_machines(self, versions: MachineVersions) -> None:
-        """Start the check of machines that have joined, and note those that have left."""
+        """Update the known machines of the cluster, every `LOOK_S` seconds.
+
+        Those that have left get a fault. On those that have joined, or whose agent was lost, an
+        agent is started, which checks that the machine can play.
+
+        Args:
+            versions: of package and policies, which a machine must have.
+        """
         now = time.monotonic()
-        if now - self._looked_at < LOOK_S or not self._head.answers():
+        if now - self._listed_at < LOOK_S or not self._head.answers():
             return
-        self._looked_at = now
+        self._listed_at = now
         alive = {node["NodeID"]: node for node in self._ray.nodes() if node["Alive"]}
         for machine in self._machines.values():
             if machine.node not in alive and machine.fault is None:
@@ -215,14 +222,21 @@ class RayPool:
         for number, node in alive.items():
             slots = self._needs.slots(node)
             if number not in self._machines and slots:
-                self._machines[number] = _Machine(node=number, name=_shown(node), slots=slots)
+                self._machines[number] = _Machine(
+                    node=number, name=_display_name(node), slots=slots
+                )
         for machine in self._machines.values():
             if machine.actor is None and machine.fault is None:
                 self._start_agent(machine, versions)
 
     def _start_agent(self, machine: _Machine, versions: MachineVersions) -> None:
-        """Start the agent of a machine, an actor that takes no CPU; its first work is the check."""
-        make = self._remote(num_cpus=0, scheduling_strategy=_there(machine))(MachineAgent)
+        """Start the agent of a machine, an actor that takes no CPU, and let it check the machine.
+
+        Args:
+            machine: where the agent runs.
+            versions: of package and policies, which the machine must have.
+        """
+        make = self._remote(num_cpus=0, scheduling_strategy=_only_on(machine))(MachineAgent)
         # In /tmp, because the path of a socket may have 100 characters only.
         name = f"roboirg-{self._run}-{machine.node[:8]}"
         folder = Path("/tmp") / name  # noqa: S108 - made with mode 700
@@ -232,10 +246,10 @@ class RayPool:
         self._calls[machine.actor.check.remote(versions)] = machine
 
     def _start_workers(self, waiting: int) -> None:
-        """Start as many workers as jobs need, on the machines that have the fewest.
+        """Start as many workers as jobs need, each on the machine with the fewest.
 
         Args:
-            waiting: jobs that nobody plays yet.
+            waiting: number of jobs that no worker plays yet.
         """
         now = time.monotonic()
         wanted = waiting + self._busy()
@@ -250,7 +264,7 @@ class RayPool:
             machine = self._emptiest_machine()
             if machine is None:
                 return
-            make = self._remote(**self._needs.options(), scheduling_strategy=_there(machine))
+            make = self._remote(**self._needs.options(), scheduling_strategy=_only_on(machine))
             actor = make(RemoteWorker).remote(
                 self._play, self._episode_timeout_s, known_salt(), machine.checked
             )
@@ -288,11 +302,14 @@ class RayPool:
                 break
 
     def _receive(self, call: object, jobs: deque[Job]) -> Iterator[Record]:
-        """Take the reply of a finished call; yield the records that come of it.
+        """Handle the reply of a finished call; yield the records that come of it.
+
+        The reply is a sign of life, a machine's check, the number of a worker's process, or the
+        result of a job. If the call failed, its actor was lost.
 
         Args:
-            call: that has finished.
-            jobs: that wait; gets those back that cannot be played there.
+            call: Ray's reference of the call.
+            jobs: the queue; gets those back that cannot be played there.
         """
         called = self._calls.pop(call, None)  # it may have been given up meanwhile
         if called is None:
@@ -305,7 +322,7 @@ class RayPool:
         if call == called.question:  # the reply is the seconds that its job has taken
             called.heard_at = time.monotonic()
             called.question = None
-            if reply > self._episode_timeout_s + LATE_S:
+            if reply > self._episode_timeout_s + OVERTIME_S:
                 reason = f"it did not end an episode that took {reply:.0f} s"
                 yield from self._lose(called, reason)
         elif isinstance(called, _Machine):
@@ -324,10 +341,15 @@ class RayPool:
             self._end(called)
 
     def _finish(self, worker: _Worker, reply: RemoteResult, jobs: deque[Job]) -> Iterator[Record]:
-        """Take the result of a job that a worker has played: store the files, yield the record.
+        """Handle the result of a job that a worker has played: store its files, yield its record.
 
-        Without a record the machine cannot play: it is left out, and the job goes back. A record
-        with an error that may be the machine's counts as a loss there.
+        Without a record the machine cannot play: it gets no more jobs, and the job returns to the
+        queue. An error that may be the machine's fault counts as a loss there.
+
+        Args:
+            worker: that has played.
+            reply: the result.
+            jobs: the queue.
         """
         self._calls.pop(worker.question, None)  # it was about this job
         worker.question = None
@@ -353,7 +375,10 @@ class RayPool:
             self._lost_on.setdefault(job, set()).add(machine.node)
 
     def _lose(self, lost: _Worker | _Machine, reason: str) -> Iterator[Record]:
-        """Give up a worker, or a machine's agent with all workers there; yield their errors.
+        """Give up a lost worker, or all workers of a machine whose agent was lost.
+
+        Yields:
+            A record of an error for each job that they played.
 
         Args:
             lost: the worker, or the machine whose agent was lost.
@@ -376,7 +401,7 @@ class RayPool:
                 yield lost_record(worker.job, "infrastructure", where)
 
     def _end(self, worker: _Worker) -> None:
-        """Kill a worker, even one that is frozen."""
+        """Kill a worker and forget it; one that is frozen is killed by its machine's agent."""
         if worker not in self._workers:
             return
         self._workers.remove(worker)
@@ -399,7 +424,7 @@ class RayPool:
             self._ray.kill(actor)
 
     def _count_loss(self, machine: _Machine, reason: str) -> None:
-        """Count a loss in a row; leave the machine out if there are too many."""
+        """Count that something was lost on a machine; leave it out after too many in a row."""
         machine.losses += 1
         most = MAX_LOSSES
         if machine.checked is not None:  # it may have workers, of which each may be lost as often
@@ -408,7 +433,7 @@ class RayPool:
             self._leave_out(machine, f"lost {machine.losses} times in a row, at last {reason}")
 
     def _leave_out(self, machine: _Machine, fault: str) -> None:
-        """Give a machine no more jobs, because of a fault; its idle workers end.
+        """Give a machine no more jobs, because of a fault, and warn the user; idle workers end.
 
         Raises:
             RoboIRGError: it was the last machine.
@@ -424,16 +449,19 @@ class RayPool:
         self._check_any_left()
 
     def _check_any_left(self) -> None:
-        """Stop if machines are left out and no other is there."""
+        """Raise if all machines that are known are left out."""
         faults = {machine.name: machine.fault for machine in self._machines.values()}
         if faults and None not in faults.values():
             shown = "; ".join(f"{name}: {fault}" for name, fault in faults.items())
             raise RoboIRGError(f"No machine of the Ray cluster can play ({shown}).")
 
     def _end_silent(self) -> Iterator[Record]:
-        """Ask agents and busy workers whether they are alive; give up those that do not answer.
+        """Ask agents and busy workers for a sign of life; give up those that do not answer.
 
-        A process is asked `BEAT_S` after it was last heard, and given up after `SILENCE_S`.
+        A process is asked `BEAT_S` seconds after its last answer, and given up after `SILENCE_S`.
+
+        Yields:
+            A record of an error for each job that was lost.
         """
         now = time.monotonic()
         machines = [machine for machine in self._machines.values() if machine.fault is None]
@@ -454,10 +482,13 @@ class RayPool:
                     yield from self._lose(process, reason)
 
     def _check_waiting(self, left: int) -> None:
-        """Warn the user while nothing is played, and stop if that takes too long.
+        """Warn the user once nothing has been played for `WAIT_S` seconds, and later raise.
 
         Args:
-            left: episodes that were not played.
+            left: number of episodes that were not played.
+
+        Raises:
+            RoboIRGError: nothing has been played for `NO_CPU_TIMEOUT_S` seconds.
         """
         now = time.monotonic()
         if self._busy():
@@ -482,14 +513,14 @@ class RayPool:
         self._warn(f"Waiting for a free CPU: the Ray cluster has room for {where}.")
 
 
-def _there(machine: _Machine) -> Any:  # noqa: ANN401 - of Ray
+def _only_on(machine: _Machine) -> Any:  # noqa: ANN401 - of Ray
     """Return the strategy of Ray that starts an actor on a machine."""
     from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
     return NodeAffinitySchedulingStrategy(machine.node, soft=False)
 
 
-def _shown(node: Mapping[str, Any]) -> str:
+def _display_name(node: Mapping[str, Any]) -> str:
     """Return the name of a machine, with a part of its number as several may be on one host."""
     return f"{node.get('NodeManagerHostname', 'machine')} ({node['NodeID'][:8]})"
 

@@ -75,9 +75,9 @@ def run_plan(
 ) -> RunSummary:
     """Play the jobs of a plan that the folder lacks; store each record as soon as it arrives.
 
-    An episode that ends in an error of a kind in the plan's `retry_on` is retried after all others,
-    or at once if its machine or process was lost, and played `tries` times at most; the newest
-    record counts.
+    An episode that ends in an error is played again if the plan's `retry_on` has the kind of error,
+    after all others, or next if its machine or process was lost. It is played `tries` times at most
+    in a run; the newest record counts.
 
     Args:
         plan: what to play.
@@ -111,7 +111,7 @@ def run_plan(
 
 
 def _jobs_to_play(jobs: Iterable[Job], store: RecordStore, *, retry_errors: bool) -> list[Job]:
-    """Return the jobs without a record, and those whose record is an error if it is retried."""
+    """Return the jobs without a record, and with `retry_errors` those whose record is an error."""
     todo = []
     for job in jobs:
         stored = store.stored.get(identity_key(job))
@@ -122,7 +122,11 @@ def _jobs_to_play(jobs: Iterable[Job], store: RecordStore, *, retry_errors: bool
 
 
 def episode_runner(plan: Plan, folder: Path) -> EpisodeRunner:
-    """Return what plays a plan's jobs into a folder."""
+    """Return an object that plays jobs with the options of a plan and writes files to a folder.
+
+    Raises:
+        MissingDependencyError: the plan asks for videos, and PyAV is not installed.
+    """
     if plan.video != "off":
         check_video_support()
     return EpisodeRunner(
@@ -182,14 +186,22 @@ class _RunLoop:
         self.unreachable: list[str] = []
 
     def play(self, todo: Sequence[Job], play: PlayJob, executor: Executor) -> None:
-        """Play jobs, and retry those that ended in an error of a retryable kind."""
+        """Play jobs, store each record, and play jobs again that ended in an error to be retried.
+
+        The jobs of a policy that cannot be reached are skipped.
+
+        Args:
+            todo: the jobs.
+            play: plays one job.
+            executor: where jobs are played.
+        """
         queue = deque(todo)
         jobs = {identity_key(job): job for job in todo}
         with contextlib.closing(executor.run(queue, play, self._reporter.warn)) as records:
             for record in records:
                 job = jobs[identity_key(record)]
                 self._store_record(job, record)
-                # The executor takes its next job from the queue, so that is changed in place.
+                # The executor takes its next job from this queue, so it must be changed in place.
                 if self._is_unreachable(record):  # its remaining jobs are skipped
                     remaining = [queued for queued in queue if queued.policy != record.policy]
                     queue.clear()
@@ -202,7 +214,10 @@ class _RunLoop:
                     queue.append(job)
 
     def summary(self, jobs: Sequence[Job]) -> RunSummary:
-        """Return what has become of all jobs of the plan, and how the run went."""
+        """Return counts of played and missing jobs, and all errors, at the end of the run.
+
+        `jobs` are all jobs of the plan, also those that were stored before.
+        """
         records = [self._store.stored.get(identity_key(job)) for job in jobs]
         found = [record for record in records if record is not None]
         return RunSummary(
@@ -215,7 +230,11 @@ class _RunLoop:
         )
 
     def _store_record(self, job: Job, record: Record) -> None:
-        """Store a record, and count and report it; raises if it is of other versions than ours."""
+        """Store a record, count it, and report it to the user.
+
+        Raises:
+            StoreError: a worker with other versions of the package or its words has made it.
+        """
         check_same(
             f"A worker returned {record.slug}",
             other_versions(record),
@@ -243,9 +262,9 @@ class _RunLoop:
         )
 
     def _is_unreachable(self, record: Record) -> bool:
-        """Count a policy's connection errors in a row; return whether this one is the last.
+        """Return whether a policy is to be given up now, because its server cannot be reached.
 
-        It is if there are `UNREACHABLE_AFTER` now: then the policy is given up, with a warning.
+        That is so, with a warning, at the `UNREACHABLE_AFTER`-th connection error in a row.
         """
         policy = record.policy
         if record.error != "connection":
@@ -272,7 +291,7 @@ def _report_torn_line(store: RecordStore, reporter: Reporter) -> None:
 
 
 def _warn_of_untrained(plan: Plan, reporter: Reporter) -> None:
-    """Name the tasks that a policy plays without having been trained on them, if that is known."""
+    """Warn of tasks of the plan on which a policy was not trained, if it declares its tasks."""
     for policy in plan.policies:
         if policy.needs is None or policy.needs.trained_tasks is None:
             continue
@@ -305,17 +324,26 @@ def _check_versions(plan: Plan, records: Collection[Summary], folder: Path) -> N
 
 
 def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> None:
-    """Refuse records of another policy of the same name, or of another version of it."""
+    """Raise if a folder has records of a planned policy in another version, or of its name only.
+
+    Args:
+        plan: with the policies that are to play.
+        records: in the folder.
+        folder: of the run, for the error.
+
+    Raises:
+        StoreError: it has.
+    """
     planned = {ref.name: ref for ref in plan.policies}
     played = {(record.policy, record.policy_versions, record.outcome) for record in records}
     for name, versions, outcome in played:
         policy = planned.get(name)
         if policy is None:
             continue
-        # Two versions that could not be read may differ, so a verdict counts even with such a
-        # version; an error with one does no harm.
-        is_known = outcome != "error" or versions.policy_version != policy.version
-        if policy.problem is not None and is_known:
+        # If the policy cannot be opened now, its version is unknown, and equal to another unknown
+        # one: a verdict with that may still be of another version. An error with it does no harm.
+        may_differ = outcome != "error" or versions.policy_version != policy.version
+        if policy.problem is not None and may_differ:
             raise StoreError(
                 f"{folder} holds episodes of {name} version {versions.policy_version}, but the "
                 f"policy cannot be opened to read its version now ({policy.problem}); choose "
@@ -327,7 +355,7 @@ def _check_policies(plan: Plan, records: Iterable[Summary], folder: Path) -> Non
 
 @contextlib.contextmanager
 def _sigterm_interrupts() -> Iterator[None]:
-    """Treat SIGTERM like Ctrl-C: end the workers and keep the records."""
+    """Treat SIGTERM like Ctrl-C while the block runs: raise `Terminated` in the main thread."""
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread can handle signals
         return

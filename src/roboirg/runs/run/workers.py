@@ -76,13 +76,14 @@ class Worker:
         return time.monotonic() - self.started - self.watchdog.queued_s
 
     def poll(self, episode_timeout_s: float, wait_s: float = 0.0) -> Record | None:
-        """Return the record of the job, or None if it goes on; with it the worker may have died.
+        """Return the record of the current job, or None while it goes on.
 
-        A process whose job exceeds a time limit is killed, and the record is an error.
+        If the process has died, or is killed now because its job exceeds a time limit, the record
+        is an error.
 
         Args:
             episode_timeout_s: how long the job may take.
-            wait_s: how long to wait for its end.
+            wait_s: how long to wait for its end, seconds.
 
         Raises:
             RoboIRGError: an error that would end every other job too (no Vulkan device, …).
@@ -142,7 +143,12 @@ class Worker:
 
 @contextlib.contextmanager
 def connected(play: PlayJob, connect: Connect | None) -> Iterator[PlayJob]:
-    """Yield what plays jobs, with a line of its own to the policy hosts, closed here at the end."""
+    """Yield the function that plays jobs, with a line to the policy hosts if it needs one.
+
+    Args:
+        play: plays one job.
+        connect: returns a new line, which is closed at the end of the block; None for none.
+    """
     if connect is None:
         yield play
         return
@@ -160,7 +166,10 @@ def _work(connection: Connection, watchdog: Watchdog, play: PlayJob, limit_threa
 
 
 def _play(play: PlayJob, job: Job) -> Record | RoboIRGError:
-    """Play a job; what it prints is kept next to the records, if it has a folder."""
+    """Return the record of a job, or the error that would end every other job too.
+
+    What is printed meanwhile goes into the episode's log, if `play` has a folder.
+    """
     log: contextlib.AbstractContextManager[None] = contextlib.nullcontext()
     if isinstance(play, EpisodeRunner):
         log = logged_output(log_path(play.folder, job.slug))
@@ -168,6 +177,7 @@ def _play(play: PlayJob, job: Job) -> Record | RoboIRGError:
         with watched("environment"), log:
             return play(job)
     except RoboIRGError as error:
-        # The class of an error that ends the run is kept; any other may be one that cannot be sent.
+        # The error is sent to the supervisor. Classes that end the run can be pickled and are kept;
+        # any other becomes the base class.
         kind = type(error) if isinstance(error, EndOfRunError) else RoboIRGError
         return kind(str(error))

@@ -59,7 +59,14 @@ def has_explicit_words(words: TaskScenarios, task: str) -> bool:
 
 
 def check_explicit(words: TaskScenarios, scenes: Sequence[Episode]) -> ExplicitReport:
-    """Check what is said of each goal that scenes allow, in the words of each pool."""
+    """Check that a file's explicit words state each goal of some scenes, and nothing else.
+
+    Each goal is said once in the words of each pool (train and test).
+
+    Args:
+        words: what the file says for a task: whole sentences by goal, or else commands.
+        scenes: episodes of the task.
+    """
     report = ExplicitReport(unused=_unused_goals(words, scenes))
     for episode in _goals_once(scenes):
         if words.literals and unordered(episode.goal) not in words.literals:
@@ -75,7 +82,7 @@ def check_explicit(words: TaskScenarios, scenes: Sequence[Episode]) -> ExplicitR
 
 
 def _unused_goals(words: TaskScenarios, scenes: Sequence[Episode]) -> list[str]:
-    """Return the goals of whole sentences, in words, that no scene can have."""
+    """Return the goals for which a file has sentences, in words, that no scene can have."""
     possible: set[Goal] = set()
     for scene in scenes:
         possible.update(map(unordered, goals_of(scene)))
@@ -83,7 +90,10 @@ def _unused_goals(words: TaskScenarios, scenes: Sequence[Episode]) -> list[str]:
 
 
 def _check_goal(report: ExplicitReport, words: TaskScenarios, episode: Episode) -> None:
-    """Check that what is said of an episode's goal means this goal, and add it to the report."""
+    """Add to the report what is said of an episode's goal, and what is wrong with it.
+
+    The words must mean this goal, or others that are equally right in the episode.
+    """
     try:
         instruction = _instruction_of(words, episode)
     except InvalidValueError as error:  # a command lacks a field
@@ -105,16 +115,16 @@ def _instruction_of(words: TaskScenarios, episode: Episode) -> Instruction:
 
 
 def _goals_once(scenes: Iterable[Episode]) -> Iterable[Episode]:
-    """Return an episode for each goal and pool of the scenes.
+    """Return one episode for each goal that the scenes allow and each pool of words.
 
-    A goal counts only where it has as many fields as the episode's own, as goals of its difficulty
-    have.
+    Goals count only in scenes whose own goal has as many values, as the difficulty decides how many
+    a goal has.
     """
     found: dict[tuple[Goal, PoolName], Episode] = {}
     for scene in scenes:
         pool = pool_of(scene.split)
-        number = len(goal_fields(scene.goal))
+        field_count = len(goal_fields(scene.goal))
         for goal in goals_of(scene):
-            if len(goal_fields(goal)) == number and (goal, pool) not in found:
+            if len(goal_fields(goal)) == field_count and (goal, pool) not in found:
                 found[goal, pool] = with_goal(scene, goal)
     return found.values()

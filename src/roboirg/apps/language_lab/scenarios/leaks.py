@@ -26,23 +26,27 @@ _POINTERS = ("first", "second", "third", "one", "each", "other")
 
 
 def find_leaks(instruction: Instruction, goal: Goal) -> frozenset[str]:
-    """Return the words and landmarks of an implicit command that give a hidden value away.
+    """Return the words of a command that name a goal value which only its context may give.
 
-    With the color red hidden, *Lift the red cube* leaks ``red``.
+    Where the color is to be found in the context, *Lift the red cube* leaks ``red``. A landmark of
+    the goal, such as *next to the bin*, leaks its place.
     """
     text = _THINGS.sub("", _without_pointers(instruction).lower())
     words = set(re.findall(r"[a-z0-9]+", text))
     leaked: set[str] = set()
     for slot in hidden_slots(instruction, goal):
         leaked |= words & _spellings(goal[slot])
-    for place in cast("list[str]", instruction.metadata["landmarks"]):
-        if place in instruction.command:
-            leaked.add(place)
+    for landmark in cast("list[str]", instruction.metadata["landmarks"]):
+        if landmark in instruction.command:
+            leaked.add(landmark)
     return frozenset(leaked)
 
 
 def _spellings(value: SlotValue) -> frozenset[str]:
-    """Return all words that give a value away: of ``2`` *two*, *twice*, *both* and so on."""
+    """Return all words that could give a goal value away: of ``2`` *two*, *twice*, *both*, ….
+
+    For a color these are all colors, and for a moment such as ``before`` all words for time.
+    """
     if isinstance(value, tuple):
         found: set[str] = set()
         for part in value:
@@ -56,13 +60,14 @@ def _spellings(value: SlotValue) -> frozenset[str]:
 
 
 def _without_pointers(instruction: Instruction) -> str:
-    """Return the command without *the first of them*, *the one I mentioned* and *once for each*.
+    """Return the command without words that point back with a number, such as *the first of them*.
 
-    Their numbers say nothing about the goal's.
+    Their numbers are no values of the goal, so they leak nothing.
     """
     text = instruction.command
     last = len(instruction.utterances) - 1
-    for mention in reversed(instruction.mentions):  # the last first, so that places stay
+    # From the end, so that the positions of earlier mentions stay right.
+    for mention in reversed(instruction.mentions):
         if mention.utterance == last and mention.expression in _POINTERS:
             text = text[: mention.start] + text[mention.end :]
     return text

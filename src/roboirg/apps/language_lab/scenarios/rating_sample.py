@@ -30,23 +30,35 @@ scene, text."""
 
 
 def draw_sample(tasks: Sequence[str], settings: Sequence[str], seed: int) -> list[SampledText]:
-    """Return up to `TEXTS` texts of each setting, shuffled."""
+    """Return up to `TEXTS` texts of each setting for a blind rating, shuffled.
+
+    Each is of another *frame*, the situation that a text tells of, such as a school trip.
+
+    Args:
+        tasks: names.
+        settings: names.
+        seed: decides scenes and order.
+    """
     rng = np.random.default_rng(seed)
     sample: list[SampledText] = []
     for setting in settings:
         texts: list[SampledText] = []
         for task in tasks:
             texts += _texts(task, setting, seed)
-        # One text for each frame, which tasks share; explicit has no frames, only texts.
+        # One text for each frame, as several tasks may have it. Texts of the explicit setting have
+        # no frame, so each counts.
         of_frames = {text["frame"] or text["text"]: text for text in shuffled(rng, texts)}
         sample += list(of_frames.values())[:TEXTS]
     return shuffled(rng, sample)
 
 
 def _texts(task: str, setting: str, seed: int) -> Iterator[SampledText]:
-    """Yield a text for each frame; without frames, up to `TEXTS`."""
+    """Yield a text of a task for each frame, the situation that it tells of; without frames `TEXTS`.
+
+    They are from random scenes that only this seed uses, in the words of the test pool.
+    """
     options = InstructionOptions(wordings=POOL)
-    first = seed * MOST_SCENES
+    first = seed * MOST_SCENES  # number of a random scene
     episodes = (get_episode(task, "random", first + number) for number in range(MOST_SCENES))
     seen: set[str] = set()
     for episode, instruction in instructions(episodes, [setting], ["implicit"], options):
@@ -66,7 +78,10 @@ def _texts(task: str, setting: str, seed: int) -> Iterator[SampledText]:
 
 
 def sheet(texts: Sequence[SampledText], order: int) -> str:
-    """Return a rater's sheet: number and text in an order of its own, and a column to fill in."""
+    """Return a rater's sheet as CSV: number, text, and an empty column for the rating.
+
+    `order` is the seed of the sheet's order; the numbers are the same on all sheets.
+    """
     rng = np.random.default_rng(order)
     numbered = shuffled(rng, list(enumerate(texts, 1)))
     rows = [{"number": number, "text": text["text"], "rating": ""} for number, text in numbered]
@@ -74,5 +89,5 @@ def sheet(texts: Sequence[SampledText], order: int) -> str:
 
 
 def key(texts: Sequence[SampledText]) -> str:
-    """Return what the numbers of the sheets stand for."""
+    """Return a CSV with setting, task and scene of each number on the sheets."""
     return csv_text([{"number": number, **text} for number, text in enumerate(texts, 1)])

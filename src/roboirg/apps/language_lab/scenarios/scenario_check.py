@@ -104,10 +104,15 @@ def check_scenarios(
 def check_scenario(
     scenario: Scenario, words: TaskScenarios, scenes: Sequence[Episode]
 ) -> ScenarioReport:
-    """Return what is wrong with a scenario as it is written, and in what it says of scenes.
+    """Return a report on a scenario, a template of texts: all rules that it breaks, with examples.
 
-    Beyond its sentences and texts: it must fit some scene, and its command alone must leave the
-    goal open in at least one of them.
+    Checked are its sentences as they are written, and its texts in every scene that it fits. It
+    must fit some scene, and in at least one of them its command alone must leave the goal open.
+
+    Args:
+        scenario: to check.
+        words: all words of the task in the scenario's file.
+        scenes: episodes of the task.
     """
     report = ScenarioReport(scenario)
     first = scenes[0]
@@ -132,7 +137,7 @@ def check_scenario(
 
 
 def length_complaint(text: str) -> str:
-    """Return that a text has more tokens than policies read; empty if it has not."""
+    """Return a complaint if a text has more tokens than usual policies read; else an empty text."""
     if tokens_of(text) <= USUAL_LIMIT:
         return ""
     return f"needs {tokens_shown(text)} tokens; only {USUAL_LIMIT} are heard"
@@ -157,7 +162,11 @@ class _SceneChecker:
         self.usual = InstructionOptions(setting, wordings=fields.pool)
 
     def check(self, episode: Episode) -> None:
-        """Check what the scenario says of an episode, in every form and frame."""
+        """Check what the scenario says of an episode, and add what is found to the report.
+
+        It is said in every form: implicit, and resolved, which names all values. In the spatial
+        setting, sides are said as the person sees them, and once more as the camera does.
+        """
         try:
             instruction = self._check_texts(episode, self.usual)
             if self.usual.setting == "spatial":
@@ -170,19 +179,23 @@ class _SceneChecker:
             self._add_fit(episode, implicit=instruction[0])
 
     def _add_fit(self, episode: Episode, implicit: Instruction) -> None:
-        """Add a scene that the scenario fits, and what it says there in the implicit form.
+        """Add a scene that the scenario fits to the report.
 
-        It must not say the same of another goal of the scene.
+        Checks that the scenario does not say the same of another goal of the scene.
+
+        Args:
+            episode: with the scene.
+            implicit: what the scenario says of it in the implicit form.
         """
         report = self._report
         number = report.scenes
-        if len(report.renderings) < SHOWN and number % 3 == 0:  # not all from similar scenes
+        if len(report.renderings) < SHOWN and number % 3 == 0:  # neighbors are similar
             report.renderings.append(implicit.text)
         report.fitting.append(episode.key)
         if not all(is_right(goal, episode) for goal in goals_of_command(implicit, episode)):
             report.open += 1
 
-        # The words of another goal of the scene must differ; which one it is changes by scene.
+        # One other goal is enough for each scene; it is not always the first, so all occur.
         others = [goal for goal in goals_of(episode) if goal != episode.goal]
         if others:
             other = with_goal(episode, others[number % len(others)])
@@ -198,9 +211,14 @@ class _SceneChecker:
         return self._instruction_of(request, chosen).text
 
     def _check_texts(self, episode: Episode, usual: InstructionOptions) -> list[Instruction]:
-        """Check and return what the scenario says in every form, the implicit one first.
+        """Check and return all texts of the scenario for an episode, the implicit one first.
 
-        With all remarks of contextual, if its setting has any. Nothing if it does not fit.
+        They differ in their form; in the contextual setting each is also said with a competing
+        remark, which mentions another value. Empty if the scenario does not fit the episode.
+
+        Args:
+            episode: that is spoken of.
+            usual: options of the texts, but for the form.
         """
         chosen = self._chosen(request_of(episode, usual))
         if chosen is None:
@@ -211,7 +229,12 @@ class _SceneChecker:
         return [self._check_text(request_of(episode, options), chosen) for options in variants]
 
     def _check_text(self, request: InstructionRequest, chosen: Chosen) -> Instruction:
-        """Check and return what the scenario says for a request."""
+        """Check one text of the scenario, add what is found to the report, and return the text.
+
+        Args:
+            request: the episode, and the options of the text.
+            chosen: how the scenario says the episode.
+        """
         report = self._report
         instruction = self._instruction_of(request, chosen)
         if request.resolved:
@@ -247,9 +270,14 @@ def our_scenarios() -> tuple[Scenario, ...]:
 def unserved_settings(
     reports: Sequence[ScenarioReport], scenes: Sequence[Episode], path: Path
 ) -> Iterator[str]:
-    """Yield a complaint for each setting of a user's file that has no scenario for some scenes.
+    """Yield a complaint for each setting of a user's file in which some scenes have no words.
 
-    Scenes that the setting refuses anyway need none.
+    Scenes that the setting cannot express need none.
+
+    Args:
+        reports: on all scenarios of the file for a task, with the scenes that each fits.
+        scenes: episodes of the task.
+        path: of the file, for the complaint.
     """
     for setting, keys in _served_scenes(reports).items():
         options = InstructionOptions(setting)
@@ -275,7 +303,7 @@ def _served_scenes(reports: Sequence[ScenarioReport]) -> dict[str, set[str]]:
     served: dict[str, set[str]] = {}
     for report in reports:
         fields = report.scenario.fields
-        if fields.pool is None:  # those of ours are never alone
+        if fields.pool is None:  # a user's; ours serve one pool each, next to many others
             served.setdefault(fields.setting, set()).update(report.fitting)
     return served
 
@@ -286,22 +314,29 @@ def _with_goal(episode: Episode) -> str:
 
 
 def _in_both_pools(scenario: Scenario, words: TaskScenarios) -> Iterator[str]:
-    """Yield the frame and the sentences that the other pool has, in its own file or in ours.
+    """Yield a complaint for each sentence of a scenario that the other pool of words also has.
 
-    A scenario of a user, which serves both pools, has no other one.
+    The pools train and test must not share sentences or frames. A scenario of a user serves both,
+    so it has no other pool.
+
+    Args:
+        scenario: to check.
+        words: all words of its file, which are compared next to those of the package.
     """
     if scenario.fields.pool is None:
         return
     (other_pool,) = set(POOLS) - {scenario.fields.pool}
-    theirs = sentences_of((*words.scenarios, *our_scenarios()), other_pool)
-    for shared in sorted(theirs.intersection(blanked(scenario))):
+    other_sentences = sentences_of((*words.scenarios, *our_scenarios()), other_pool)
+    for shared in sorted(other_sentences.intersection(blanked(scenario))):
         yield f"the other pool has {shared!r}, too"
 
 
 def _broken(request: InstructionRequest, chosen: Chosen, instruction: Instruction) -> Iterator[str]:
-    """Yield the rules that a text breaks.
+    """Yield a complaint for each rule that a text of a scenario breaks.
 
-    A resolved one, whose command names everything, only has to be right as a text.
+    Its grammar is checked, its meaning, that its command does not give the goal away, and that
+    words such as *it* point at one thing. In the resolved form, whose command names all values,
+    only the grammar counts.
     """
     yield from broken_text(instruction, chosen, request)
     if request.resolved:
@@ -314,9 +349,14 @@ def _broken(request: InstructionRequest, chosen: Chosen, instruction: Instructio
 
 
 def _wrong_meaning(request: InstructionRequest, meaning: Meaning) -> Iterator[str]:
-    """Yield that words do not mean the goal, and for which fields they stand for other values.
+    """Yield complaints if words do not mean the goal of their episode; nothing if they do.
 
-    They may mean several goals if each of them is right in the episode.
+    They may mean several goals if each of them is right. The first complaint is about the goal, the
+    others about its values for which the words stand for another one.
+
+    Args:
+        request: the episode with the values of its goal.
+        meaning: what the words declare to mean.
     """
     episode = request.episode
     goals = meant_goals(meaning, episode)
@@ -331,10 +371,10 @@ def _wrong_meaning(request: InstructionRequest, meaning: Meaning) -> Iterator[st
 
 
 def _broken_pointers(instruction: Instruction, scenario: Scenario) -> Iterator[str]:
-    """Yield what is wrong with words that point back, such as *it*.
+    """Yield a complaint for each word that points back, such as *it*, without a clear antecedent.
 
-    Each needs one mention of its value before it, its antecedent: *red* before *it*. Remarks that
-    distract count as none.
+    An antecedent is an earlier mention of the value, such as *red* before *it*; there must be
+    exactly one. Values in distracting remarks do not count.
     """
     # "Red or blue? Red is gone." names one of two again, and so says which one is meant.
     is_named_again = "taken" in slots_in(scenario.text("introduction"))
@@ -356,7 +396,13 @@ def _broken_pointers(instruction: Instruction, scenario: Scenario) -> Iterator[s
 
 
 def _ambiguous(pointer: Mention, words: str, values: Sequence[str]) -> Iterator[str]:
-    """Yield that a pointer at a single value can mean several that were named before."""
+    """Yield a complaint if words that point back at one value could mean several.
+
+    Args:
+        pointer: the words that point back.
+        words: the same, for the complaint.
+        values: that were named before and are of its kind: *red*, *blue*.
+    """
     named = list(dict.fromkeys(values))
     if len(_parts_of(pointer)) == 1 and len(named) > 1:
         yield f"{words} can mean {' or '.join(named)}"
@@ -370,13 +416,14 @@ def _parts_of(mention: Mention) -> list[str]:
 def _wrong_antecedents(
     pointer: Mention, words: str, values: Sequence[str], *, is_named_again: bool
 ) -> Iterator[str]:
-    """Yield the values of a pointer that were not named before, or more than once.
+    """Yield a complaint for each value of a pointer that was not named exactly once before.
 
     Args:
         pointer: words that point back.
         words: the same, for the complaint.
         values: of the mentions before it, of its kind.
-        is_named_again: whether one of two was named again to say that it is gone.
+        is_named_again: whether one of two was named again to say that it is gone; then a value may
+            be named twice.
     """
     parts = _parts_of(pointer)
     must_be_once = len(parts) == 1 and pointer.expression != "other" and not is_named_again
@@ -391,10 +438,15 @@ def _wrong_antecedents(
 def _of_its_kind(
     pointer: Mention, before: Sequence[Mention], instruction: Instruction
 ) -> Sequence[Mention]:
-    """Return the mentions before a pointer that are of its kind: numbers, moments or colors.
+    """Return the earlier mentions that a word such as *it* could mean, by their kind.
 
-    For *that cube*, only those that name a color; for *the one there*, only those that name a
-    place.
+    Numbers point at numbers, colors at colors, moments (*before*) at moments. *That cube* and *the
+    one there* only mean what was introduced in one way: by its color, or by its place.
+
+    Args:
+        pointer: the word that points back.
+        before: mentions before it.
+        instruction: with all of them.
     """
     parts = _parts_of(pointer)
     kind = _kind_of(parts[0])

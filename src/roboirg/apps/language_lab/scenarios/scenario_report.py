@@ -14,7 +14,7 @@ _MOST_GOALS = 10
 
 
 def explicit_lines(report: ExplicitReport, task: str) -> Iterator[str]:
-    """Yield what an author wants to know of the explicit words of a task."""
+    """Yield the lines of a report on a file's explicit words: texts, lengths, what is wrong."""
     yield f"explicit ({task})"
     for text in report.renderings:
         yield f"  {text}"
@@ -34,7 +34,7 @@ def explicit_lines(report: ExplicitReport, task: str) -> Iterator[str]:
 
 
 def report_lines(report: ScenarioReport, task: str) -> Iterator[str]:
-    """Yield what an author wants to know of a scenario in a task: texts, length, broken rules."""
+    """Yield the lines of a report on a scenario in a task: texts, length, broken rules."""
     fields = report.scenario.fields
     yield f"{fields.frame} ({task}, {fields.setting}, {fields.pool or 'both pools'})"
     for text in report.renderings:
@@ -54,7 +54,10 @@ def report_lines(report: ScenarioReport, task: str) -> Iterator[str]:
 
 
 def _rule_lines(report: ScenarioReport, rule: str) -> Iterator[str]:
-    """Yield a broken rule, with a text that breaks it and how often, if texts do."""
+    """Yield the lines on a broken rule: how often it is broken, and a text that breaks it.
+
+    A rule that the written sentences break has neither.
+    """
     example = report.examples[rule]
     if not example:
         yield f"  BROKEN {rule}"

@@ -92,7 +92,10 @@ _DESCRIBED = ("place", "clue", "rest")
 def broken_sentences(scenario: Scenario, pointed: str) -> Iterator[str]:
     """Yield what is wrong with a scenario's sentences: *lead: has the words 'red'; …*.
 
-    `pointed` is the kind of object at which the task's words point, ``cube`` or ``container``.
+    Args:
+        scenario: whose sentences are checked as they are written, whatever the episode.
+        pointed: kind of object at which the task's words point: ``cube``, ``hidden_cube`` or
+            ``container``.
     """
     noun = pointed.removeprefix("hidden_")
     # These depend on the task: what a place is said of, and whether the cube can be seen.
@@ -112,13 +115,15 @@ def broken_sentences(scenario: Scenario, pointed: str) -> Iterator[str]:
 
 
 def _names_container(text: Text) -> bool:
-    """Return whether words are for a container: *the one over it*, not *it* of a cube."""
+    """Return whether words stand for a container, *the one over it*, and not for a cube, *it*."""
     slots = {pointer.of.partition(".")[0] for pointer in pointers_in(text)}
     return "over " in literal(text) or not slots.isdisjoint(_DESCRIBED)
 
 
 def _wrong(name: str, text: Text, never: Mapping[str, str]) -> Iterator[str]:
-    """Yield what is wrong with a sentence: its words, the values it names, where it points.
+    """Yield a complaint for each rule that a sentence of a scenario breaks.
+
+    Rules are about its words, the values that it names, and what it points back at.
 
     Args:
         name: of its field, such as ``say.color``.
@@ -146,7 +151,7 @@ def _wrong(name: str, text: Text, never: Mapping[str, str]) -> Iterator[str]:
 
 
 def _rival_named_last(text: Text) -> Iterator[str]:
-    """Yield where a competing remark ends with another value, which *that one* would then mean.
+    """Yield a complaint if a remark names a wrong value last, as *that one* would then mean it.
 
     If *before* is meant, *not after but before* is right, and *before and not after* is wrong.
     """
@@ -163,9 +168,14 @@ def _rival_named_last(text: Text) -> Iterator[str]:
 
 
 def _values_named(field: str, text: Text) -> Iterator[str]:
-    """Yield what is wrong with the values that a sentence names where it may point back only.
+    """Yield a complaint for each value that a sentence names where it may only point back.
 
-    In a lead, neither *red* may be said nor ``{color}``; in ``say``, counts may.
+    In a ``lead``, the beginning of a command, neither *red* may be said nor the slot ``{color}``;
+    in ``say``, the command itself, counts may.
+
+    Args:
+        field: of the scenario, to which the sentence belongs.
+        text: the sentence.
     """
     if field in _SILENT or field in _COMMAND:
         values = _values_in_words(field, text)
@@ -180,7 +190,10 @@ def _values_named(field: str, text: Text) -> Iterator[str]:
 
 
 def _values_in_words(field: str, text: Text) -> set[str]:
-    """Return words that could be a value, *two* or *left*, outside of a sentence's pointers."""
+    """Return words of a sentence that could be a goal value, such as *two* or *left*.
+
+    Words that point back, such as *the second one*, are not searched.
+    """
     outside = tuple(part for part in text if not isinstance(part, Pointer))
     values = set(_VALUE.findall(literal(outside).lower()))
     if field in _COMMAND and any(pointers_in(text)):
@@ -189,9 +202,10 @@ def _values_in_words(field: str, text: Text) -> set[str]:
 
 
 def blanked(scenario: Scenario) -> Iterator[str]:
-    """Yield the frame of a scenario, and its sentences in small letters with ``_`` for slots.
+    """Yield a scenario's name and sentences, in small letters, with ``_`` for slots.
 
-    Those of the command are left out, and so are fragments of two words or fewer.
+    So texts of two scenarios can be compared: *My sister likes {color}.* becomes *my sister likes
+    _.* Sentences of the command are left out, and so are fragments of two words or fewer.
     """
     yield f"frame {scenario.fields.frame}"
     for name, texts in scenario.texts.items():
@@ -205,7 +219,7 @@ def blanked(scenario: Scenario) -> Iterator[str]:
 
 
 def sentences_of(scenarios: Iterable[Scenario], pool: PoolName) -> set[str]:
-    """Return the frames of a pool and its sentences with their slots blanked."""
+    """Return the names and the sentences of a pool's scenarios, with ``_`` for slots."""
     found: set[str] = set()
     for scenario in scenarios:
         if scenario.fields.pool == pool:
@@ -214,10 +228,10 @@ def sentences_of(scenarios: Iterable[Scenario], pool: PoolName) -> set[str]:
 
 
 def literal(text: Text) -> str:
-    """Return the words of a sentence as they are written, without the classes of pointers.
+    """Return the words of a sentence of a scenario, without its markup for what points back.
 
-    ``Lift <it color: it> {repeats:times}.`` becomes ``Lift it {repeats:times}.``; ``lap`` and
-    ``laps`` of an agreement both stand there.
+    ``Lift <it color: it> {repeats:times}.`` becomes ``Lift it {repeats:times}.``. Of words that
+    agree with a number, such as ``[repeats: lap|laps]``, both forms are there.
     """
     words = []
     for part in text:

@@ -83,10 +83,15 @@ OF_LISTS: Mapping[int, Patterns] = {
 def broken_text(
     instruction: Instruction, chosen: Chosen, request: InstructionRequest
 ) -> Iterator[str]:
-    """Yield the rules that a text breaks as a text, in any form: *says 'a apple'; 'an' is right*.
+    """Yield a complaint for each grammar rule that a text breaks: *says 'a apple'; 'an' is right*.
 
-    Which rules there are depends on the length of the list that it names, and on whether things
-    change places in the scene.
+    Further rules depend on how many values the text lists, and on whether things change places in
+    the scene: then *there* needs a time.
+
+    Args:
+        instruction: whose text is checked.
+        chosen: how a scenario says the episode, with the values that it lists.
+        request: with the episode.
     """
     yield from _found(GRAMMAR, "\n".join(instruction.turns))
     patterns = dict(MENTIONED)
@@ -106,9 +111,14 @@ def _found(patterns: Patterns, text: str) -> Iterator[str]:
 
 
 def _marked(instruction: Instruction) -> str:
-    """Return the utterances with their mentions marked: ``Lift <it red:it>.``."""
+    """Return the text with its referring words marked, as the patterns of rules need it.
+
+    *Lift it.* becomes ``Lift <it red:it>.``: class of the expression, value, and the words; None
+    is the class of words that name a value. A line is an utterance.
+    """
     turns = list(instruction.turns)
-    for mention in reversed(instruction.mentions):  # the last first, so that places before it stay
+    # From the end, so that the positions of earlier mentions stay right.
+    for mention in reversed(instruction.mentions):
         turn = turns[mention.utterance]
         marked = f"<{mention.expression} {mention.value}:{instruction.span(mention)}>"
         turns[mention.utterance] = turn[: mention.start] + marked + turn[mention.end :]
