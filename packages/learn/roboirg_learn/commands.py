@@ -156,7 +156,7 @@ def learn_policy(
     ] = False,
     workers: Workers = None,
 ) -> None:
-    """Train a policy that acts on pictures and words: records the expert, then learns.
+    """Train a policy that body_plan on pictures and words: records the expert, then learns.
 
     It becomes two files: a body, and a reader of words for it. What is there already is used again.
     A plan may have, under `training`: scenes, drawn, goals, detector_epochs, body_epochs,
@@ -169,21 +169,21 @@ def learn_policy(
     from roboirg_learn.policy.policy_plan import MEMORY_NAMES, BodyPlan
 
     words = PlanWords(context, plan, TRAINING, POLICY_OPTIONS)
-    reads = _reader_plan(words, words.tasks(tasks), settings)
+    reader_plan = _reader_plan(words, words.tasks(tasks), settings)
     memory = known_name("memory", memory, MEMORY_NAMES)
-    acts = BodyPlan(reads.tasks, memory, **words.choices(BodyPlan))
+    body_plan = BodyPlan(reader_plan.tasks, memory, **words.choices(BodyPlan))
     if paper and memory != USUAL_MEMORY:
         raise InvalidValueError("--paper has its memories from the plan: training.memories.")
     _check_folder(out, "--out needs a folder")
     check_learn_support()
     with locked(out / ".lock", f"Another command learns in {str(out)!r}."):
         if paper:
-            _play_paper(acts, reads, words, out, worker_count(workers))
+            _play_paper(body_plan, reader_plan, words, out, worker_count(workers))
             return
         from roboirg_learn.policy.policy_training import trained_files
 
-        files = trained_files(acts, reads, out, worker_count(workers), _print_tenths())
-    print_policy(files, reads)
+        files = trained_files(body_plan, reader_plan, out, worker_count(workers), _print_tenths())
+    print_policy(files, reader_plan)
 
 
 def _reader_plan(
@@ -229,22 +229,24 @@ def learn_reader(
     from roboirg_learn.policy.policy_files import PolicyFiles
     from roboirg_learn.policy.trained_body import load_body
     from roboirg_learn.policy.trained_reader import save_reader
-    from roboirg_learn.policy.word_training import check_words, teach_reader
+    from roboirg_learn.policy.word_training import check_words, train_policy_reader
 
     words = PlanWords(context, plan, TRAINING, READER_OPTIONS)
     check_output_file(out)
-    acts = load_body(body)
+    body_plan = load_body(body)
     if tasks == "all":
-        tasks = ",".join(acts.goals.tasks)
-    reads = _reader_plan(words, words.tasks(tasks), settings)
-    for task in reads.tasks:
-        known_name("task of this body", task, acts.goals.tasks)
-    check_words(reads)
+        tasks = ",".join(body_plan.goals.tasks)
+    reader_plan = _reader_plan(words, words.tasks(tasks), settings)
+    for task in reader_plan.tasks:
+        known_name("task of this body", task, body_plan.goals.tasks)
+    check_words(reader_plan)
     work = out.parent / "reader-work"
     work.mkdir(exist_ok=True)
-    reader = teach_reader(acts, reads, work, out.stem, worker_count(workers), _print_tenths())
+    reader = train_policy_reader(
+        body_plan, reader_plan, work, out.stem, worker_count(workers), _print_tenths()
+    )
     save_reader(reader, out)
-    print_policy(PolicyFiles(body, out), reads)
+    print_policy(PolicyFiles(body, out), reader_plan)
 
 
 def print_policy(files: PolicyFiles, plan: ReaderPlan) -> None:
@@ -260,7 +262,7 @@ def print_policy(files: PolicyFiles, plan: ReaderPlan) -> None:
 
 
 def _play_paper(
-    acts: BodyPlan, reads: ReaderPlan, words: PlanWords, out: Path, workers: int
+    body_plan: BodyPlan, reader_plan: ReaderPlan, words: PlanWords, out: Path, workers: int
 ) -> None:
     """Train a policy for each mechanism of the paper, play its tables, and print the page."""
     import roboirg
@@ -278,8 +280,8 @@ def _play_paper(
 
     experiment = ExperimentPlan(**words.choices(ExperimentPlan))
     check_experiment(experiment)
-    files = train_rows(experiment, acts, reads, out, workers, _print_tenths())
-    changes = _changes(words, reads.tasks)
+    files = train_rows(experiment, body_plan, reader_plan, out, workers, _print_tenths())
+    changes = _plan_changes(words, reader_plan.tasks)
     results = {}
     for part in experiment.parts:
         options = part_options(part, experiment, files, changes)
@@ -295,7 +297,7 @@ def _play_paper(
     typer.echo(str(page))
 
 
-def _changes(words: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
+def _plan_changes(words: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
     """Return the options that the parts of the paper's experiment take from a plan."""
     changes: dict[str, Any] = {"tasks": tasks}
     for name in ("episodes", "split"):

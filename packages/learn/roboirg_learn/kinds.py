@@ -38,14 +38,16 @@ def _checked_path(
     return Path(name)
 
 
-def _learned(spec: str, name: str, options: Mapping[str, str]) -> Callable[[int], Any]:
+def _learned_listener_maker(
+    spec: str, name: str, options: Mapping[str, str]
+) -> Callable[[int], Any]:
     """Return what makes listeners that learned."""
     from roboirg_learn.listener.learned_listener import LearnedListener
 
     return functools.partial(LearnedListener, _checked_path(spec, name, options))
 
 
-def _trained(spec: str, name: str, options: Mapping[str, str]) -> Callable[[int], Any]:
+def _trained_policy_maker(spec: str, name: str, options: Mapping[str, str]) -> Callable[[int], Any]:
     """Return what makes learned policies; with ``hands=…`` learned planners with those hands."""
     body = _checked_path(spec, name, options, (READER, ACTIONS, HANDS))
     if not options.get(READER):
@@ -60,10 +62,10 @@ def _trained(spec: str, name: str, options: Mapping[str, str]) -> Callable[[int]
         return lambda seed: make_learned(files, seed, actions)
     if ACTIONS in options:
         raise InvalidValueError(f"Policy {spec!r} has other hands, which have their own actions.")
-    return lambda seed: _planner_with(hands, files, seed, spec)
+    return lambda seed: _planner_for_hands(hands, files, seed, spec)
 
 
-def _planner_with(hands: str, files: PolicyFiles, seed: int, spec: str) -> object:
+def _planner_for_hands(hands: str, files: PolicyFiles, seed: int, spec: str) -> object:
     """Return a learned planner whose subgoals other hands follow."""
     from roboirg_learn.policy.subgoal_following import LearnedPlanner
 
@@ -105,11 +107,11 @@ def make_learned(
 def _load(files: PolicyFiles) -> PolicyModel:
     """Return what files hold now."""
     check_learn_support()
-    return _model(files, files.changed)
+    return _cached_model(files, files.changed)
 
 
 @functools.lru_cache(maxsize=4)
-def _model(files: PolicyFiles, changed: tuple[int, ...]) -> PolicyModel:
+def _cached_model(files: PolicyFiles, changed: tuple[int, ...]) -> PolicyModel:
     """Return what files that were written then hold; episodes change nothing in it."""
     del changed
     from roboirg_learn.policy.policy_model import load_policy
@@ -117,5 +119,5 @@ def _model(files: PolicyFiles, changed: tuple[int, ...]) -> PolicyModel:
     return load_policy(files)
 
 
-LEARNED = PolicyKind("learned", _learned)
-TRAINED = PolicyKind("trained", _trained, has_weights=True)
+LEARNED = PolicyKind("learned", _learned_listener_maker)
+TRAINED = PolicyKind("trained", _trained_policy_maker, has_weights=True)

@@ -60,7 +60,7 @@ def pictures_to_see(first: Pixels, frames: Sequence[Pixels] | Pixels, every: int
     return [frames[0], frames[later]]
 
 
-def look_as_played(episode: Episode) -> tuple[LabeledView, ...]:
+def views_as_played(episode: Episode) -> tuple[LabeledView, ...]:
     """Return the pictures that a listener looks at when it plays an episode; without labels."""
     first, frames = shown_to_policy(episode, LATER_STEP)
     pictures = pictures_to_see(first, frames, LATER_STEP)
@@ -75,7 +75,7 @@ def draw_missing(
     workers: int,
     show: Callable[[int, int], object],
 ) -> None:
-    """Draw the views of episodes that a folder does not have, by `look` or `look_as_played`."""
+    """Draw the views of episodes that a folder does not have, by `look` or `views_as_played`."""
     folder.mkdir(parents=True, exist_ok=True)
     missing = [episode for episode in episodes if not _path(folder, episode).exists()]
     done = len(episodes) - len(missing)

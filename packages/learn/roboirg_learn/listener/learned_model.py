@@ -17,8 +17,8 @@ from roboirg_learn.listener.detector_net import DetectorNet
 from roboirg_learn.listener.listener_net import ListenerNet
 from roboirg_learn.listener.object_relations import (
     TablePlane,
-    nothing_of,
-    relate,
+    locate_and_rank,
+    without_objects,
 )
 from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary
 from roboirg_learn.trained_file import TrainedFile, load_trained, save_trained
@@ -81,20 +81,20 @@ class LearnedModel:
             )
         goals = list(goal_schema(given.task).goals.values())
         with torch.no_grad():
-            (scores,) = self.reader([hide(given, self.without)])
+            (scores,) = self.reader([hide_inputs(given, self.without)])
         return goals[int(scores.argmax())]
 
     def see(self, pictures: Sequence[Pixels]) -> ListenerInput:
         """Return what is seen in pictures, without task and words."""
-        seen = relate(self.detector.find(pictures), self.plane, self.vocabulary.classes)
+        seen = locate_and_rank(self.detector.find(pictures), self.plane, self.vocabulary.classes)
         return ListenerInput("", "", seen, tuple(pictures))
 
 
-def hide(given: ListenerInput, without: Without) -> ListenerInput:
+def hide_inputs(given: ListenerInput, without: Without) -> ListenerInput:
     """Return an input without pictures, video or words."""
     has_video = given.seen.looks > 1
     if without == "pictures" or (without == "video" and has_video):
-        return given._replace(seen=nothing_of(given.seen), pictures=())
+        return given._replace(seen=without_objects(given.seen), pictures=())
     if without == "words":
         return given._replace(text="")
     return given

@@ -22,7 +22,7 @@ from roboirg.extension.episodes import (
     plain_settings,
     spoken,
 )
-from roboirg_learn.labeled_views import Pixels, draw_missing, look_as_played, read_views
+from roboirg_learn.labeled_views import Pixels, draw_missing, read_views, views_as_played
 from roboirg_learn.listener.vocabulary import WORD_POOLS, WordPool
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ class _Study:
     def trained(self, variant: StudyVariant, plan: TrainingPlan) -> LearnedModel:
         """Return a listener: that of its file if it has the same plan, else a new one."""
         from roboirg_learn.listener.learned_model import load_model, save_model
-        from roboirg_learn.listener.listener_training import teach
+        from roboirg_learn.listener.listener_training import train_on_scenes
         from roboirg_learn.trained_file import END
         from roboirg_learn.trainer import part_of
 
@@ -156,7 +156,7 @@ class _Study:
         scenes = self._seen_scenes()
         self._answer_file(variant, plan.reader).unlink(missing_ok=True)
         kept = self._work / f"reader-{name}.pt"
-        model = teach(scenes, plan, kept, part_of(self._progress, name))
+        model = train_on_scenes(scenes, plan, kept, part_of(self._progress, name))
         save_model(model, path)
         return model
 
@@ -188,7 +188,7 @@ class _Study:
         if not self._tested:
             episodes = episodes_of(self._common.reader.tasks, "test")
             show = partial(self._progress, "test pictures")
-            draw_missing(self._work, episodes, look_as_played, self._workers, show)
+            draw_missing(self._work, episodes, views_as_played, self._workers, show)
             for episode in episodes:
                 views = read_views(self._work, episode, pictures=True)
                 pictures = [view.picture for view in views]
@@ -203,7 +203,7 @@ def _answers(
     # Every scene has many instructions, and is looked at once.
     seen = {scene.episode.key: model.see(scene.pictures) for scene in shown}
     episodes = [scene.episode for scene in shown]
-    for setting, pool in _asked():
+    for setting, pool in _tested_settings():
         for episode, text in spoken(episodes, [setting], pool):
             task = episode.task
             goal = model.understand_seen(seen[episode.key]._replace(task=task, text=text))
@@ -219,7 +219,7 @@ def _answers(
             )
 
 
-def _asked() -> Iterator[tuple[str, WordPool]]:
+def _tested_settings() -> Iterator[tuple[str, WordPool]]:
     """Yield each setting with the pool of words in which it is spoken."""
     for setting in plain_settings():
         for pool in WORD_POOLS:

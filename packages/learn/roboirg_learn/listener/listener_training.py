@@ -23,19 +23,19 @@ from roboirg.extension.sight import LabeledView
 from roboirg_learn.labeled_views import draw_missing, look, read_views
 from roboirg_learn.listener.detector_net import INPUT_SIZE, DetectorNet, detector_loss
 from roboirg_learn.listener.encoders import ENCODERS
-from roboirg_learn.listener.learned_model import LearnedModel, Without, hide
+from roboirg_learn.listener.learned_model import LearnedModel, Without, hide_inputs
 from roboirg_learn.listener.object_relations import (
     SeenObjects,
     TablePlane,
     fit_plane,
-    relate,
+    locate_and_rank,
 )
 from roboirg_learn.listener.reader_plan import ReaderPlan
 from roboirg_learn.listener.reader_training import (
     Lesson,
     check_reader,
+    instructions_of,
     lesson_of,
-    said,
     train_reader,
 )
 from roboirg_learn.listener.vocabulary import ListenerInput, make_vocabulary
@@ -160,7 +160,7 @@ def train_listener(
     """
     check_reader(plan.reader)
     scenes = see_episodes(plan, folder, workers, progress)
-    return teach(scenes, plan, folder / f"reader-{name}-{plan.reader.seed}.pt", progress)
+    return train_on_scenes(scenes, plan, folder / f"reader-{name}-{plan.reader.seed}.pt", progress)
 
 
 def see_episodes(
@@ -230,13 +230,15 @@ def _see_each(
     seen = {}
     for key, views in labeled.by_key.items():
         pictures = tuple(view.picture for view in views)
-        found = _labels(views, classes) if key in labeled.random else detector.find(pictures)
-        objects = relate(found, plane, classes)
+        found = _as_detected(views, classes) if key in labeled.random else detector.find(pictures)
+        objects = locate_and_rank(found, plane, classes)
         seen[key] = ListenerInput("", "", objects, pictures if keeps_pictures else ())
     return seen
 
 
-def teach(scenes: SeenEpisodes, plan: TrainingPlan, kept: Path, progress: Progress) -> LearnedModel:
+def train_on_scenes(
+    scenes: SeenEpisodes, plan: TrainingPlan, kept: Path, progress: Progress
+) -> LearnedModel:
     """Return a listener that has learned to read; `kept` is its file after each pass."""
     reader_plan = plan.reader
     torch.manual_seed(reader_plan.seed)
@@ -246,12 +248,12 @@ def teach(scenes: SeenEpisodes, plan: TrainingPlan, kept: Path, progress: Progre
     vocabulary = make_vocabulary(texts, scenes.classes, reader_plan.tasks)
 
     reader = train_reader(
-        _hidden(lessons, plan.without),
+        _hide_from_lessons(lessons, plan.without),
         vocabulary,
         reader_plan,
         progress,
         KeptTraining(kept, plan.about),
-        _hidden(held_back, plan.without),
+        _hide_from_lessons(held_back, plan.without),
     )
     return LearnedModel(vocabulary, scenes.detector, scenes.plane, reader, plan.without, plan.about)
 
@@ -261,18 +263,18 @@ def _lessons(
 ) -> list[Lesson]:
     """Return what is said of episodes, with what is seen of them and the goals that are meant."""
     lessons = []
-    for episode, text in said(episodes, plan):
+    for episode, text in instructions_of(episodes, plan):
         given = seen[episode.key]._replace(task=episode.task, text=text)
         lessons.append(lesson_of(given, episode))
     return lessons
 
 
-def _hidden(lessons: Iterable[Lesson], without: Without) -> list[Lesson]:
+def _hide_from_lessons(lessons: Iterable[Lesson], without: Without) -> list[Lesson]:
     """Return lessons without what the listener does not get."""
-    return [lesson._replace(given=hide(lesson.given, without)) for lesson in lessons]
+    return [lesson._replace(given=hide_inputs(lesson.given, without)) for lesson in lessons]
 
 
-def _labels(views: Iterable[LabeledView], classes: Sequence[str]) -> list[SeenObjects]:
+def _as_detected(views: Iterable[LabeledView], classes: Sequence[str]) -> list[SeenObjects]:
     """Return labels as if the detector had found them."""
     numbers = {name: number for number, name in enumerate(classes)}
     found = []

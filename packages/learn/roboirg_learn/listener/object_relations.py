@@ -21,7 +21,7 @@ VIEWS = 2
 """At the start of the video, or else of the policy's turn; and later in the video."""
 _RANKS = 3
 """How many of the first and of the last have a rank."""
-_CODES = 2 * _RANKS
+_CODES_PER_LANDMARK = 2 * _RANKS
 """Ranks at one landmark: of the first, then of the last."""
 _FIXED_LANDMARKS = 7
 """To the robot's left, forward, distance from the robot, and distance from each corner."""
@@ -102,10 +102,10 @@ def corners_of(positions: NDArray[np.floating]) -> Points:
 
 def relation_count(classes: int) -> int:
     """Return the number of ranks for `classes` classes of objects."""
-    return (_FIXED_LANDMARKS + VIEWS * classes) * _CODES
+    return (_FIXED_LANDMARKS + VIEWS * classes) * _CODES_PER_LANDMARK
 
 
-def relate(
+def locate_and_rank(
     views: Sequence[SeenObjects], plane: TablePlane, classes: Sequence[str]
 ) -> ObjectsInView:
     """Return the objects of pictures with their ranks among their kind.
@@ -117,10 +117,10 @@ def relate(
     """
     positions = plane.find(np.concatenate([view.places for view in views]))
     kinds = [view.kinds for view in views]
-    return rank(kinds, positions, plane.corners, classes)
+    return rank_objects(kinds, positions, plane.corners, classes)
 
 
-def rank(
+def rank_objects(
     views: Sequence[NDArray[np.int64]], positions: Points, corners: Points, classes: Sequence[str]
 ) -> ObjectsInView:
     """Return objects that stand at positions with their ranks among their kind.
@@ -134,14 +134,14 @@ def rank(
     view_numbers = np.repeat(np.arange(len(views)), [len(kinds) for kinds in views])
     scene = _Scene(np.concatenate(list(views)), view_numbers, positions, corners, len(classes))
     relations = np.zeros((len(positions), relation_count(len(classes))), np.uint8)
-    for members in _groups(scene, classes):
-        for order in _orders(members, scene):
+    for members in _groups_of_one_kind(scene, classes):
+        for order in _landmark_orders(members, scene):
             _note_ranks(relations, order)
     stored_positions = positions.astype(np.float32)
     return ObjectsInView(scene.kinds, view_numbers, stored_positions, relations, len(views))
 
 
-def nothing_of(seen: ObjectsInView) -> ObjectsInView:
+def without_objects(seen: ObjectsInView) -> ObjectsInView:
     """Return what is seen of a scene that is not looked at."""
     return ObjectsInView(
         seen.kinds[:0], seen.views[:0], seen.positions[:0], seen.relations[:0], looks=0
@@ -158,7 +158,7 @@ class _Scene(NamedTuple):
     class_count: int
 
 
-def _groups(scene: _Scene, classes: Sequence[str]) -> Iterator[NDArray[np.int64]]:
+def _groups_of_one_kind(scene: _Scene, classes: Sequence[str]) -> Iterator[NDArray[np.int64]]:
     """Yield the numbers of the objects of each kind in each picture.
 
     The kind is the first word of the class: a red and a blue cube are both cubes.
@@ -171,7 +171,7 @@ def _groups(scene: _Scene, classes: Sequence[str]) -> Iterator[NDArray[np.int64]
             yield np.flatnonzero(is_in_view & (names == name))
 
 
-class _Order(NamedTuple):
+class _LandmarkOrder(NamedTuple):
     """Objects with the value by which a landmark, given by its number, orders them."""
 
     landmark: int
@@ -179,20 +179,20 @@ class _Order(NamedTuple):
     values: Points
 
 
-def _orders(members: NDArray[np.int64], scene: _Scene) -> Iterator[_Order]:
+def _landmark_orders(members: NDArray[np.int64], scene: _Scene) -> Iterator[_LandmarkOrder]:
     """Yield the orders of objects of one kind at every landmark."""
     positions = scene.positions[members]
-    yield _Order(0, members, -positions[:, 1])
-    yield _Order(1, members, positions[:, 0])
+    yield _LandmarkOrder(0, members, -positions[:, 1])
+    yield _LandmarkOrder(1, members, positions[:, 0])
     points = np.vstack([[ROBOT_BASE[:2]], scene.corners])
     for number, point in enumerate(points, start=2):
-        yield _Order(number, members, _distances(positions, point))
+        yield _LandmarkOrder(number, members, _distances(positions, point))
 
     for other, position in enumerate(scene.positions):
         rest = members[members != other]
         of_view = int(scene.views[other]) * scene.class_count
         landmark = _FIXED_LANDMARKS + of_view + int(scene.kinds[other])
-        yield _Order(landmark, rest, _distances(scene.positions[rest], position))
+        yield _LandmarkOrder(landmark, rest, _distances(scene.positions[rest], position))
 
 
 def _distances(positions: Points, point: Points) -> Points:
@@ -200,10 +200,10 @@ def _distances(positions: Points, point: Points) -> Points:
     return np.asarray(np.linalg.norm(positions - point, axis=1), np.float64)
 
 
-def _note_ranks(relations: NDArray[np.uint8], order: _Order) -> None:
+def _note_ranks(relations: NDArray[np.uint8], order: _LandmarkOrder) -> None:
     """Mark in `relations` the objects with the least and the greatest values at a landmark."""
     sorted_objects = order.objects[np.argsort(order.values, kind="stable")]
-    column = order.landmark * _CODES
+    column = order.landmark * _CODES_PER_LANDMARK
     for rank_number, least in enumerate(sorted_objects[:_RANKS]):
         relations[least, column + rank_number] = 1
     for rank_number, greatest in enumerate(sorted_objects[::-1][:_RANKS]):

@@ -42,7 +42,7 @@ FORGOTTEN_WORDS = 0.05
 """Share of the words that are unknown in training, so that new ones do no harm."""
 
 
-def said(episodes: Sequence[Episode], plan: ReaderPlan) -> Iterator[tuple[Episode, str]]:
+def instructions_of(episodes: Sequence[Episode], plan: ReaderPlan) -> Iterator[tuple[Episode, str]]:
     """Yield the instructions of episodes, and of more goals of each scene, as a plan has them."""
     known = all_settings()
     for_own_goal = []

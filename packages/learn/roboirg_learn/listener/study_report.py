@@ -30,7 +30,7 @@ _SECTIONS = (
     _Section("Words of the training pool", "train", has_rival=False),
     _Section("Held-out words with rivals", HELD_OUT, has_rival=True),
 )
-_NOTHING = "–"
+_NO_RATE = "–"
 """In the place of a rate that there is not."""
 _NOTE = (
     "Right answers in percent, with the 95 % interval over trainings and scenes: means over tasks "
@@ -68,16 +68,16 @@ def trained_rate(tasks: Sequence[Verdicts]) -> TrainedRate:
     """
     by_seed = np.mean([verdicts.mean(axis=1) for verdicts in tasks], axis=0)
     rate = float(by_seed.mean())
-    apart = _variance_of_mean(tasks, by_seed)
+    variance = _variance_of_mean(tasks, by_seed)
     count = sum(verdicts.shape[1] for verdicts in tasks)
-    if not apart.total:
+    if not variance.total:
         interval: tuple[float, float] = without_spread(rate, count)
     else:
         from scipy import special  # SciPy's statistics take a second to import
 
-        quantile = float(special.stdtrit(apart.freedom, UPPER_END))
-        half = quantile * math.sqrt(apart.total)
-        interval = max(0.0, rate - half), min(1.0, rate + half)
+        quantile = float(special.stdtrit(variance.freedom, UPPER_END))
+        half_width = quantile * math.sqrt(variance.total)
+        interval = max(0.0, rate - half_width), min(1.0, rate + half_width)
     return TrainedRate(rate, interval, tuple(by_seed.tolist()))
 
 
@@ -103,9 +103,9 @@ def _variance_of_mean(tasks: Sequence[Verdicts], by_seed: Verdicts) -> _Variance
     total = trainings + scenes
     if not total:
         return _Variance(0.0, 0.0)
-    of_trainings = trainings**2 / max(1, seeds - 1)
-    of_scenes = scenes**2 / max(1, count - len(tasks))
-    return _Variance(total, total**2 / (of_trainings + of_scenes))
+    trainings_part = trainings**2 / max(1, seeds - 1)
+    scenes_part = scenes**2 / max(1, count - len(tasks))
+    return _Variance(total, total**2 / (trainings_part + scenes_part))
 
 
 def write_study(answers: Iterable[StudyAnswer], about: Mapping[str, Any], folder: Path) -> Path:
@@ -173,7 +173,7 @@ def _rows(
         for setting in settings:
             rate = found.get(ListenerCell(variant.name, pool, setting))
             right.append(_with_interval(rate))
-            by_seed.append(_NOTHING if rate is None else _percent(rate.by_seed))
+            by_seed.append(_NO_RATE if rate is None else _percent(rate.by_seed))
         yield variant.title, "right", right
         yield variant.title, "by seed", by_seed
 
@@ -181,7 +181,7 @@ def _rows(
 def _with_interval(rate: TrainedRate | None) -> str:
     """Return a rate in percent with its interval, as in "50.0 (40.0–60.0)"."""
     if rate is None:
-        return _NOTHING
+        return _NO_RATE
     return f"{_percent([rate.rate])} ({_percent(rate.interval, '–')})"
 
 

@@ -15,16 +15,16 @@ from roboirg_learn.policy.body_layers import HEADS, LAYERS, WIDTH, Join, run_lay
 from roboirg_learn.policy.fast_weights import FastWeightMemory
 from roboirg_learn.policy.frame_memory import EvenFrameMemory, KeptFrameMemory
 from roboirg_learn.policy.memories import (
-    CLOSED,
+    BLOCKED_SCORE,
     Carried,
     LookMemory,
     Looks,
     NoMemory,
     RecurrentMemory,
     Remembered,
-    at_looks,
+    values_at_looks,
 )
-from roboirg_learn.policy.policy_plan import CHOOSES
+from roboirg_learn.policy.policy_plan import KEYFRAME_PLANNER
 from roboirg_learn.policy.subgoal_net import ContextInput, KeepScore, PlannedBatch
 
 MEMORIES: Mapping[str, type[LookMemory]] = {
@@ -58,7 +58,7 @@ class EpisodeBatch(NamedTuple):
         seen: (B, T, K).
         known: (B, T, K).
         tool: (B, T, TOOL_NUMBERS).
-        there: (B, T).
+        has_look: (B, T).
         goals: (B, parts) 1 for each part of the goal.
         decisions: (B, D) looks.
         moves: (B, D) kinds of waypoints; -1 where there is none.
@@ -73,7 +73,7 @@ class EpisodeBatch(NamedTuple):
     seen: Tensor
     known: Tensor
     tool: Tensor
-    there: Tensor
+    has_look: Tensor
     goals: Tensor
     decisions: Tensor
     moves: Tensor
@@ -89,13 +89,13 @@ class BodyAnswer(NamedTuple):
         moves: (B, D, M) logits of kinds of waypoints.
         things: (B, D, M, K) logits of things for each kind.
         done: (B, D, MOST_DONE + 1) logits of how many stages are completed; only learned from.
-        keys: (B, D, RECENT) logits of keeping each of the recent looks; of `CHOOSES` only.
+        keep_scores: (B, D, RECENT) logits of keeping each of the recent looks; of `KEYFRAME_PLANNER` only.
     """
 
     moves: Tensor
     things: Tensor
     done: Tensor
-    keys: Tensor | None = None
+    keep_scores: Tensor | None = None
 
 
 class BodyNet(nn.Module):
@@ -126,7 +126,7 @@ class BodyNet(nn.Module):
         self.key = nn.Linear(WIDTH, WIDTH)
         self.mixed = nn.Linear(WIDTH, WIDTH)
         self.given = ContextInput(context) if context else None
-        self.keeps = KeepScore() if memory == CHOOSES else None
+        self.keeps = KeepScore() if memory == KEYFRAME_PLANNER else None
 
     def forward(self, batch: EpisodeBatch, carried: Carried | None = None) -> BodyAnswer:
         """Return what is said at the decisions; what is carried is as in `Looks`."""
@@ -142,10 +142,10 @@ class BodyNet(nn.Module):
         things = self._thing_scores(robot, tokens[:, 1:], can_choose).unflatten(0, shape)
         moves = self.move(robot).unflatten(0, shape)
         done = self.done(robot).unflatten(0, shape)
-        keys = None
+        keep_scores = None
         if self.keeps is not None:
-            keys = self.keeps(looks, batch.decisions, robot.unflatten(0, shape))
-        return BodyAnswer(moves, things, done, keys)
+            keep_scores = self.keeps(looks, batch.decisions, robot.unflatten(0, shape))
+        return BodyAnswer(moves, things, done, keep_scores)
 
     def _tokens(
         self, batch: EpisodeBatch, goal: Tensor, looks: Looks, remembered: Remembered
@@ -155,10 +155,10 @@ class BodyNet(nn.Module):
         (B * D, 1 + K, WIDTH), the robot's first.
         """
         decisions = batch.decisions
-        things = at_looks(looks.things, decisions) + remembered.things + goal[:, :, None]
-        whole = at_looks(looks.whole, decisions) + remembered.whole
+        things = values_at_looks(looks.things, decisions) + remembered.things + goal[:, :, None]
+        whole = values_at_looks(looks.whole, decisions) + remembered.whole
         if self.given is not None and batch.planned is not None:
-            places = at_looks(batch.places, decisions)
+            places = values_at_looks(batch.places, decisions)
             to_whole, to_things = self.given(batch.planned.context, places)
             whole = whole + to_whole
             things = things + to_things
@@ -178,7 +178,7 @@ class BodyNet(nn.Module):
         queries = self.query.weight[None] + self.mixed(robot)[:, None]
         keys = self.key(things)
         scores = queries @ keys.transpose(1, 2) / math.sqrt(WIDTH)
-        return scores.masked_fill(~can_choose[:, None], CLOSED)
+        return scores.masked_fill(~can_choose[:, None], BLOCKED_SCORE)
 
     def _looks(self, batch: EpisodeBatch, goal: Tensor) -> Looks:
         """Return the looks of a batch, embedded."""
@@ -190,8 +190,8 @@ class BodyNet(nn.Module):
             places=batch.places,
             seen=batch.seen,
             known=batch.known,
-            there=batch.there,
-            kept=None if batch.planned is None else batch.planned.kept,
+            has_look=batch.has_look,
+            kept_looks=None if batch.planned is None else batch.planned.kept_looks,
         )
 
     def _things(self, batch: EpisodeBatch) -> Tensor:

@@ -23,7 +23,7 @@ from torch.nn import functional
 
 from roboirg.extension.commands import write_atomically
 from roboirg_learn.policy.body_net import MOST_DONE, BodyAnswer, BodyNet, EpisodeBatch
-from roboirg_learn.policy.memories import CLOSED
+from roboirg_learn.policy.memories import BLOCKED_SCORE
 from roboirg_learn.policy.moves import LookDecision
 from roboirg_learn.policy.policy_data import (
     EpisodeNumbers,
@@ -32,7 +32,7 @@ from roboirg_learn.policy.policy_data import (
 )
 from roboirg_learn.policy.policy_plan import BodyPlan, Recorded
 from roboirg_learn.policy.sight import Sight
-from roboirg_learn.policy.subgoal_training import with_planned
+from roboirg_learn.policy.subgoal_training import with_planner_inputs
 from roboirg_learn.policy.trained_body import GoalLayout, Kind, make_body
 from roboirg_learn.trainer import Course, KeptTraining, Progress, Training, even_batches
 
@@ -153,7 +153,7 @@ class BodyCourse(Course[EpisodeNumbers]):
         goal = self._layout.goals.of_episode(recorded.episode)
         numbers = {kind: number for number, kind in enumerate(kinds)}
         episode = to_numbers(recorded.recording, lesson.decisions, goal, sight, numbers, rng)
-        return with_planned(self._plan.memory, recorded, episode, len(kinds), sight, rng)
+        return with_planner_inputs(self._plan.memory, recorded, episode, len(kinds), sight, rng)
 
 
 def held_back(tasks: Sequence[str]) -> list[bool]:
@@ -187,12 +187,12 @@ def body_loss(body: BodyNet, batch: EpisodeBatch) -> Tensor:
     choices = _thing_choices(answer.things, batch)
     if len(choices.right):
         loss = loss + functional.cross_entropy(choices.scores, choices.right)
-    if answer.keys is not None and batch.planned is not None:
-        loss = loss + _keys_loss(answer.keys, batch.planned.keys)
+    if answer.keep_scores is not None and batch.planned is not None:
+        loss = loss + _keep_loss(answer.keep_scores, batch.planned.to_keep)
     return loss
 
 
-def _keys_loss(scores: Tensor, wanted: Tensor) -> Tensor:
+def _keep_loss(scores: Tensor, wanted: Tensor) -> Tensor:
     """Return the loss of which looks are kept; wanted is 1 or 0, or -1 where there is no look."""
     has_look = wanted >= 0
     return functional.binary_cross_entropy_with_logits(scores[has_look], wanted[has_look].float())
@@ -217,7 +217,7 @@ def _thing_choices(things: Tensor, batch: EpisodeBatch) -> ThingChoices:
     scores = things[is_at_thing].gather(1, kinds)[:, 0]
     right = batch.things[is_at_thing]
     # What is not seen cannot be chosen without memory.
-    is_possible = scores.gather(1, right[:, None])[:, 0] > CLOSED / 2
+    is_possible = scores.gather(1, right[:, None])[:, 0] > BLOCKED_SCORE / 2
     return ThingChoices(scores[is_possible], right[is_possible])
 
 

@@ -29,16 +29,16 @@ from roboirg_learn.policy.memories import (
     Looks,
     MaskedTokens,
     Remembered,
-    at_frames,
-    seen_now,
+    choose_only_seen,
+    tokens_at_looks,
 )
 
 FAST_HEADS = 2
 HEAD_WIDTH = WIDTH // FAST_HEADS
 EXPERT_WIDTH = WIDTH // 2
-LAST = 8
+READ_LOOKS = 8
 """Looks whose tokens the body sees, the present one included."""
-RATE = 0.01
+INITIAL_RATE = 0.01
 """Inner rate before anything is learned."""
 MOST_RATE = 0.1
 """The greatest inner rate."""
@@ -143,14 +143,14 @@ class FastWeightMemory(LookMemory):
         tokens = self.frames(looks)
         given = self._through_time(tokens, looks.carried or Carried())
         values = tokens.values + self.out(self.norm(given))
-        recent = decisions[..., None] - torch.arange(LAST - 1, -1, -1)
-        narrow = at_frames(MaskedTokens(self.narrow(values), tokens.there), recent)
+        recent = decisions[..., None] - torch.arange(READ_LOOKS - 1, -1, -1)
+        narrow = tokens_at_looks(MaskedTokens(self.narrow(values), tokens.mask), recent)
         joins: list[Join] = []
         for layer in self.layers:
             values, join = layer(narrow)
             narrow = narrow._replace(values=values)
             joins.append(join)
-        return seen_now(looks, decisions, joins)
+        return choose_only_seen(looks, decisions, joins)
 
     def _through_time(self, tokens: MaskedTokens, carried: Carried) -> Tensor:
         """Return what the weights give at each look (B, T, m, WIDTH), after its own update.
@@ -158,7 +158,7 @@ class FastWeightMemory(LookMemory):
         At looks that were taken in before it is what was given then.
         """
         count = tokens.values.shape[2]
-        new = MaskedTokens(tokens.values[:, carried.looks :], tokens.there[:, carried.looks :])
+        new = MaskedTokens(tokens.values[:, carried.looks :], tokens.mask[:, carried.looks :])
         steps = self._inner_steps(new)
         fast, given = self._first_state(new, carried)
         norm = FastNorm(self.scale, self.shift)
@@ -178,7 +178,7 @@ class FastWeightMemory(LookMemory):
 
     def _inner_steps(self, tokens: MaskedTokens) -> list[InnerStep]:
         """Return what the weights are updated and read with at each look."""
-        batch, length, count = tokens.there.shape
+        batch, length, count = tokens.mask.shape
         projected = self.projected(tokens.values)
         thirds = projected.reshape(batch, length, count, 3, FAST_HEADS, HEAD_WIDTH).unbind(3)
         looks = []
@@ -189,16 +189,16 @@ class FastWeightMemory(LookMemory):
 
     def _rates(self, tokens: MaskedTokens) -> Tensor:
         """Return the inner rate (B, T, heads, m, 1) of each token; 0 for one that is not there."""
-        start = math.log(math.expm1(RATE))
+        start = math.log(math.expm1(INITIAL_RATE))
         rates = functional.softplus(self.rate(tokens.values) + start).clamp(0.0, MOST_RATE)
-        return (rates * tokens.there[..., None]).transpose(2, 3)[..., None]
+        return (rates * tokens.mask[..., None]).transpose(2, 3)[..., None]
 
     def _first_state(self, tokens: MaskedTokens, carried: Carried) -> FastState:
         """Return the state before the new looks, whose tokens these are."""
         if carried.state is not None:
             state: FastState = carried.state
             return state
-        batch, _, count = tokens.there.shape
+        batch, _, count = tokens.mask.shape
         weights = self.weights.expand(batch, -1, -1, -1)
         biases = tokens.values.new_zeros(batch, FAST_HEADS, 1, HEAD_WIDTH)
         return FastState(Fast(weights, biases), tokens.values.new_zeros(batch, 0, count, WIDTH))
@@ -225,11 +225,11 @@ class ExpertLayer(nn.Module):
         """
         projected = self.projected(self.norm1(tokens.values))
         queries, keys, values = (split_heads(part, HEADS) for part in projected.chunk(3, -1))
-        open_to = tokens.there[:, None, None]
+        open_to = tokens.mask[:, None, None]
         found = functional.scaled_dot_product_attention(queries, keys, values, open_to)
         attended = tokens.values + self.out(join_heads(found))
         after = attended + self.feed(self.norm2(attended))
-        return after, ExpertJoin(keys, values, tokens.there)
+        return after, ExpertJoin(keys, values, tokens.mask)
 
 
 class ExpertJoin(Join):
@@ -238,15 +238,15 @@ class ExpertJoin(Join):
     Things do not see them.
     """
 
-    def __init__(self, keys: Tensor, values: Tensor, there: Tensor) -> None:
+    def __init__(self, keys: Tensor, values: Tensor, mask: Tensor) -> None:
         self._keys = keys
         self._values = values
-        self._there = there
+        self._mask = mask
 
     def attended(self, keys: Tensor, values: Tensor, seen: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Return the keys and values of the tokens and of the memory's."""
         is_first = torch.arange(keys.shape[2], device=keys.device) == 0
-        added = is_first[None, None, :, None] & self._there[:, None, None]
+        added = is_first[None, None, :, None] & self._mask[:, None, None]
         every_key = torch.cat([keys, self._keys], 2)
         every_value = torch.cat([values, self._values], 2)
         return every_key, every_value, torch.cat([seen, added], -1)

@@ -18,16 +18,16 @@ from torch.nn import functional
 
 from roboirg_learn.policy.body_layers import WIDTH, Join
 
-CLOSED = -1e4
+BLOCKED_SCORE = -1e4
 """Score of a thing that cannot be chosen."""
 TIME_WAVES = 8
 """Sines and cosines that encode a look's number in frames."""
-SLOWEST = 100.0
+SLOWEST_WAVE = 100.0
 """Looks in a radian of the slowest of them."""
 NEARNESS_PER_METER = 25.0
-ALONE = -3.0
+NO_NEIGHBOR_SCORE = -3.0
 """Score of the extra place at which a thing that is alone looks."""
-LEAST = -2.0
+UNKNOWN_THING = -2.0
 """Stands for things that are not known in a maximum."""
 
 
@@ -53,8 +53,8 @@ class Looks(NamedTuple):
         places: (B, T, K, 2) x and y on the table, m.
         seen: (B, T, K) whether the look shows the thing.
         known: (B, T, K) whether it was seen until then, often enough to be no mistake.
-        there: (B, T) whether the episode has the look.
-        kept: (B, D, S) looks that a planner keeps at each decision, -1 for none.
+        has_look: (B, T) whether the episode has the look.
+        kept_looks: (B, D, S) looks that a planner keeps at each decision, -1 for none.
         carried: what a memory knows of the first looks, and updates; None before the first look.
             Decisions are at looks that are new.
     """
@@ -65,8 +65,8 @@ class Looks(NamedTuple):
     places: Tensor
     seen: Tensor
     known: Tensor
-    there: Tensor
-    kept: Tensor | None = None
+    has_look: Tensor
+    kept_looks: Tensor | None = None
     carried: Carried | None = None
 
 
@@ -99,20 +99,20 @@ class LookMemory(nn.Module, ABC):
         """
 
 
-def at_looks(values: Tensor, decisions: Tensor) -> Tensor:
+def values_at_looks(values: Tensor, decisions: Tensor) -> Tensor:
     """Return the values (B, T, …) at looks (B, D)."""
     rows = torch.arange(len(values), device=values.device)[:, None]
     return values[rows, decisions]
 
 
 class MaskedTokens(NamedTuple):
-    """Tokens, and which of them there are."""
+    """Tokens (…, m, width), and a mask (…, m): False for padding."""
 
     values: Tensor
-    there: Tensor
+    mask: Tensor
 
 
-def at_frames(tokens: MaskedTokens, frames: Tensor) -> MaskedTokens:
+def tokens_at_looks(tokens: MaskedTokens, frames: Tensor) -> MaskedTokens:
     """Return the tokens of some looks for each decision, in sequences; m tokens of each look.
 
     Args:
@@ -124,11 +124,11 @@ def at_frames(tokens: MaskedTokens, frames: Tensor) -> MaskedTokens:
     """
     looks = frames.clamp(min=0).flatten(1)
     is_look = (frames >= 0).flatten(1)
-    there = at_looks(tokens.there, looks) & is_look[..., None]
+    mask = values_at_looks(tokens.mask, looks) & is_look[..., None]
     batch, decisions, count = frames.shape
-    shape = batch * decisions, count * there.shape[-1]
-    values = at_looks(tokens.values, looks).reshape(*shape, -1)
-    return MaskedTokens(values, there.reshape(shape))
+    shape = batch * decisions, count * mask.shape[-1]
+    values = values_at_looks(tokens.values, looks).reshape(*shape, -1)
+    return MaskedTokens(values, mask.reshape(shape))
 
 
 class FrameTokens(nn.Module):
@@ -143,23 +143,23 @@ class FrameTokens(nn.Module):
         """Return tokens (B, T, 1 + K, WIDTH) of all looks, the robot's first."""
         tool = looks.tool[:, :, None]
         tokens = torch.cat([tool, looks.things], 2)
-        there = torch.cat([looks.there[..., None], looks.seen], 2)
+        mask = torch.cat([looks.has_look[..., None], looks.seen], 2)
         with_tool = torch.cat([tokens, tool.expand_as(tokens)], -1)
-        return MaskedTokens(self.mixed(with_tool) + self._times(tokens.shape[1]), there)
+        return MaskedTokens(self.mixed(with_tool) + self._times(tokens.shape[1]), mask)
 
     def _times(self, length: int) -> Tensor:
         """Return the encoded number of each look (T, 1, WIDTH)."""
-        speeds = SLOWEST ** -torch.linspace(0, 1, TIME_WAVES)
+        speeds = SLOWEST_WAVE ** -torch.linspace(0, 1, TIME_WAVES)
         angles = torch.arange(length)[:, None] * speeds
         times: Tensor = self.time(torch.cat([angles.sin(), angles.cos()], -1))
         return times[:, None]
 
 
-def seen_now(looks: Looks, decisions: Tensor, joins: Sequence[Join] = ()) -> Remembered:
+def choose_only_seen(looks: Looks, decisions: Tensor, joins: Sequence[Join] = ()) -> Remembered:
     """Return that only what is seen now can be chosen, and what a memory does in each layer."""
-    things = torch.zeros_like(at_looks(looks.things, decisions))
-    whole = torch.zeros_like(at_looks(looks.whole, decisions))
-    can_choose = at_looks(looks.seen & looks.known, decisions)
+    things = torch.zeros_like(values_at_looks(looks.things, decisions))
+    whole = torch.zeros_like(values_at_looks(looks.whole, decisions))
+    can_choose = values_at_looks(looks.seen & looks.known, decisions)
     return Remembered(things, whole, can_choose, joins)
 
 
@@ -167,7 +167,7 @@ class NoMemory(LookMemory):
     """Remembers nothing."""
 
     def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
-        return seen_now(looks, decisions)
+        return choose_only_seen(looks, decisions)
 
 
 class RecurrentState(NamedTuple):
@@ -186,7 +186,7 @@ class _LookInput(NamedTuple):
         near: (B, K, K) the weights with which things see others.
         is_updated: (B, K, 1) whether the look shows the thing.
         known: (B, K, 1) whether it was seen often enough.
-        there: (B, 1) whether the episode has the look.
+        has_look: (B, 1) whether the episode has the look.
     """
 
     thing: Tensor
@@ -194,7 +194,7 @@ class _LookInput(NamedTuple):
     near: Tensor
     is_updated: Tensor
     known: Tensor
-    there: Tensor
+    has_look: Tensor
 
 
 class RecurrentMemory(LookMemory):
@@ -202,8 +202,8 @@ class RecurrentMemory(LookMemory):
 
     def __init__(self) -> None:
         super().__init__()
-        self.thing = _PartedCell()
-        self.whole = _PartedCell()
+        self.thing = _ThreeInputCell()
+        self.whole = _ThreeInputCell()
         self.nearness = nn.Parameter(torch.tensor(1.0))
         self.pool = nn.Linear(WIDTH, 1)
 
@@ -211,16 +211,16 @@ class RecurrentMemory(LookMemory):
         carried = looks.carried or Carried()
         first_new = carried.looks
         states = [self._first_state(looks, carried)]
-        for inputs in self._inputs(looks, first_new):
-            states.append(self._after(states[-1], inputs))
+        for inputs in self._cell_inputs(looks, first_new):
+            states.append(self._next_state(states[-1], inputs))
         carried.looks = looks.things.shape[1]
         carried.state = states[-1]
 
         numbers = decisions - first_new + 1
         return Remembered(
-            at_looks(torch.stack([state.things for state in states], 1), numbers),
-            at_looks(torch.stack([state.whole for state in states], 1), numbers),
-            at_looks(looks.known, decisions),
+            values_at_looks(torch.stack([state.things for state in states], 1), numbers),
+            values_at_looks(torch.stack([state.whole for state in states], 1), numbers),
+            values_at_looks(looks.known, decisions),
         )
 
     def _first_state(self, looks: Looks, carried: Carried) -> RecurrentState:
@@ -233,20 +233,20 @@ class RecurrentMemory(LookMemory):
         added = count - things.shape[1]
         return RecurrentState(functional.pad(things, (0, 0, 0, added)), whole)
 
-    def _inputs(self, looks: Looks, first_new: int) -> Iterator[_LookInput]:
+    def _cell_inputs(self, looks: Looks, first_new: int) -> Iterator[_LookInput]:
         """Yield what the cells are given at each new look; computed for all looks at once."""
         parts = [
             self.thing.first(looks.things[:, first_new:]),
             self.whole.first(looks.whole[:, first_new:]),
             self._nearness(looks)[:, first_new:],
-            (looks.seen & looks.there[..., None])[:, first_new:, :, None],
+            (looks.seen & looks.has_look[..., None])[:, first_new:, :, None],
             looks.known[:, first_new:, :, None],
-            looks.there[:, first_new:, None],
+            looks.has_look[:, first_new:, None],
         ]
         for look in zip(*(part.unbind(1) for part in parts), strict=True):
             yield _LookInput(*look)
 
-    def _after(self, state: RecurrentState, look: _LookInput) -> RecurrentState:
+    def _next_state(self, state: RecurrentState, look: _LookInput) -> RecurrentState:
         """Return the state after a look."""
         things, whole = state
         around = look.near @ things
@@ -254,7 +254,7 @@ class RecurrentMemory(LookMemory):
         things = torch.where(look.is_updated, updated, things)
         mean, most = self._summary(things, look.known)
         updated = self.whole(look.whole, mean, most, whole)
-        return RecurrentState(things, torch.where(look.there, updated, whole))
+        return RecurrentState(things, torch.where(look.has_look, updated, whole))
 
     def _nearness(self, looks: Looks) -> Tensor:
         """Return the weights (B, T, K, K) with which things see those known before, by distance."""
@@ -265,19 +265,19 @@ class RecurrentMemory(LookMemory):
         is_closed = ~was_known[:, :, None, :] | is_itself
         scores = (-far).masked_fill(is_closed, -math.inf)
         # A thing that is alone sees nothing: an extra place holds zeros.
-        alone = far.new_full((*far.shape[:-1], 1), ALONE)
+        alone = far.new_full((*far.shape[:-1], 1), NO_NEIGHBOR_SCORE)
         return torch.cat([scores, alone], -1).softmax(-1)[..., :-1]
 
     def _summary(self, things: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
         """Return a weighted mean and the maximum (B, WIDTH) of things (B, K, …) known (B, K, 1)."""
-        scores = self.pool(things).masked_fill(~known, CLOSED)
+        scores = self.pool(things).masked_fill(~known, BLOCKED_SCORE)
         weights = scores.softmax(1) * known
         mean = weights.transpose(1, 2) @ things
-        most = things.masked_fill(~known, LEAST).amax(1)
+        most = things.masked_fill(~known, UNKNOWN_THING).amax(1)
         return mean[:, 0], most
 
 
-class _PartedCell(nn.Module):
+class _ThreeInputCell(nn.Module):
     """A gated recurrent unit with three inputs, of which the first is known for all looks."""
 
     def __init__(self) -> None:

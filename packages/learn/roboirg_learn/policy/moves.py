@@ -22,11 +22,11 @@ HOME = (math.pi, 0.0, 0.0)
 """Roll, pitch and yaw of the tool at the beginning, rad."""
 STAY = "stay"
 """The turn of a tool that stays where it is while the gripper opens or closes."""
-LEAVE = 0.0
+GRIPPER_UNCHANGED = 0.0
 """Gripper value of a waypoint that neither opens nor closes it."""
 XY_GRID = 0.1
 """Meters to which a way in the plane from the tool's place is rounded."""
-RAREST = 0.0005
+LEAST_SHARE = 0.0005
 """Share of all waypoints; kinds that are rarer are not learned."""
 
 
@@ -70,9 +70,9 @@ def decisions_of(recorded: ExpertRecording) -> list[LookDecision]:
     found: list[LookDecision] = []
     for number, look in enumerate(recorded.looks.tolist()):
         move = _move_of(recorded, number)
-        has_open_end = bool(found) and found[-1].move.gripper == LEAVE
-        if move.gripper != LEAVE and has_open_end:
-            _end_with(found, move.gripper)
+        has_open_end = bool(found) and found[-1].move.gripper == GRIPPER_UNCHANGED
+        if move.gripper != GRIPPER_UNCHANGED and has_open_end:
+            _set_gripper_at_end(found, move.gripper)
         else:
             found.append(LookDecision(look, move, int(recorded.anchors[number])))
     return found
@@ -84,7 +84,7 @@ def _move_of(recorded: ExpertRecording, number: int) -> Move:
     action = recorded.actions[number]
     at_thing = bool(recorded.anchors[number] >= 0)
     gripper = float(action[-1])
-    if gripper != LEAVE:
+    if gripper != GRIPPER_UNCHANGED:
         return Move(at_thing, 0.0, 0.0, 0.0, STAY, gripper)
     x, y, z = action[:3] - np.append(recorded.tool[look, :2], 0.0)
     height = _round(z, Z_GRID)
@@ -94,7 +94,7 @@ def _move_of(recorded: ExpertRecording, number: int) -> Move:
     return Move(at_thing, _round(x, XY_GRID), _round(y, XY_GRID), height, turn, gripper)
 
 
-def _end_with(found: list[LookDecision], gripper: float) -> None:
+def _set_gripper_at_end(found: list[LookDecision], gripper: float) -> None:
     """Let the last move open or close the gripper, and the same before it that were not made.
 
     A move that is not made is decided again at the next look, and so stands several times.
@@ -113,7 +113,7 @@ def common_moves(decisions: Iterable[Sequence[LookDecision]]) -> tuple[Move, ...
     counts: Counter[Move] = Counter()
     for of_episode in decisions:
         counts.update(decision.move for decision in of_episode)
-    least = RAREST * counts.total()
+    least = LEAST_SHARE * counts.total()
     return tuple(move for move, count in counts.most_common() if count >= least)
 
 

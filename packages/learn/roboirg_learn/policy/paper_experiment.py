@@ -38,7 +38,7 @@ PARTS: Mapping[str, str] = {
 """The packaged plan that each part of the experiment changes. Resolved forms join the main run."""
 HELD_OUT = "test"
 """The pool of words that is spoken in every split: that of the packaged plans' split."""
-OWN_TASKS = (CONTEXT, PLANNER)
+PARTS_WITH_OWN_TASKS = (CONTEXT, PLANNER)
 """Parts with three tasks of their own."""
 RUNS = "runs"
 """Folder of the runs."""
@@ -135,16 +135,16 @@ def part_options(
     if changes.get("split", options["split"]) != options["split"]:
         options["wordings"] = HELD_OUT
     for name, value in changes.items():
-        is_fixed = name == "tasks" and part in OWN_TASKS
+        is_fixed = name == "tasks" and part in PARTS_WITH_OWN_TASKS
         if not is_fixed:
             options[name] = value
     options["policy"] = {row: of_row.spec for row, of_row in files.items()}
     if part == PLANNER:
-        options["policy"] = _with_planners(experiment, options["policy"])
+        options["policy"] = _planner_pairings(experiment, options["policy"])
     return options
 
 
-def _with_planners(experiment: ExperimentPlan, rows: Mapping[str, str]) -> dict[str, str]:
+def _planner_pairings(experiment: ExperimentPlan, rows: Mapping[str, str]) -> dict[str, str]:
     """Return the rows with planners, and the same hands and planners with others.
 
     The stronger planner is the interpreter of the words; the stronger hands are the scripted ones.

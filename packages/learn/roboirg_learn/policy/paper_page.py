@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 EXPLICIT = "explicit"
-FIRST = row_name("none")
+WITHOUT_MEMORY_ROW = row_name("none")
 """The row that the others are compared with."""
-WITHOUT_MEMORY, *OTHER_SYSTEMS = SYSTEMS.values()
+WITHOUT_MEMORY_SYSTEM, *OTHER_SYSTEMS = SYSTEMS.values()
 """The paper's system that the others are compared with, and these."""
-LESS_FIRST = "less that of the row without memory, in points"
+LESS_WITHOUT_MEMORY = "less that of the row without memory, in points"
 TRIALS = 150
 """Rollouts behind a published rate."""
 Z_95 = 1.96
@@ -65,13 +65,13 @@ def answers_text(frames: Mapping[str, pd.DataFrame]) -> str:
     """
     sections: list[str] = []
     if MAIN in frames:
-        sections += _main_questions(_told(frames[MAIN]))
+        sections += _main_questions(_with_words(frames[MAIN]))
     if CONTEXT in frames:
-        sections.append(_stage_question(_told(frames[CONTEXT])))
+        sections.append(_stage_question(_with_words(frames[CONTEXT])))
     return "\n\n".join(sections)
 
 
-def _told(frame: pd.DataFrame) -> pd.DataFrame:
+def _with_words(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the episodes in which the instruction was told, not withheld."""
     return frame[frame["arm"] == "told"]
 
@@ -94,7 +94,7 @@ class _Published:
         for system in SYSTEMS.values():
             explicit = self.rates(system, EXPLICIT)
             found[system] = {
-                name: _independent(self.rates(system, name), explicit) for name in settings
+                name: _published_difference(self.rates(system, name), explicit) for name in settings
             }
         return found
 
@@ -102,17 +102,17 @@ class _Published:
         """Return by system, for each setting, its success less that of the one without memory."""
         found: dict[str, dict[str, Difference]] = {system: {} for system in OTHER_SYSTEMS}
         for name in settings:
-            first = self.rates(WITHOUT_MEMORY, name)
+            first = self.rates(WITHOUT_MEMORY_SYSTEM, name)
             for system, gains in found.items():
-                gains[name] = _independent(self.rates(system, name), first)
+                gains[name] = _published_difference(self.rates(system, name), first)
         return found
 
 
-def _main_questions(told: pd.DataFrame) -> Iterator[str]:
+def _main_questions(with_words: pd.DataFrame) -> Iterator[str]:
     """Yield the sections that the main experiment answers, each a table."""
     settings = [name for name in plain_settings() if name != EXPLICIT]
     published = _Published()
-    played = told[told["form"] == "implicit"]
+    played = with_words[with_words["form"] == "implicit"]
     changes = _gaps(played, "setting", {"setting": EXPLICIT})
     yield _table(
         "Does explicit success carry over, and which setting costs most?",
@@ -120,11 +120,11 @@ def _main_questions(told: pd.DataFrame) -> Iterator[str]:
         settings,
         {**changes, **published.changes(settings)},
     )
-    if FIRST in set(played["policy"]):
+    if WITHOUT_MEMORY_ROW in set(played["policy"]):
         yield _memory_question(played, [EXPLICIT, *settings], published)
         yield _group_question(played[played["setting"] == EXPLICIT], published)
     yield _retention(settings, changes, published)
-    resolved = _gaps(told, "setting", {"form": "implicit"}, form="resolved")
+    resolved = _gaps(with_words, "setting", {"form": "implicit"}, form="resolved")
     if resolved:
         yield _table(
             "Do resolved forms recover it?",
@@ -136,10 +136,10 @@ def _main_questions(told: pd.DataFrame) -> Iterator[str]:
 
 def _memory_question(played: pd.DataFrame, settings: Sequence[str], published: _Published) -> str:
     """Return by setting what memory adds."""
-    gaps = _gaps(played, "setting", {"policy": FIRST})
+    gaps = _gaps(played, "setting", {"policy": WITHOUT_MEMORY_ROW})
     return _table(
         "Do memory and referring come apart?",
-        f"Success {LESS_FIRST}.",
+        f"Success {LESS_WITHOUT_MEMORY}.",
         settings,
         {**gaps, **published.gains(settings)},
     )
@@ -152,17 +152,17 @@ def _group_question(explicit: pd.DataFrame, published: _Published) -> str:
     tasks_of: dict[str, set[str]] = {}
     found: dict[str, dict[str, Any]] = {}
     for frame in (explicit, filmed):
-        if FIRST not in set(frame["policy"]):
+        if WITHOUT_MEMORY_ROW not in set(frame["policy"]):
             continue
         for group, tasks in frame.groupby("suite", sort=False)["task"]:
             tasks_of[str(group)] = set(tasks)
-        for row, gaps in _gaps(frame, "suite", {"policy": FIRST}).items():
+        for row, gaps in _gaps(frame, "suite", {"policy": WITHOUT_MEMORY_ROW}).items():
             found.setdefault(row, {}).update(gaps)
     for system in OTHER_SYSTEMS:
         found[system] = _published_gains(system, tasks_of, published)
     return _table(
         "Where does memory help?",
-        f"Explicit success {LESS_FIRST}, by group of tasks.",
+        f"Explicit success {LESS_WITHOUT_MEMORY}, by group of tasks.",
         list(tasks_of),
         found,
     )
@@ -172,32 +172,32 @@ def _published_gains(
     system: str, tasks_of: Mapping[str, set[str]], published: _Published
 ) -> dict[str, Difference]:
     """Return by group of tasks the explicit success of a system less that without memory."""
-    first = published.rates(WITHOUT_MEMORY, EXPLICIT)
+    first = published.rates(WITHOUT_MEMORY_SYSTEM, EXPLICIT)
     gains = {}
     for group, tasks in tasks_of.items():
         rates = published.rates(system, EXPLICIT).items()
         of_group = {task: rate for task, rate in rates if task in tasks}
-        gains[group] = _independent(of_group, first)
+        gains[group] = _published_difference(of_group, first)
     return gains
 
 
-def _stage_question(told: pd.DataFrame) -> str:
+def _stage_question(with_words: pd.DataFrame) -> str:
     """Return what each further stage of the context costs."""
     rows = published_rows("context")
     shortest = min(rows, key=lambda row: len(row.options.stages)).label
     longer = [label for label in dict.fromkeys(row.label for row in rows) if label != shortest]
     rates = {(row.model, row.label): row.rates for row in rows}
-    theirs: dict[str, dict[str, Difference]] = {}
+    published_gaps: dict[str, dict[str, Difference]] = {}
     for row in rows:
         if row.label != shortest:
-            difference = _independent(row.rates, rates[row.model, shortest])
-            theirs.setdefault(row.model, {})[row.label] = difference
-    gaps = _gaps(told, "instruction_options", {"instruction_options": shortest})
+            difference = _published_difference(row.rates, rates[row.model, shortest])
+            published_gaps.setdefault(row.model, {})[row.label] = difference
+    gaps = _gaps(with_words, "instruction_options", {"instruction_options": shortest})
     return _table(
         "Does success fall with each stage of the context?",
         f"Success less that in {shortest}, in points.",
         longer,
-        {**gaps, **theirs},
+        {**gaps, **published_gaps},
     )
 
 
@@ -213,7 +213,7 @@ def _gaps(
     return {row: gaps for row, gaps in found.items() if gaps}
 
 
-def _independent(first: Rates, second: Rates) -> Difference:
+def _published_difference(first: Rates, second: Rates) -> Difference:
     """Return the difference of published rates, the mean over the tasks of the first.
 
     The trials of two published cells are taken as independent, as only their rates are known.
@@ -251,7 +251,7 @@ def _retention(settings: Sequence[str], changes: Differences, published: _Publis
         for setting in settings:
             percent = _percent_kept(published.rates(system, setting), explicit)
             of_system[setting] = f"{percent:.0f}"
-    rows = [("", row, _in_columns(texts, settings)) for row, texts in cells.items()]
+    rows = [("", row, _cells_of_row(texts, settings)) for row, texts in cells.items()]
     note = "Success in each setting by explicit success, in percent."
     return markdown_table("Do planners keep more?", settings, rows, (note,))
 
@@ -280,11 +280,11 @@ def _table(title: str, note: str, columns: Sequence[str], found: Differences) ->
             texts[name] = _with_interval(
                 100 * difference.value, difference.interval, form, "{:+.0f}"
             )
-        rows.append(("", row, _in_columns(texts, columns)))
+        rows.append(("", row, _cells_of_row(texts, columns)))
     return markdown_table(title, columns, rows, (note, _POINTS))
 
 
-def _in_columns(texts: Mapping[str, str], columns: Sequence[str]) -> list[str]:
+def _cells_of_row(texts: Mapping[str, str], columns: Sequence[str]) -> list[str]:
     """Return the cells of a row; a dash where there is none."""
     return [texts.get(name, "–") for name in columns]
 

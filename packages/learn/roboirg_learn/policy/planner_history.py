@@ -14,15 +14,15 @@ from roboirg_learn.policy.subgoals import POINT_NUMBERS
 
 VIDEO_FRAMES = 10
 """Most looks of the video that are kept."""
-SWITCHES = 4
+MAX_SWITCHES = 4
 """Most looks at changes of subgoal that are kept."""
-KEYS = 16
+MAX_CHOSEN = 16
 """Most chosen looks that are kept."""
 RECENT = 8
 """Recent looks that are kept, and among which a planner chooses."""
 NO_LOOK = -1
 """In the place of a look's number where there is none."""
-LONGEST = 40
+MAX_LOOKS_SINCE = 40
 """Looks since a subgoal was named; more count as this many."""
 
 
@@ -31,16 +31,16 @@ class PlannedNumbers(NamedTuple):
 
     Attributes:
         context: (D, C) the subgoal asked for, or what was named before; `POINT_NUMBERS` at the end.
-        kept: (D, S) numbers of looks that a planner keeps; -1 for none.
-        keys: (D, RECENT) whether each of the recent looks is to be kept; -1 where there is none.
+        kept_looks: (D, S) numbers of looks that a planner keeps; -1 for none.
+        to_keep: (D, RECENT) whether each of the recent looks is to be kept; -1 where there is none.
     """
 
     context: NDArray[np.float32]
-    kept: NDArray[np.int64]
-    keys: NDArray[np.int64]
+    kept_looks: NDArray[np.int64]
+    to_keep: NDArray[np.int64]
 
 
-def asked_for(rows: Sequence[NDArray[np.float32]]) -> PlannedNumbers:
+def requests_for_hands(rows: Sequence[NDArray[np.float32]]) -> PlannedNumbers:
     """Return what hands are given that follow subgoals, as `asked_numbers` returns them."""
     no_looks = np.full((len(rows), 1), NO_LOOK, np.int64)
     no_keys = np.full((len(rows), RECENT), NO_LOOK, np.int64)
@@ -61,31 +61,31 @@ class PlannerHistory:
     def __init__(self, forms: int, *, chooses: bool) -> None:
         self._forms = forms
         self._chooses = chooses
-        self._named: list[int] = []
+        self._forms_named: list[int] = []
         self.switches: list[int] = []
-        self._keys: tuple[int, ...] = ()
+        self._chosen_looks: tuple[int, ...] = ()
 
     def name(self, form: int, look: int) -> None:
         """Remember a subgoal; the same again is the same one."""
-        if not self._named or self._named[-1] != form:
-            self._named.append(form)
+        if not self._forms_named or self._forms_named[-1] != form:
+            self._forms_named.append(form)
             self.switches.append(look)
 
     def choose(self, looks: Iterable[int]) -> None:
         """Keep some looks; those in a row become one."""
-        steps = [look * LOOK_EVERY for look in (*self._keys, *looks)]
-        self._keys = tuple(step // LOOK_EVERY for step in merge_keyframes(steps))
+        steps = [look * LOOK_EVERY for look in (*self._chosen_looks, *looks)]
+        self._chosen_looks = tuple(step // LOOK_EVERY for step in merge_keyframes(steps))
 
     def context(self, look: int) -> NDArray[np.float32]:
         """Return how often each form was done, which is under way, and since when."""
         done = np.zeros(self._forms)
         under_way = np.zeros(self._forms)
         since = 0.0
-        if self._named:
-            *earlier, present = self._named
+        if self._forms_named:
+            *earlier, present = self._forms_named
             np.add.at(done, np.array(earlier, int), 1.0)
             under_way[present] = 1.0
-            since = min(look - self.switches[-1], LONGEST) / LONGEST
+            since = min(look - self.switches[-1], MAX_LOOKS_SINCE) / MAX_LOOKS_SINCE
         point = np.zeros(POINT_NUMBERS)
         return np.concatenate([done, under_way, [since], point], dtype=np.float32)
 
@@ -99,13 +99,13 @@ class PlannerHistory:
         count = min(video, VIDEO_FRAMES)
         looks = np.linspace(0, video - 1, count).round().astype(int).tolist()
         if self._chooses:
-            looks += self._keys[-KEYS:]
+            looks += self._chosen_looks[-MAX_CHOSEN:]
             looks += recent_looks(look)
-            size = VIDEO_FRAMES + KEYS + RECENT
+            size = VIDEO_FRAMES + MAX_CHOSEN + RECENT
         else:
-            looks += self.switches[-SWITCHES:]
+            looks += self.switches[-MAX_SWITCHES:]
             looks.append(look)
-            size = VIDEO_FRAMES + SWITCHES + 1
+            size = VIDEO_FRAMES + MAX_SWITCHES + 1
         kept = np.full(size, NO_LOOK, np.int64)
         kept[: len(looks)] = looks
         return kept
@@ -121,7 +121,7 @@ def context_size(forms: int) -> int:
     return 2 * forms + 1 + POINT_NUMBERS
 
 
-def replayed(
+def ideal_planner_inputs(
     forms: NDArray[np.int64], looks: NDArray[np.int64], video: int, size: int, *, chooses: bool
 ) -> PlannedNumbers:
     """Return what a planner would be given that names what is due, and chooses where it changes.
@@ -146,11 +146,11 @@ def replayed(
             history.name(form, look)
             if history.switches[-1] == look:
                 history.choose([look])
-        keys.append(_right_keys(look, history.switches, is_named=form >= 0))
+        keys.append(_keep_labels(look, history.switches, is_named=form >= 0))
     return PlannedNumbers(np.stack(context), np.stack(kept), np.stack(keys))
 
 
-def _right_keys(look: int, switches: Sequence[int], *, is_named: bool) -> NDArray[np.int64]:
+def _keep_labels(look: int, switches: Sequence[int], *, is_named: bool) -> NDArray[np.int64]:
     """Return which of the recent looks are to be kept (RECENT,): those at changes of subgoal.
 
     Where there is no look, or nothing is named, it is `NO_LOOK`.

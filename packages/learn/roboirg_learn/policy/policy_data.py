@@ -24,7 +24,7 @@ from roboirg_learn.policy.tracks import LookTokens, Tracks
 
 COUNTED_LOOKS = 10
 """Looks of an episode, besides those of decisions, at which a body learns what is completed."""
-NOT_ASKED = -1
+NO_LABEL = -1
 """In the place of a move, thing or count that a network is not to say, or does not see."""
 HEIGHT_SCALE = 5.0
 FINGER_SCALE = 25.0
@@ -111,20 +111,20 @@ def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray
     return np.array([x, y, height, *turn, opening, is_video], np.float32)
 
 
-class AskedMoves:
+class LookLabels:
     """What a network is to say at some looks of an episode."""
 
     def __init__(self) -> None:
         self._looks: list[int] = []
         self._rows: list[tuple[int, int, int]] = []
 
-    def add(self, look: int, done: int, move: int = NOT_ASKED, thing: int = NOT_ASKED) -> None:
+    def add(self, look: int, done: int, move: int = NO_LABEL, thing: int = NO_LABEL) -> None:
         """Ask at a look for completed stages, and for a move and a thing at a decision."""
         self._looks.append(look)
         self._rows.append((move, thing, done))
 
     def numbers(self, looks: LookNumbers, goal: NDArray[np.float32]) -> EpisodeNumbers:
-        """Return the episode with what is asked."""
+        """Return the episode with what is labels."""
         moves, things, done = np.array(self._rows, np.int64).T
         return EpisodeNumbers(looks, goal, np.array(self._looks, np.int64), moves, things, done)
 
@@ -148,7 +148,7 @@ def to_numbers(
         rng: draws the noise of the detector.
     """
     history = _LabeledHistory()
-    asked = AskedMoves()
+    labels = LookLabels()
     decision_at = {decision.look: decision for decision in decisions}
     skipped = _merged_looks(recorded) - decision_at.keys()
     counted = _counted_looks(recorded, rng)
@@ -160,11 +160,11 @@ def to_numbers(
         done = int(recorded.done[look])
         if look in decision_at:
             decision = decision_at[look]
-            move = moves.get(decision.move, NOT_ASKED)
-            asked.add(now, done, move, history.track(decision.thing))
+            move = moves.get(decision.move, NO_LABEL)
+            labels.add(now, done, move, history.track(decision.thing))
         elif look in counted:
-            asked.add(now, done)
-    return asked.numbers(history.looks.numbers(), goal)
+            labels.add(now, done)
+    return labels.numbers(history.looks.numbers(), goal)
 
 
 class _LabeledHistory:
@@ -185,10 +185,10 @@ class _LabeledHistory:
         return len(self.looks) - 1
 
     def track(self, number: int) -> int:
-        """Return the track of an object; `NOT_ASKED` for none, and for one that was not found."""
+        """Return the track of an object; `NO_LABEL` for none, and for one that was not found."""
         if number == GHOST:
-            return NOT_ASKED
-        return self._track_of.get(number, NOT_ASKED)
+            return NO_LABEL
+        return self._track_of.get(number, NO_LABEL)
 
 
 def _merged_looks(recorded: ExpertRecording) -> set[int]:
@@ -211,28 +211,30 @@ def to_batch(episodes: Sequence[EpisodeNumbers]) -> EpisodeBatch:
     looks = {}
     for name in LookNumbers._fields:
         looks[name] = _pad([getattr(episode.looks, name) for episode in episodes], 0)
-    there = [np.ones(len(episode.looks.tool), bool) for episode in episodes]
+    has_look = [np.ones(len(episode.looks.tool), bool) for episode in episodes]
     return EpisodeBatch(
         **looks,
-        there=_pad(there, 0),
+        has_look=_pad(has_look, 0),
         goals=torch.from_numpy(np.stack([episode.goal for episode in episodes])),
         decisions=_pad([episode.decisions for episode in episodes], 0),
-        moves=_pad([episode.moves for episode in episodes], NOT_ASKED),
-        things=_pad([episode.things for episode in episodes], NOT_ASKED),
-        done=_pad([episode.done for episode in episodes], NOT_ASKED),
-        planned=_planned([episode.planned for episode in episodes if episode.planned is not None]),
+        moves=_pad([episode.moves for episode in episodes], NO_LABEL),
+        things=_pad([episode.things for episode in episodes], NO_LABEL),
+        done=_pad([episode.done for episode in episodes], NO_LABEL),
+        planned=_pad_planned(
+            [episode.planned for episode in episodes if episode.planned is not None]
+        ),
     )
 
 
-def _planned(episodes: Sequence[PlannedNumbers]) -> PlannedBatch | None:
+def _pad_planned(episodes: Sequence[PlannedNumbers]) -> PlannedBatch | None:
     """Return the subgoals, or what planners keep, padded; None without any."""
     if not episodes:
         return None
     # A decision that is there for padding sees the first look.
     return PlannedBatch(
         context=_pad([episode.context for episode in episodes], 0),
-        kept=_pad([episode.kept for episode in episodes], 0),
-        keys=_pad([episode.keys for episode in episodes], NOT_ASKED),
+        kept_looks=_pad([episode.kept_looks for episode in episodes], 0),
+        to_keep=_pad([episode.to_keep for episode in episodes], NO_LABEL),
     )
 
 

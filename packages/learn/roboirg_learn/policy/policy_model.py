@@ -17,7 +17,7 @@ from roboirg_learn.policy.body_net import BodyAnswer, BodyNet
 from roboirg_learn.policy.memories import Carried
 from roboirg_learn.policy.moves import waypoint
 from roboirg_learn.policy.planner_history import PlannedNumbers
-from roboirg_learn.policy.policy_data import NOT_ASKED, EpisodeNumbers, LookHistory, to_batch
+from roboirg_learn.policy.policy_data import NO_LABEL, EpisodeNumbers, LookHistory, to_batch
 from roboirg_learn.policy.policy_files import PolicyFiles
 from roboirg_learn.policy.tracks import LookTokens
 from roboirg_learn.policy.trained_body import Pictures, TrainedBody, load_body
@@ -65,12 +65,12 @@ class NetworkChoice(NamedTuple):
     Attributes:
         kind: number of the kind of waypoint, or of the form of a subgoal.
         thing: track of the thing; None where there is none.
-        keys: places among the recent looks of those to be kept.
+        to_keep: places among the recent looks of those to be kept.
     """
 
     kind: int
     thing: int | None
-    keys: tuple[int, ...]
+    to_keep: tuple[int, ...]
 
 
 class _RememberedLooks(NamedTuple):
@@ -93,7 +93,7 @@ class SeenEpisode:
     def __init__(self, model: PolicyModel) -> None:
         self._model = model
         self._history = LookHistory()
-        self._first: list[LookTokens] = []
+        self._first_looks: list[LookTokens] = []
         self._remembered: dict[BodyNet, _RememberedLooks] = {}
         self.video_looks = 0
 
@@ -117,14 +117,14 @@ class SeenEpisode:
             found = self._model.body.see(pictures[part])
             for tokens, tool in zip(found, tools[part], strict=True):
                 if len(self._history) in first_looks:
-                    self._first.append(tokens)
+                    self._first_looks.append(tokens)
                 self._history.add(tokens, tool, is_video=is_video)
         if is_video:
             self.video_looks += len(pictures)
 
     def understand(self, text: str) -> NDArray[np.float32]:
         """Return the goal that an instruction means, as `GoalLayout.numbers` does."""
-        return self._model.reader.understand(text, self._first, self._model.body.goals)
+        return self._model.reader.understand(text, self._first_looks, self._model.body.goals)
 
     @property
     def looks(self) -> int:
@@ -136,24 +136,24 @@ class SeenEpisode:
         self, net: BodyNet, goal: NDArray[np.float32], planned: PlannedNumbers | None
     ) -> NetworkChoice:
         """Return what a network, body or planner, chooses after the last look."""
-        not_asked = np.array([NOT_ASKED])
+        no_label = np.array([NO_LABEL])
         numbers = EpisodeNumbers(
             looks=self._history.numbers(),
             goal=goal,
             decisions=np.array([self.looks - 1]),
-            moves=not_asked,
-            things=not_asked,
-            done=not_asked,
+            moves=no_label,
+            things=no_label,
+            done=no_label,
             planned=planned,
         )
         answer: BodyAnswer = net(to_batch([numbers]), self._carried_for(net, goal))
         kind = int(answer.moves[0, 0].argmax())
         thing = int(answer.things[0, 0, kind].argmax())
         is_there = thing < self._history.tracks.count
-        keys: tuple[int, ...] = ()
-        if answer.keys is not None:
-            keys = tuple(np.flatnonzero(answer.keys[0, 0].numpy() > 0))
-        return NetworkChoice(kind, thing if is_there else None, keys)
+        to_keep: tuple[int, ...] = ()
+        if answer.keep_scores is not None:
+            to_keep = tuple(np.flatnonzero(answer.keep_scores[0, 0].numpy() > 0))
+        return NetworkChoice(kind, thing if is_there else None, to_keep)
 
     def _carried_for(self, net: BodyNet, goal: NDArray[np.float32]) -> Carried:
         """Return what a network remembers of the looks; with another goal it begins anew."""

@@ -29,12 +29,12 @@ from roboirg_learn.policy.subgoals import forms_of, subgoals_due
 from roboirg_learn.policy.thing_detector import (
     LabeledPicture,
     ThingDetector,
+    augmented,
     detector_loss,
-    varied,
 )
 from roboirg_learn.policy.trained_body import GoalLayout, TrainedBody, load_body, save_body
 from roboirg_learn.policy.trained_reader import load_reader, save_reader
-from roboirg_learn.policy.word_training import check_words, teach_reader
+from roboirg_learn.policy.word_training import check_words, train_policy_reader
 from roboirg_learn.trained_file import END
 from roboirg_learn.trainer import Course, KeptTraining, Progress, Training, batches
 
@@ -79,7 +79,7 @@ def trained_files(
     body = load_body(files.body)
     _check_plan(files.body, body.plan, plan.about)
     if not files.reader.exists():
-        reader = teach_reader(body, words, folder, name, workers, progress)
+        reader = train_policy_reader(body, words, folder, name, workers, progress)
         save_reader(reader, files.reader)
     _check_plan(files.reader, load_reader(files.reader).plan, words.about)
     return files
@@ -233,7 +233,7 @@ class ThingDetectorCourse(Course[LabeledPicture]):
         variation = np.random.default_rng((self._plan.seed, epoch))
         rng = random.Random(f"{self._plan.seed}/{epoch}")
         for batch in batches(self._views, rng, DETECTOR_BATCH):
-            yield [varied(view, variation) for view in batch]
+            yield [augmented(view, variation) for view in batch]
 
     def loss(self, batch: Sequence[LabeledPicture]) -> torch.Tensor:
         return detector_loss(self.net, batch)

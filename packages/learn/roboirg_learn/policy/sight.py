@@ -26,9 +26,9 @@ PLACE_NOISE = 0.7
 """Standard deviation of the places that a detector finds, pixels."""
 TURN_NOISE = 0.2
 """Standard deviation of the angles that it finds, rad."""
-LOST = 0.02
+LOST_RATE = 0.02
 """Mean probability that a thing is not found; some things are lost more often."""
-LOST_NEAR_TOOL = 0.15
+LOST_RATE_NEAR_TOOL = 0.15
 """The same near the tool."""
 GHOST_RATE = 0.04
 """Probability that something is found that is not there, where something else is."""
@@ -109,7 +109,7 @@ def labeled_looks(
     A detector loses things, mistakes their places and angles a little, and now and then finds a
     ghost: a thing of any class at the place of another.
     """
-    things = _noisy_things(recorded, sight, rng)
+    things = _draw_noisy_things(recorded, sight, rng)
     looks, objects = things.is_found.shape
     ghosts = _draw_ghosts(looks, objects, len(sight.classes), rng)
     for look in range(looks):
@@ -159,13 +159,13 @@ class _NoisyThings(NamedTuple):
         return LabeledLook(tokens, objects)
 
 
-def _noisy_things(
+def _draw_noisy_things(
     recorded: ExpertRecording, sight: Sight, rng: np.random.Generator
 ) -> _NoisyThings:
     """Draw what a detector would find of the objects of an episode."""
     kinds = sight.kinds(recorded.classes)
     positions = recorded.things[..., :3].astype(np.float64)
-    is_found = _is_not_lost(recorded, positions, rng)
+    is_found = _draw_is_not_lost(recorded, positions, rng)
     points = points_of(positions)
     is_found &= recorded.visible & (kinds >= 0) & _is_on_table(points)
 
@@ -176,13 +176,13 @@ def _noisy_things(
     return _NoisyThings(kinds, is_found, places, turns)
 
 
-def _is_not_lost(
+def _draw_is_not_lost(
     recorded: ExpertRecording, positions: NDArray[np.float64], rng: np.random.Generator
 ) -> NDArray[np.bool_]:
     """Draw whether a detector does not lose things that are visible (looks, objects)."""
     from_tool = positions[..., :2] - recorded.tool[:, None, :2]
     distances = np.hypot(from_tool[..., 0], from_tool[..., 1])
-    probabilities = np.where(distances < NEAR_TOOL, LOST_NEAR_TOOL, LOST)
+    probabilities = np.where(distances < NEAR_TOOL, LOST_RATE_NEAR_TOOL, LOST_RATE)
     looks, objects = distances.shape
     # A detector has trouble with the same thing again and again.
     probabilities = probabilities * rng.exponential(1.0, objects)

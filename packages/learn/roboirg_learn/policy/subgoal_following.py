@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 from roboirg.extension.policies import Demonstration, Observation
 from roboirg.extension.sight import LOOK_EVERY
 from roboirg_learn.policy.learned_policy import LearnedPolicy, tool_of
-from roboirg_learn.policy.moves import LEAVE
+from roboirg_learn.policy.moves import GRIPPER_UNCHANGED
 from roboirg_learn.policy.planner_history import (
     NO_LOOK,
     RECENT,
     PlannedNumbers,
     PlannerHistory,
-    asked_for,
     recent_looks,
+    requests_for_hands,
 )
-from roboirg_learn.policy.policy_plan import CHOOSES
-from roboirg_learn.policy.subgoals import asked_numbers
+from roboirg_learn.policy.policy_plan import KEYFRAME_PLANNER
+from roboirg_learn.policy.subgoals import encode_request
 
 if TYPE_CHECKING:
     from roboirg_learn.policy.policy_model import NetworkChoice, PolicyModel, SeenEpisode
@@ -37,7 +37,7 @@ class SubgoalNamer:
     def __init__(self, model: PolicyModel, seen: SeenEpisode) -> None:
         self._body = model.body
         self._seen = seen
-        chooses = self._body.plan["memory"] == CHOOSES
+        chooses = self._body.plan["memory"] == KEYFRAME_PLANNER
         self._history = PlannerHistory(len(self._body.forms), chooses=chooses)
         self._last_kind: int | None = None
         self._last_thing: int | None = None
@@ -54,7 +54,7 @@ class SubgoalNamer:
         look = self._seen.looks - 1
         chosen = self._seen.choose(self._body.planner, goal, self._planned(look))
         self._history.name(chosen.kind, look)
-        recent = [recent_looks(look)[place] for place in chosen.keys]
+        recent = [recent_looks(look)[place] for place in chosen.to_keep]
         self._history.choose(kept for kept in recent if kept >= 0)
 
         is_same = chosen.kind == self._last_kind and chosen.thing == self._last_thing
@@ -68,8 +68,8 @@ class SubgoalNamer:
         """Return what the planner is given at a look; which looks to keep it says itself."""
         return PlannedNumbers(
             context=self._history.context(look)[None],
-            kept=self._history.kept(self._seen.video_looks, look)[None],
-            keys=np.full((1, RECENT), NO_LOOK),
+            kept_looks=self._history.kept(self._seen.video_looks, look)[None],
+            to_keep=np.full((1, RECENT), NO_LOOK),
         )
 
     def _words(self, chosen: NetworkChoice) -> str:
@@ -86,13 +86,13 @@ class LearnedHands(LearnedPolicy):
     """
 
     subgoal: str | None = None
-    _asked: NDArray[np.float32] | None = None
+    _request: NDArray[np.float32] | None = None
     _namer: SubgoalNamer | None = None
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         super().reset(instruction, demonstration)
         self.subgoal = None
-        self._asked = None
+        self._request = None
         self._namer = SubgoalNamer(self.model, self.seen)
 
     def follow(self, subgoal: str) -> None:
@@ -105,18 +105,18 @@ class LearnedHands(LearnedPolicy):
         seen = self.watch(observation)
         if self._namer is not None:
             self._take(self._namer.next(self.understand()))
-        if self._asked is None:
-            return np.append(observation["end_effector"], LEAVE)[None]
+        if self._request is None:
+            return np.append(observation["end_effector"], GRIPPER_UNCHANGED)[None]
         nothing = np.zeros(self.model.body.goals.size, np.float32)
-        chosen = seen.decide(nothing, tool_of(observation), asked_for([self._asked]))
+        chosen = seen.decide(nothing, tool_of(observation), requests_for_hands([self._request]))
         return chosen[None]
 
     def _take(self, subgoal: str) -> None:
         """Set the subgoal if its words have a known form."""
-        found = asked_numbers(subgoal, self.model.body.sight)
+        found = encode_request(subgoal, self.model.body.sight)
         if found is not None:
             self.subgoal = subgoal
-            self._asked = found
+            self._request = found
 
 
 class LearnedPlanner:

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from roboirg_learn.policy.body_layers import WIDTH
-from roboirg_learn.policy.memories import Looks, at_looks
+from roboirg_learn.policy.memories import Looks, values_at_looks
 from roboirg_learn.policy.planner_history import RECENT
 
 AWAY_SCALE = 5.0
@@ -21,8 +21,8 @@ class PlannedBatch(NamedTuple):
     """What is given at each decision, padded; fields as in `PlannedNumbers`, with B."""
 
     context: Tensor
-    kept: Tensor
-    keys: Tensor
+    kept_looks: Tensor
+    to_keep: Tensor
 
 
 class ContextInput(nn.Module):
@@ -72,7 +72,7 @@ class KeepScore(nn.Module):
         recent = present - torch.arange(RECENT - 1, -1, -1)
         seen_things = (looks.things * looks.seen[..., None]).mean(2)
         summaries = torch.cat([looks.tool, seen_things], -1)
-        found = at_looks(summaries, recent.clamp(min=0).flatten(1))
+        found = values_at_looks(summaries, recent.clamp(min=0).flatten(1))
         frames = found.reshape(*recent.shape, -1)
         thought = now[:, :, None].expand(-1, -1, RECENT, -1)
         is_present = (recent == present).float()[..., None]

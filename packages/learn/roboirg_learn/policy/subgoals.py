@@ -17,7 +17,7 @@ from roboirg.extension.sight import ExpertRecording, points_of
 from roboirg_learn.policy.moves import LookDecision
 from roboirg_learn.policy.sight import COLUMNS, Sight
 
-AT = "{at}"
+POINT_SLOT = "{at}"
 NO_THING = -1
 """In the place of an object's number where a subgoal points at none."""
 LAST_PIXEL = COLUMNS - 1
@@ -28,14 +28,14 @@ MOTIONS = (
     "press", "press_below", "hover", "hold", "hold_until", "retreat", "go_home",
 )  # fmt: skip
 COLORS = ("red", "green", "blue", "yellow", "gray", "purple")
-MARKS = (*MOTIONS, *THINGS, *COLORS, "left", "right")
+REQUEST_WORDS = (*MOTIONS, *THINGS, *COLORS, "left", "right")
 """In the order in which trained files have them."""
 POINT_NUMBERS = 3
 """Whether there is a point, and its x and y on the table, m."""
-ASKED_NUMBERS = len(MARKS) + POINT_NUMBERS
-SPREAD = 3.2
+REQUEST_SIZE = len(REQUEST_WORDS) + POINT_NUMBERS
+POINT_NOISE = 3.2
 """Standard deviation of the noise of a point, pixels."""
-FARTHEST = 8.0
+MOST_POINT_NOISE = 8.0
 """Limit of that noise, pixels."""
 
 
@@ -47,14 +47,14 @@ class SubgoalForm(NamedTuple):
     @property
     def at_thing(self) -> bool:
         """Whether it has a point."""
-        return AT in self.words
+        return POINT_SLOT in self.words
 
     def at(self, point: NDArray[np.floating] | None) -> str:
         """Return it with a point, column and row in the front picture; None leaves that out."""
         if point is None:
-            return self.words.replace(f" {AT}", "")
+            return self.words.replace(f" {POINT_SLOT}", "")
         column, row = np.clip(np.rint(point), 0, LAST_PIXEL).astype(int)
-        return self.words.replace(AT, f"at <{row}, {column}>")
+        return self.words.replace(POINT_SLOT, f"at <{row}, {column}>")
 
 
 def subgoals_due(
@@ -84,19 +84,19 @@ def forms_of(episodes: Iterable[Episode]) -> tuple[SubgoalForm, ...]:
     return tuple(SubgoalForm(words) for words in sorted(found))
 
 
-def asked_numbers(subgoal: str, sight: Sight) -> NDArray[np.float32] | None:
-    """Return verb, kind, color and side as marks, and the point (`ASKED_NUMBERS`).
+def encode_request(subgoal: str, sight: Sight) -> NDArray[np.float32] | None:
+    """Return verb, kind, color and side as marks, and the point (`REQUEST_SIZE`).
 
     None if the words are no subgoal that is known.
     """
     request = read_subgoal(subgoal)
     if request is None:
         return None
-    found = np.zeros(ASKED_NUMBERS, np.float32)
+    found = np.zeros(REQUEST_SIZE, np.float32)
     for name in (request.kind, request.thing, request.color, request.side):
         if name is not None:
-            found[MARKS.index(name)] = 1.0
-    meant = _class_meant(request.thing, request.color, sight)
+            found[REQUEST_WORDS.index(name)] = 1.0
+    meant = _class_number(request.thing, request.color, sight)
     if request.point is not None and meant is not None:
         row, column = request.point
         # The point is at the height of what is meant.
@@ -105,7 +105,7 @@ def asked_numbers(subgoal: str, sight: Sight) -> NDArray[np.float32] | None:
     return found
 
 
-def _class_meant(thing: str | None, color: str | None, sight: Sight) -> int | None:
+def _class_number(thing: str | None, color: str | None, sight: Sight) -> int | None:
     """Return the class of a thing and a color, else the first of the thing; None if unknown."""
     same_thing = None
     for number, name in enumerate(sight.classes):
@@ -152,9 +152,11 @@ def _point_at_begin(recorded: ExpertRecording, stage: int, name: str) -> NDArray
 
 
 def _noise(rng: np.random.Generator) -> NDArray[np.float64]:
-    """Draw by how much a point is moved, column and row; never by more than `FARTHEST`."""
+    """Draw by how much a point is moved, column and row; never by more than `MOST_POINT_NOISE`."""
     from scipy.stats import truncnorm  # takes a second, and looks for PyTorch
 
-    most = FARTHEST / SPREAD
-    drawn: NDArray[np.float64] = truncnorm.rvs(-most, most, scale=SPREAD, size=2, random_state=rng)
+    most = MOST_POINT_NOISE / POINT_NOISE
+    drawn: NDArray[np.float64] = truncnorm.rvs(
+        -most, most, scale=POINT_NOISE, size=2, random_state=rng
+    )
     return drawn

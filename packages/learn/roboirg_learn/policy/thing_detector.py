@@ -30,7 +30,7 @@ MOST_THINGS = 24
 LEAST_SCORE = 0.6
 MOST_SHIFT = 20
 """Pixels by which a picture is moved while a detector learns."""
-RARE = -4.0
+INITIAL_LOGIT = -4.0
 """Logit of a class in a cell before anything is learned."""
 PRESENT_WEIGHT = 30.0
 """Of a cell with a thing in the loss: most have none."""
@@ -71,7 +71,7 @@ class ThingDetector(nn.Module):
         self.scores = nn.Conv2d(fourth, classes, 1)
         self.details = nn.Conv2d(fourth, 4, 1)
         bias: Any = self.scores.bias
-        nn.init.constant_(bias, RARE)
+        nn.init.constant_(bias, INITIAL_LOGIT)
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
         """Return logits (n, classes, *GRID), and offsets in cells and angles (n, 4, *GRID).
@@ -121,7 +121,7 @@ def _labels_at(cells: _Cells, details: Tensor, picture: NDArray[np.uint8]) -> La
     return LabeledPicture(picture, cells.kinds.numpy(), points, turns)
 
 
-def varied(view: LabeledPicture, rng: np.random.Generator) -> LabeledPicture:
+def augmented(view: LabeledPicture, rng: np.random.Generator) -> LabeledPicture:
     """Return a picture moved by some pixels, and mirrored half the time, with its labels.
 
     A few scenes show each thing in a few places only, and a detector learns those by heart.

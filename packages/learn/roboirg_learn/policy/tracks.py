@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 MOST_TRACKS = 24
-GATE = 0.4
+MAX_JUMP = 0.4
 """Meters from where a thing is expected at which it may be, at most: the hand moves fast."""
-ENOUGH = 3
+CONFIRMING_LOOKS = 3
 """Looks in which a thing must be seen, once there were as many."""
-NEVER = 10.0
+OTHER_CLASS_DISTANCE = 10.0
 """Meters that a thing of another class counts as."""
 
 
@@ -49,13 +49,13 @@ class Tracks:
         self.turns = np.zeros((MOST_TRACKS, 2), np.float32)
         self._speeds = np.zeros((MOST_TRACKS, 2), np.float32)
         self.seen = np.zeros(MOST_TRACKS, bool)
-        self._times = np.zeros(MOST_TRACKS, np.int64)
+        self._looks_seen = np.zeros(MOST_TRACKS, np.int64)
         self._looks = 0
 
     @property
     def known(self) -> NDArray[np.bool_]:
         """Whether each was seen often enough to be no mistake of the detector (MOST_TRACKS,)."""
-        return self._times >= min(self._looks, ENOUGH)
+        return self._looks_seen >= min(self._looks, CONFIRMING_LOOKS)
 
     def update(self, look: LookTokens) -> NDArray[np.int64]:
         """Take in a look; returns the track of each of its things, -1 beyond the most tracks."""
@@ -72,7 +72,7 @@ class Tracks:
         self.classes[shown] = look.classes[is_tracked]
         self.places[shown] = look.places[is_tracked]
         self.turns[shown] = look.turns[is_tracked]
-        self._times[shown] += 1
+        self._looks_seen[shown] += 1
         self._looks += 1
         return tracks
 
@@ -93,8 +93,8 @@ class Tracks:
         away = look.places[:, None] - expected
         distances = np.hypot(away[..., 0], away[..., 1])
         is_other_class = look.classes[:, None] != self.classes[: self.count]
-        distances[is_other_class] = NEVER
-        things, tracks = linear_sum_assignment(np.minimum(distances, NEVER))
-        is_near = distances[things, tracks] <= GATE
+        distances[is_other_class] = OTHER_CLASS_DISTANCE
+        things, tracks = linear_sum_assignment(np.minimum(distances, OTHER_CLASS_DISTANCE))
+        is_near = distances[things, tracks] <= MAX_JUMP
         found[things[is_near]] = tracks[is_near]
         return found

@@ -23,7 +23,7 @@ from roboirg_learn.policy.moves import Move
 from roboirg_learn.policy.planner_history import context_size
 from roboirg_learn.policy.policy_plan import HANDS, PLANNERS
 from roboirg_learn.policy.sight import Sight
-from roboirg_learn.policy.subgoals import ASKED_NUMBERS, SubgoalForm
+from roboirg_learn.policy.subgoals import REQUEST_SIZE, SubgoalForm
 from roboirg_learn.policy.thing_detector import ThingDetector
 from roboirg_learn.policy.tracks import LookTokens
 from roboirg_learn.trained_file import TrainedFile, load_trained, save_trained
@@ -108,7 +108,7 @@ def make_body(sight: Sight, goals: GoalLayout, moves: Sequence[Kind], memory: st
     """Return an untrained net for these classes, goals and kinds, or an untrained planner."""
     context = 0
     if memory == HANDS:
-        context = ASKED_NUMBERS
+        context = REQUEST_SIZE
     elif memory in PLANNERS:
         context = context_size(len(moves))
     at_things = [move.at_thing for move in moves]

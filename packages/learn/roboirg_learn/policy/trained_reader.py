@@ -14,7 +14,7 @@ from torch import nn
 
 from roboirg.extension.episodes import goal_schema
 from roboirg_learn.listener.listener_net import ListenerNet
-from roboirg_learn.listener.object_relations import ObjectsInView, rank
+from roboirg_learn.listener.object_relations import ObjectsInView, rank_objects
 from roboirg_learn.listener.reader_plan import WORDLESS
 from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary
 from roboirg_learn.policy.task_net import TaskNet
@@ -73,7 +73,7 @@ def seen_things(
 ) -> ObjectsInView:
     """Return what is seen at one or two looks, for the reader."""
     places = np.concatenate([look.places for look in looks]).astype(np.float64)
-    return rank([look.classes for look in looks], places, corners, classes)
+    return rank_objects([look.classes for look in looks], places, corners, classes)
 
 
 def save_reader(reader: TrainedReader, path: Path) -> None:

@@ -22,8 +22,8 @@ from roboirg_learn.listener.reader_plan import ReaderPlan
 from roboirg_learn.listener.reader_training import (
     Lesson,
     check_reader,
+    instructions_of,
     lesson_of,
-    said,
     train_reader,
 )
 from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary, words_of
@@ -69,7 +69,7 @@ def check_words(plan: ReaderPlan) -> None:
             raise InvalidValueError(f"Encoder {name!r} reads pixels; a policy's reader has none.")
 
 
-def teach_reader(
+def train_policy_reader(
     body: TrainedBody, plan: ReaderPlan, folder: Path, name: str, workers: int, progress: Progress
 ) -> TrainedReader:
     """Return a reader that has learned what instructions mean in scenes that a body sees.
@@ -84,7 +84,7 @@ def teach_reader(
     """
     train = episodes_of(plan.tasks, "train")
     episodes = (*train, *episodes_of(plan.tasks, "random", plan.scenes))
-    scenes = _see(body, episodes, workers, progress)
+    scenes = _view_scenes(body, episodes, workers, progress)
     lessons = _lessons(plan, episodes, scenes)
     vocabulary = _vocabulary(lessons, body)
     about = {**plan.about, "body": body.version}
@@ -108,7 +108,7 @@ def _lessons(plan: ReaderPlan, episodes: Sequence[Episode], scenes: SeenScenes) 
     """Return the instructions of episodes; without settings nothing is said."""
     instructions = [(episode, "") for episode in episodes]
     if plan.settings:
-        instructions = list(said(episodes, plan))
+        instructions = list(instructions_of(episodes, plan))
     lessons = []
     for episode, text in instructions:
         given = ListenerInput(episode.task, text, scenes.seen[episode.key])
@@ -116,7 +116,7 @@ def _lessons(plan: ReaderPlan, episodes: Sequence[Episode], scenes: SeenScenes) 
     return lessons
 
 
-def _see(
+def _view_scenes(
     body: TrainedBody, episodes: Sequence[Episode], workers: int, progress: Progress
 ) -> SeenScenes:
     """Return what a body sees at first in episodes; no expert plays them."""
@@ -153,12 +153,12 @@ class TaskCourse(Course[Lesson]):
         return batches(self._lessons, self._rng)
 
     def loss(self, batch: Sequence[Lesson]) -> torch.Tensor:
-        texts = [_thinned(lesson.given.text, self._rng) for lesson in batch]
+        texts = [_without_some_words(lesson.given.text, self._rng) for lesson in batch]
         right = [self._tasks.index(lesson.given.task) for lesson in batch]
         scores = self.net(texts, [lesson.given.seen for lesson in batch])
         return functional.cross_entropy(scores, torch.tensor(right))
 
 
-def _thinned(text: str, rng: random.Random) -> str:
+def _without_some_words(text: str, rng: random.Random) -> str:
     """Return a text without some of its words."""
     return " ".join(word for word in text.split() if rng.random() >= FORGOTTEN_WORDS)
