@@ -31,9 +31,12 @@ INITIAL_WEIGHT_STD = 0.002
 
 
 def even_frames(now: Tensor) -> Tensor:
-    """Return the numbers (…, FRAME_COUNT) of looks evenly spaced from 0 to `now` (…), both included.
+    """Return `FRAME_COUNT` numbers of looks, evenly spaced from the first to the present one.
 
-    As long as there are fewer, it is all of them, and the rest is -1.
+    With fewer looks it is all of them, and -1 in the other places: 2 → 0, 1, 2, -1, -1, …
+
+    Args:
+        now: (…) number of the present look; the result is (…, FRAME_COUNT).
     """
     last = now[..., None]
     evenly = (last * torch.linspace(0, 1, FRAME_COUNT)).round().long()
@@ -51,6 +54,7 @@ class EvenFrameMemory(LookMemory):
         self.layers = nn.ModuleList(Modulation() for _ in range(LAYERS))
 
     def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
+        """Return how the chosen looks modulate each layer of the body at decisions (B, D)."""
         tokens = self.frames(looks)
         chosen = self.chosen(looks, decisions)
         joins = [layer(tokens, chosen) for layer in self.layers]
@@ -89,7 +93,7 @@ class Modulation(nn.Module):
         nn.init.zeros_(self.scale_shift.bias)
 
     def forward(self, tokens: MaskedTokens, chosen: Tensor) -> ModulationJoin:
-        """Return what modulates a layer.
+        """Return what scales and shifts one layer's input: keys and values of the chosen looks.
 
         Args:
             tokens: (B, T, m, WIDTH) of all looks.
@@ -111,13 +115,16 @@ class ModulationJoin(Join):
         self._mask = mask
 
     def modulated(self, normed: Tensor) -> Tensor:
-        """Return the input of the feed-forward network, scaled and shifted."""
+        """Return the feed-forward input (n, L, WIDTH), scaled and shifted by what is remembered.
+
+        Each of the body's L tokens attends to the tokens of the remembered looks.
+        """
         queries = split_heads(self._modulation.query(normed))
         # Queries have four heads, keys and values one, which all of them share.
-        found = functional.scaled_dot_product_attention(
+        read = functional.scaled_dot_product_attention(
             queries.flatten(1, 2)[:, None], self._keys, self._values, self._mask
         )
-        joined = self._modulation.out(join_heads(found.reshape(queries.shape)))
+        joined = self._modulation.out(join_heads(read.reshape(queries.shape)))
         scale, shift = self._modulation.scale_shift(joined).chunk(2, -1)
         after: Tensor = normed * (1.0 + scale) + shift
         return after

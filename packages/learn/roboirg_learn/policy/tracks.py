@@ -10,11 +10,11 @@ from scipy.optimize import linear_sum_assignment
 
 MOST_TRACKS = 24
 MAX_JUMP = 0.4
-"""Meters from where a thing is expected at which it may be, at most: the hand moves fast."""
+"""Most meters between where a thing is expected and where it is found: the hand moves fast."""
 CONFIRMING_LOOKS = 3
-"""Looks in which a thing must be seen, once there were as many."""
+"""Looks that must show a thing before it counts as known; fewer in the first looks."""
 OTHER_CLASS_DISTANCE = 10.0
-"""Meters that a thing of another class counts as."""
+"""Meters that count between things of different classes: more than any jump, so never paired."""
 
 
 class LookTokens(NamedTuple):
@@ -32,7 +32,7 @@ class LookTokens(NamedTuple):
 
 
 class Tracks:
-    """What is known of each thing that was ever seen; a thing stays in its class.
+    """What is known of each thing that was ever seen; a track is such a thing, by its number.
 
     Attributes:
         count: number of things; the rows after theirs are empty.
@@ -58,12 +58,16 @@ class Tracks:
         return self._looks_seen >= min(self._looks, CONFIRMING_LOOKS)
 
     def update(self, look: LookTokens) -> NDArray[np.int64]:
-        """Take in a look; returns the track of each of its things, -1 beyond the most tracks."""
+        """Match the things of a new look with the tracks, and bring those up to date.
+
+        Returns the number of the track of each thing, (n,): a new one for a thing that is seen
+        first, -1 where `MOST_TRACKS` are used up.
+        """
         tracks = self._assign(look)
         self._follow(look, tracks)
-        new = np.flatnonzero(tracks < 0)[: MOST_TRACKS - self.count]
-        tracks[new] = self.count + np.arange(len(new))
-        self.count += len(new)
+        new_things = np.flatnonzero(tracks < 0)[: MOST_TRACKS - self.count]
+        tracks[new_things] = self.count + np.arange(len(new_things))
+        self.count += len(new_things)
 
         is_tracked = tracks >= 0
         shown = tracks[is_tracked]
@@ -77,21 +81,30 @@ class Tracks:
         return tracks
 
     def _follow(self, look: LookTokens, tracks: NDArray[np.int64]) -> None:
-        """Note how far things have moved that the last look showed, too."""
+        """Set the speed of each track: meters since the last look; 0 unless both looks show it.
+
+        Args:
+            look: the new look.
+            tracks: (n,) the track of each of its things; -1 for a new thing.
+        """
         is_old = tracks >= 0
         old = tracks[is_old]
-        way = look.places[is_old] - self.places[old]
+        moved = look.places[is_old] - self.places[old]
         self._speeds[:] = 0.0
-        self._speeds[old] = np.where(self.seen[old, None], way, 0.0)
+        self._speeds[old] = np.where(self.seen[old, None], moved, 0.0)
 
     def _assign(self, look: LookTokens) -> NDArray[np.int64]:
-        """Return the track of each thing, -1 for a new one; pairs are nearest in all."""
+        """Return the track of each thing of a look, (n,); -1 for a thing that fits none.
+
+        Things are paired with tracks of their class so that the sum of all distances to where the
+        tracks are expected is least; pairs farther apart than `MAX_JUMP` are dropped.
+        """
         found = np.full(len(look.classes), -1, np.int64)
         if not self.count or not len(found):
             return found
         expected = (self.places + self._speeds)[: self.count]
-        away = look.places[:, None] - expected
-        distances = np.hypot(away[..., 0], away[..., 1])
+        offsets = look.places[:, None] - expected
+        distances = np.hypot(offsets[..., 0], offsets[..., 1])
         is_other_class = look.classes[:, None] != self.classes[: self.count]
         distances[is_other_class] = OTHER_CLASS_DISTANCE
         things, tracks = linear_sum_assignment(np.minimum(distances, OTHER_CLASS_DISTANCE))
