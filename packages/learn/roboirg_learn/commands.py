@@ -101,7 +101,12 @@ def learn_listener(
 
 
 def _listener_plan(words: PlanWords, without: str) -> TrainingPlan:
-    """Return how a listener is trained."""
+    """Return how a listener is trained, from the words of the command and its plan file.
+
+    Args:
+        words: what was given.
+        without: what it does not get: none, pictures, video or words.
+    """
     from roboirg_learn.listener.learned_model import WITHOUTS
     from roboirg_learn.listener.listener_training import TrainingPlan
 
@@ -113,7 +118,7 @@ def _listener_plan(words: PlanWords, without: str) -> TrainingPlan:
 
 
 def _run_study(plan: TrainingPlan, out: Path, workers: int) -> None:
-    """Train and compare several listeners; print the page with their tables."""
+    """Train and compare the listeners of the study; print the path of the page with tables."""
     from roboirg_learn.listener.listener_study import run_study
     from roboirg_learn.listener.study_report import write_study
 
@@ -189,7 +194,15 @@ def learn_policy(
 def _reader_plan(
     words: PlanWords, tasks: tuple[str, ...], settings: str, **usual: int
 ) -> ReaderPlan:
-    """Return how a reader is trained; what a plan does not have is as usual."""
+    """Return how a reader of words is trained.
+
+    Args:
+        words: the command's options and its plan file.
+        tasks: names of tasks.
+        settings: those whose instructions it hears, as given as an option; "none" for a reader
+            without words.
+        usual: values of fields that the plan file does not have, in place of `ReaderPlan`'s.
+    """
     from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.listener.vocabulary import WORD_POOLS
 
@@ -250,7 +263,7 @@ def learn_reader(
 
 
 def print_policy(files: PolicyFiles, plan: ReaderPlan) -> None:
-    """Print how the instructions that a policy has heard are played."""
+    """Print the command that plays a trained policy with the settings that its reader learned."""
     heard = ",".join(plan.settings) or "explicit"
     if plan.heard == "all":  # tasks without one of the settings are played in the others
         heard = plan.heard
@@ -264,7 +277,15 @@ def print_policy(files: PolicyFiles, plan: ReaderPlan) -> None:
 def _play_paper(
     body_plan: BodyPlan, reader_plan: ReaderPlan, words: PlanWords, out: Path, workers: int
 ) -> None:
-    """Train a policy for each mechanism of the paper, play its tables, and print the page."""
+    """Train a policy for each memory, play the paper's experiment, and print the page's path.
+
+    Args:
+        body_plan: of the bodies; the experiment sets the memory of each.
+        reader_plan: of their reader.
+        words: the command's options and its plan file, which has the experiment.
+        out: folder for files, runs and the page.
+        workers: processes that record and play.
+    """
     import roboirg
     from roboirg.extension.commands import write_atomically
     from roboirg_learn.policy.paper_experiment import (
@@ -298,7 +319,7 @@ def _play_paper(
 
 
 def _plan_changes(words: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
-    """Return the options that the parts of the paper's experiment take from a plan."""
+    """Return the options that a plan file changes in all parts of the paper's experiment."""
     changes: dict[str, Any] = {"tasks": tasks}
     for name in ("episodes", "split"):
         if name in words.fields:
@@ -307,7 +328,7 @@ def _plan_changes(words: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _print_tenths() -> Progress:
-    """Return a function that prints progress where it has a note or another tenth is done."""
+    """Return a function that prints progress to stderr: each tenth, and whatever has a note."""
     shown: dict[str, int] = {}
 
     def progress(work: str, done: int, total: int, note: str = "") -> None:

@@ -40,17 +40,17 @@ NO_PICTURE: Pixels = np.zeros((0, 0, 3), np.uint8)
 
 
 look = partial(labeled_views, later=LATER_STEP)
-"""Returns labeled pictures of an episode's start; of one with a video, also a later one."""
+"""Returns labeled front pictures of an episode: its first one; with a video, also a later one."""
 
 
 def pictures_to_see(first: Pixels, frames: Sequence[Pixels] | Pixels, every: int) -> list[Pixels]:
-    """Return the pictures that a listener looks at.
+    """Return the one or two front pictures that a listener looks at.
 
-    Of a video, its first frame and the one at `LATER_STEP`, or the last one; without a video, the
-    first picture of the policy's turn.
+    Of a video, its first frame and the one at control step `LATER_STEP`, or else the last one;
+    without a video, `first` alone.
 
     Args:
-        first: that picture.
+        first: the first picture after the instruction, when it is the policy's turn.
         frames: of the video, up to that step; may be empty.
         every: control steps between two frames.
     """
@@ -61,11 +61,11 @@ def pictures_to_see(first: Pixels, frames: Sequence[Pixels] | Pixels, every: int
 
 
 def views_as_played(episode: Episode) -> tuple[LabeledView, ...]:
-    """Return the pictures that a listener looks at when it plays an episode; without labels."""
+    """Return what a listener looks at when it plays an episode, as views without labels."""
     first, frames = shown_to_policy(episode, LATER_STEP)
     pictures = pictures_to_see(first, frames, LATER_STEP)
-    nowhere = _points_of([])
-    return tuple(LabeledView(picture, (), nowhere, nowhere) for picture in pictures)
+    no_points = _points_of([])
+    return tuple(LabeledView(picture, (), no_points, no_points) for picture in pictures)
 
 
 def draw_missing(
@@ -75,7 +75,15 @@ def draw_missing(
     workers: int,
     show: Callable[[int, int], object],
 ) -> None:
-    """Draw the views of episodes that a folder does not have, by `look` or `views_as_played`."""
+    """Draw the views of those episodes that a folder does not have, and store them there.
+
+    Args:
+        folder: of the files, one for each episode.
+        episodes: all of them.
+        draw: `look`, with labels, or `views_as_played`, without.
+        workers: processes that draw; 0 uses this one.
+        show: called after each episode with how many are done, and how many there are.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     missing = [episode for episode in episodes if not _path(folder, episode).exists()]
     done = len(episodes) - len(missing)
@@ -85,7 +93,16 @@ def draw_missing(
 
 
 def read_views(folder: Path, episode: Episode, *, pictures: bool) -> tuple[LabeledView, ...]:
-    """Return the views of an episode from a folder, or only their labels."""
+    """Return the views of an episode from a folder.
+
+    Args:
+        folder: to which `draw_missing` wrote them.
+        episode: of which they are.
+        pictures: whether to decode the pictures; else only the labels are loaded.
+
+    Raises:
+        InvalidValueError: the file cannot be read.
+    """
     path = _path(folder, episode)
     try:
         stored = msgspec.msgpack.decode(path.read_bytes(), type=list[_StoredView])

@@ -57,13 +57,14 @@ class WordEncoder(TokenEncoder):
         self.order = nn.Parameter(torch.randn(MAX_WORDS, WIDTH) * 0.02)
 
     def forward(self, inputs: Sequence[ListenerInput]) -> InputTokens:
+        """Return a token for each word of each text, padded to the longest."""
         rows = [torch.tensor(self._row(given.text), dtype=torch.long) for given in inputs]
         numbers = pad_sequence(rows, batch_first=True, padding_value=PADDING)
         order = self.order[: numbers.shape[1]]
         return InputTokens(self.words(numbers) + order, numbers != PADDING)
 
     def _row(self, text: str) -> list[int]:
-        """Return the numbers of the last words; the command stands at the end."""
+        """Return the numbers of the last `MAX_WORDS` words: at the end of a text is the command."""
         words = split_words(text)[-MAX_WORDS:]
         return [self._numbers.get(word, UNKNOWN) for word in words]
 
@@ -80,6 +81,7 @@ class ObjectEncoder(TokenEncoder):
         self.relations = nn.Linear(relation_count(classes), WIDTH, bias=False)
 
     def forward(self, inputs: Sequence[ListenerInput]) -> InputTokens:
+        """Return a token for each object that is seen, padded to the input with most objects."""
         kinds = _padded([given.seen.kinds for given in inputs])
         views = _padded([given.seen.views for given in inputs])
         places = _padded([given.seen.positions for given in inputs]) / METERS
@@ -92,7 +94,7 @@ class ObjectEncoder(TokenEncoder):
 
 
 def _padded(arrays: Sequence[NDArray[Any]]) -> Tensor:
-    """Return arrays of objects in one, each filled up with zeros to the longest."""
+    """Return n arrays (objects, …) as one tensor (n, most objects, …), filled up with zeros."""
     return pad_sequence([torch.from_numpy(array) for array in arrays], batch_first=True)
 
 
@@ -102,7 +104,11 @@ ENCODERS: dict[str, type[TokenEncoder]] = {"words": WordEncoder, "objects": Obje
 def make_encoders(
     vocabulary: Vocabulary, settings: Mapping[str, Mapping[str, Any]]
 ) -> nn.ModuleDict:
-    """Return untrained encoders.
+    """Return untrained encoders by name, for a reader of words.
+
+    Args:
+        vocabulary: words and classes that they encode.
+        settings: by the name of each encoder, its keyword arguments.
 
     Raises:
         UnknownNameError: there is none of that name.
@@ -119,9 +125,13 @@ def make_encoders(
 
 
 def waves(places: Tensor, count: int) -> Tensor:
-    """Return places (..., 2) with sines and cosines of `count` rising frequencies.
+    """Return places followed by sines and cosines of them: (..., 4 * count + 2).
 
-    A network tells places near each other apart by the fast ones, and far ones by the slow.
+    A network separates places near each other by the fast waves, and far ones by the slow.
+
+    Args:
+        places: (..., 2) in units that the slowest wave spans about once.
+        count: number of frequencies, each twice the one before.
     """
     scales = math.pi * 2.0 ** torch.arange(count)
     angles = (places[..., None] * scales).flatten(-2)

@@ -153,10 +153,14 @@ class LabeledEpisodes(NamedTuple):
 def train_listener(
     plan: TrainingPlan, folder: Path, name: str, workers: int, progress: Progress
 ) -> LearnedModel:
-    """Return a listener that has learned from the train split and random scenes.
+    """Train a listener on the train split and random scenes, and return it.
 
-    Pictures, the detector and the reader on the way stay in the folder, and are used again as far
-    as they fit. The name is the listener's among those of the folder.
+    Args:
+        plan: how it is trained.
+        folder: keeps pictures, detector and reader, which are used again as far as they fit.
+        name: of the listener, among those of the folder.
+        workers: processes that draw pictures; 0 uses this one.
+        progress: called with a kind of work, what is done of it, and all of it.
     """
     check_reader(plan.reader)
     scenes = see_episodes(plan, folder, workers, progress)
@@ -168,7 +172,7 @@ def see_episodes(
 ) -> SeenEpisodes:
     """Train a detector on the pictures of the train split, and look at all episodes.
 
-    Of random scenes the labels stand for what the detector would find.
+    In random scenes, which are many, it does not look: their labels stand for what it would find.
     """
     splits = TrainingSplits.of(plan.reader)
     every_episode = (*splits.learned, *splits.held_back)
@@ -189,7 +193,7 @@ def see_episodes(
 def _trained_detector(
     labeled: LabeledEpisodes, plan: TrainingPlan, folder: Path, progress: Progress
 ) -> DetectorNet:
-    """Return a detector that has learned; its file after each pass stays in the folder."""
+    """Return a trained detector; a finished or interrupted training of the folder goes on."""
     course = DetectorCourse(labeled, plan)
     kept = KeptTraining(folder / f"detector-{plan.reader.seed}.pt", course.made_of)
     Training(course).run(partial(progress, "detector"), kept)
@@ -202,7 +206,7 @@ def _needs_pixels(plan: TrainingPlan) -> bool:
 
 
 def _read_each(folder: Path, episodes: Iterable[Episode], *, pictures: bool) -> ViewsByKey:
-    """Return the views of episodes, or only their labels."""
+    """Return the stored views of episodes by the episode's key, with pictures or only labels."""
     return {episode.key: read_views(folder, episode, pictures=pictures) for episode in episodes}
 
 
@@ -215,7 +219,7 @@ def _views_in(views_by_key: ViewsByKey) -> list[LabeledView]:
 
 
 def _plane_of(labeled: LabeledEpisodes) -> TablePlane:
-    """Return where on the table the points of pictures are, learned from all labels."""
+    """Return the map from places in pictures to the table, fitted to all labels."""
     views = _views_in(labeled.by_key)
     centers = np.concatenate([view.centers for view in views])
     positions = np.concatenate([view.positions for view in views])
@@ -225,7 +229,14 @@ def _plane_of(labeled: LabeledEpisodes) -> TablePlane:
 def _see_each(
     labeled: LabeledEpisodes, detector: DetectorNet, plane: TablePlane, *, keeps_pictures: bool
 ) -> dict[str, ListenerInput]:
-    """Return what is seen of each episode, by its key, without task and words."""
+    """Return what is seen of each episode, by its key, as inputs without task and words yet.
+
+    Args:
+        labeled: all episodes; of random scenes the labels are taken, else the detector looks.
+        detector: trained.
+        plane: maps pictures to the table.
+        keeps_pictures: whether the pictures themselves are part of the inputs.
+    """
     classes = labeled.classes
     seen = {}
     for key, views in labeled.by_key.items():
@@ -239,7 +250,14 @@ def _see_each(
 def train_on_scenes(
     scenes: SeenEpisodes, plan: TrainingPlan, kept: Path, progress: Progress
 ) -> LearnedModel:
-    """Return a listener that has learned to read; `kept` is its file after each pass."""
+    """Train the reader of a listener on scenes that its detector has seen; return the listener.
+
+    Args:
+        scenes: episodes with what is seen of them.
+        plan: how it is trained.
+        kept: file in which the training is kept after each pass.
+        progress: called after each pass.
+    """
     reader_plan = plan.reader
     torch.manual_seed(reader_plan.seed)
     lessons = _lessons(scenes.episodes, scenes.seen, reader_plan)
@@ -261,7 +279,7 @@ def train_on_scenes(
 def _lessons(
     episodes: Sequence[Episode], seen: Mapping[str, ListenerInput], plan: ReaderPlan
 ) -> list[Lesson]:
-    """Return what is said of episodes, with what is seen of them and the goals that are meant."""
+    """Return the lessons of episodes: each an instruction, what is seen, and the goal it means."""
     lessons = []
     for episode, text in instructions_of(episodes, plan):
         given = seen[episode.key]._replace(task=episode.task, text=text)
@@ -270,12 +288,17 @@ def _lessons(
 
 
 def _hide_from_lessons(lessons: Iterable[Lesson], without: Without) -> list[Lesson]:
-    """Return lessons without what the listener does not get."""
+    """Return lessons without what the listener does not get: pictures, video or words."""
     return [lesson._replace(given=hide_inputs(lesson.given, without)) for lesson in lessons]
 
 
 def _as_detected(views: Iterable[LabeledView], classes: Sequence[str]) -> list[SeenObjects]:
-    """Return labels as if the detector had found them."""
+    """Return the labels of views as if the detector had found those objects.
+
+    Args:
+        views: labeled pictures.
+        classes: names in the order of their numbers.
+    """
     numbers = {name: number for number, name in enumerate(classes)}
     found = []
     for view in views:
@@ -302,7 +325,7 @@ class DetectorCourse(Course[LabeledView]):
 
     @property
     def made_of(self) -> list[object]:
-        """All that the detector depends on, apart from the seed."""
+        """What must be equal for a kept training to go on; the seed is in its file's name."""
         tasks = list(self._plan.reader.tasks)
         return [tasks, list(self._classes), self.epochs, ENVIRONMENT_VERSION]
 

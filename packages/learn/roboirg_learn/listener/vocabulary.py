@@ -103,7 +103,7 @@ def parts_of(answer: str) -> list[str]:
 
 
 def parts_of_tasks(tasks: Iterable[str]) -> tuple[str, ...]:
-    """Return the parts of all answers of tasks, in the order of their numbers."""
+    """Return the parts that the answers of tasks can have, sorted; a part's place is its number."""
     found = set()
     for task in tasks:
         for answer in goal_schema(task).goals:

@@ -59,7 +59,7 @@ class FastNorm(NamedTuple):
     shift: Tensor
 
     def __call__(self, values: Tensor) -> Tensor:
-        """Return values (n, heads, m, size), each row divided by its root mean square, scaled, shifted."""
+        """Return values (n, heads, m, size) over their root mean square, scaled and shifted."""
         return values / _root_mean_square(values) * (1.0 + self.scale) + self.shift
 
     def pull_back(self, values: Tensor, error: Tensor) -> Tensor:
@@ -211,7 +211,7 @@ class FastWeightMemory(LookMemory):
         return (rates * tokens.mask[..., None]).transpose(2, 3)[..., None]
 
     def _first_state(self, tokens: MaskedTokens, carried: Carried) -> FastState:
-        """Return the fast weights before the new looks: carried ones, or those that were learned."""
+        """Return the fast weights before the new looks: carried ones, or else learned ones."""
         if carried.state is not None:
             state: FastState = carried.state
             return state
@@ -264,7 +264,7 @@ class ExpertJoin(Join):
         self._mask = mask
 
     def attended(self, keys: Tensor, values: Tensor, seen: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Return keys, values and attention mask after appending the memory's tokens.
+        """Return keys, values and mask after appending the memory's tokens.
 
         Args:
             keys: (n, heads, L, size) of the body's tokens.

@@ -58,10 +58,12 @@ Differences = Mapping[str, Mapping[str, Any]]
 
 
 def answers_text(frames: Mapping[str, pd.DataFrame]) -> str:
-    """Return the paper's questions with the answers of the parts and of its rates.
+    """Return the page's sections: each a question of the paper with a table of answers.
+
+    A table has rows of our small policies, and rows computed from the paper's published rates.
 
     Args:
-        frames: results of the parts that were played, as `roboirg.results` returns them.
+        frames: episodes of the parts that were played, by part, as `roboirg.results` returns them.
     """
     sections: list[str] = []
     if MAIN in frames:
@@ -72,7 +74,7 @@ def answers_text(frames: Mapping[str, pd.DataFrame]) -> str:
 
 
 def _with_words(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the episodes in which the instruction was told, not withheld."""
+    """Return the episodes in which the policy was given the instruction; in others it gets none."""
     return frame[frame["arm"] == "told"]
 
 
@@ -85,11 +87,11 @@ class _Published:
         }
 
     def rates(self, system: str, setting: str) -> Rates:
-        """Return the rates of a system in a setting, by task."""
+        """Return the published success of a system in a setting by task, percent."""
         return self._rates[system, setting]
 
     def changes(self, settings: Sequence[str]) -> Differences:
-        """Return by system, for each setting, its success less explicit success."""
+        """Return for each system and setting its success less that with explicit words."""
         found: dict[str, dict[str, Difference]] = {}
         for system in SYSTEMS.values():
             explicit = self.rates(system, EXPLICIT)
@@ -99,7 +101,7 @@ class _Published:
         return found
 
     def gains(self, settings: Sequence[str]) -> Differences:
-        """Return by system, for each setting, its success less that of the one without memory."""
+        """Return for each system and setting its success less that of the system without memory."""
         found: dict[str, dict[str, Difference]] = {system: {} for system in OTHER_SYSTEMS}
         for name in settings:
             first = self.rates(WITHOUT_MEMORY_SYSTEM, name)
@@ -109,7 +111,12 @@ class _Published:
 
 
 def _main_questions(with_words: pd.DataFrame) -> Iterator[str]:
-    """Yield the sections that the main experiment answers, each a table."""
+    """Yield the sections that the main experiment answers, each a question with a table.
+
+    Args:
+        with_words: episodes of the main part. In the form *implicit* words refer to things; in
+            *resolved* the references are replaced by names.
+    """
     settings = [name for name in plain_settings() if name != EXPLICIT]
     published = _Published()
     played = with_words[with_words["form"] == "implicit"]
@@ -135,7 +142,7 @@ def _main_questions(with_words: pd.DataFrame) -> Iterator[str]:
 
 
 def _memory_question(played: pd.DataFrame, settings: Sequence[str], published: _Published) -> str:
-    """Return by setting what memory adds."""
+    """Return the table of what memory adds in each setting: ours, then the paper's systems."""
     gaps = _gaps(played, "setting", {"policy": WITHOUT_MEMORY_ROW})
     return _table(
         "Do memory and referring come apart?",
@@ -146,7 +153,10 @@ def _memory_question(played: pd.DataFrame, settings: Sequence[str], published: _
 
 
 def _group_question(explicit: pd.DataFrame, published: _Published) -> str:
-    """Return by group of tasks what memory adds; tasks with a video are also a group."""
+    """Return the table of what memory adds in each group of tasks, with explicit words.
+
+    Groups are the suites of tasks; all tasks with a video are one more group.
+    """
     is_filmed = explicit["demonstration_steps"] > 0
     filmed = explicit[is_filmed].assign(suite="with a video")
     tasks_of: dict[str, set[str]] = {}
@@ -171,7 +181,13 @@ def _group_question(explicit: pd.DataFrame, published: _Published) -> str:
 def _published_gains(
     system: str, tasks_of: Mapping[str, set[str]], published: _Published
 ) -> dict[str, Difference]:
-    """Return by group of tasks the explicit success of a system less that without memory."""
+    """Return for each group of tasks what memory adds to a system: a difference of success.
+
+    Args:
+        system: of the paper.
+        tasks_of: the tasks of each group.
+        published: the paper's rates; those with explicit words are compared.
+    """
     first = published.rates(WITHOUT_MEMORY_SYSTEM, EXPLICIT)
     gains = {}
     for group, tasks in tasks_of.items():
@@ -182,7 +198,10 @@ def _published_gains(
 
 
 def _stage_question(with_words: pd.DataFrame) -> str:
-    """Return what each further stage of the context costs."""
+    """Return the table of what each further stage of the context costs.
+
+    A context is told in stages before the instruction; all are compared with the shortest one.
+    """
     rows = published_rows("context")
     shortest = min(rows, key=lambda row: len(row.options.stages)).label
     longer = [label for label in dict.fromkeys(row.label for row in rows) if label != shortest]
@@ -204,7 +223,14 @@ def _stage_question(with_words: pd.DataFrame) -> str:
 def _gaps(
     frame: pd.DataFrame, column: str, against: Mapping[str, str], form: str = "implicit"
 ) -> dict[str, dict[str, Any]]:
-    """Return the gaps of the groups of policy, a column and a form that have one."""
+    """Return differences of success, by policy and then by the value of a column.
+
+    Args:
+        frame: played episodes.
+        column: such as ``setting``; each of its values is a column of the table.
+        against: what each group is compared with, such as ``{"setting": "explicit"}``.
+        form: of the instructions that are compared.
+    """
     found: dict[str, dict[str, Any]] = {row_name(memory): {} for memory in SYSTEMS}
     for measured in roboirg.measure(frame, ("policy", column, "form"), against):
         policy, name, measured_form = measured.key
@@ -214,9 +240,10 @@ def _gaps(
 
 
 def _published_difference(first: Rates, second: Rates) -> Difference:
-    """Return the difference of published rates, the mean over the tasks of the first.
+    """Return the mean difference of two published rates over the tasks that the first has.
 
-    The trials of two published cells are taken as independent, as only their rates are known.
+    Interval and p-value are of a normal approximation, with `TRIALS` rollouts for each rate. The
+    rollouts of the two are taken as independent, because only their rates are known.
     """
     total = 0.0
     variance = 0.0
@@ -234,11 +261,18 @@ def _published_difference(first: Rates, second: Rates) -> Difference:
     if not spread:
         return Difference(value, None, 1.0)
     interval = value - Z_95 * spread, value + Z_95 * spread
+    # The p-value is two-sided.
     return Difference(value, interval, math.erfc(abs(value) / spread / math.sqrt(2)))
 
 
 def _retention(settings: Sequence[str], changes: Differences, published: _Published) -> str:
-    """Return how much of explicit success is kept in each setting."""
+    """Return the table of the share of explicit success that is kept in each setting, percent.
+
+    Args:
+        settings: the columns.
+        changes: differences to explicit success, by policy and setting, with the shares.
+        published: the paper's rates.
+    """
     cells: dict[str, dict[str, str]] = {}
     for row, gaps in changes.items():
         for setting, gap in gaps.items():
@@ -257,18 +291,27 @@ def _retention(settings: Sequence[str], changes: Differences, published: _Publis
 
 
 def _percent_kept(rates: Rates, explicit: Rates) -> float:
-    """Return the sum of rates by that of the explicit rates of the same tasks, in percent."""
+    """Return what percentage of explicit success is kept: of the sums over the same tasks."""
     kept = 0.0
-    whole = 0.0
+    explicit_sum = 0.0
     for task, rate in rates.items():
         if rate is not None:
             kept += float(rate)
-            whole += float(explicit[task] or 0)
-    return 100 * kept / whole
+            explicit_sum += float(explicit[task] or 0)
+    return 100 * kept / explicit_sum
 
 
 def _table(title: str, note: str, columns: Sequence[str], found: Differences) -> str:
-    """Return a table of differences; a star marks p at most 0.05 with Holm's correction by row."""
+    """Return a Markdown table of differences in points, with their 95 % intervals.
+
+    A star marks p ≤ 0.05 after Holm's correction for the several columns of a row.
+
+    Args:
+        title: the question.
+        note: under the table.
+        columns: such as settings.
+        found: by row, then by column.
+    """
     rows = []
     for row, differences in found.items():
         shown = [name for name in columns if name in differences]
@@ -285,7 +328,7 @@ def _table(title: str, note: str, columns: Sequence[str], found: Differences) ->
 
 
 def _cells_of_row(texts: Mapping[str, str], columns: Sequence[str]) -> list[str]:
-    """Return the cells of a row; a dash where there is none."""
+    """Return the text of each column of a row; a dash where it has none."""
     return [texts.get(name, "–") for name in columns]
 
 
@@ -295,9 +338,13 @@ def _with_interval(
     form: str,
     form_of_ends: str = "{:.0f}",
 ) -> str:
-    """Return a value in percent with the ends of its interval, which are from 0 to 1.
+    """Return a value with its interval as text, such as ``-12.0* (-20 to -4)``.
 
-    Example: ``-12.0* (-20 to -4)``.
+    Args:
+        value: in percent or points.
+        interval: from 0 to 1, or -1 to 1 for a difference; None for *no interval*.
+        form: format of the value.
+        form_of_ends: format of the ends, which are turned into percent.
     """
     shown = form.format(value)
     if interval is None:

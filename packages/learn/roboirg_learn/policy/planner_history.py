@@ -42,10 +42,14 @@ class PlannedNumbers(NamedTuple):
 
 
 def requests_for_hands(rows: Sequence[NDArray[np.float32]]) -> PlannedNumbers:
-    """Return what hands are given that follow subgoals, as `asked_numbers` returns them."""
+    """Return the network input of hands for D decisions.
+
+    Args:
+        rows: the subgoal to follow at each, as `subgoals.encode_request` returns it.
+    """
     no_looks = np.full((len(rows), 1), NO_LOOK, np.int64)
-    no_keys = np.full((len(rows), RECENT), NO_LOOK, np.int64)
-    return PlannedNumbers(np.stack(rows), no_looks, no_keys)
+    no_labels = np.full((len(rows), RECENT), NO_LOOK, np.int64)
+    return PlannedNumbers(np.stack(rows), no_looks, no_labels)
 
 
 class PlannerHistory:
@@ -158,8 +162,7 @@ def ideal_planner_inputs(
         kept_looks.append(history.kept(video, look))
         if form >= 0:
             history.name(form, look)
-            has_changed = history.switches[-1] == look
-            if has_changed:
+            if history.switches[-1] == look:  # the subgoal has changed
                 history.choose([look])
         to_keep.append(_keep_labels(look, history.switches, is_named=form >= 0))
     return PlannedNumbers(np.stack(context), np.stack(kept_looks), np.stack(to_keep))

@@ -24,7 +24,7 @@ from roboirg_learn.policy.trained_body import Pictures, TrainedBody, load_body
 from roboirg_learn.policy.trained_reader import TrainedReader, load_reader
 
 FIRST_LOOKS = (0, LATER_STEP // LOOK_EVERY)
-"""Looks at which the reader of words sees a video, two seconds apart; else it sees the first."""
+"""Numbers of the looks at a video that the reader of words sees, two seconds apart."""
 _BATCH = 32
 
 
@@ -104,13 +104,14 @@ class SeenEpisode:
         *,
         is_video: bool,
     ) -> None:
-        """See pictures of the front camera.
+        """Find the things of front pictures and remember them as looks.
 
         Args:
-            pictures: in the order of time.
-            tools: (7,) the tool's pose and a finger's opening at each.
+            pictures: uint8 (256, 256, 3) each, in the order of time.
+            tools: (7,) at each picture, as `tool_of` returns it.
             is_video: whether they are of the video.
         """
+        # Without a video the reader of words sees the first picture only.
         first_looks = FIRST_LOOKS if is_video else FIRST_LOOKS[:1]
         for start in range(0, len(pictures), _BATCH):
             part = slice(start, start + _BATCH)
@@ -135,7 +136,13 @@ class SeenEpisode:
     def choose(
         self, net: BodyNet, goal: NDArray[np.float32], planned: PlannedNumbers | None
     ) -> NetworkChoice:
-        """Return what a network, body or planner, chooses after the last look."""
+        """Return what a network chooses after the last look.
+
+        Args:
+            net: a body, which chooses a kind of waypoint, or a planner, which chooses a subgoal.
+            goal: as `understand` returns it.
+            planned: for hands the subgoal, for a planner what it named and keeps; else None.
+        """
         no_label = np.array([NO_LABEL])
         numbers = EpisodeNumbers(
             looks=self._history.numbers(),
@@ -156,15 +163,19 @@ class SeenEpisode:
         return NetworkChoice(kind, thing if is_there else None, to_keep)
 
     def _carried_for(self, net: BodyNet, goal: NDArray[np.float32]) -> Carried:
-        """Return what a network remembers of the looks; with another goal it begins anew."""
-        before = self._remembered.get(net)
-        if before is None or not np.array_equal(before.goal, goal):
-            before = _RememberedLooks(goal, Carried())
-            self._remembered[net] = before
-        return before.carried
+        """Return what a network remembers of the looks so far, which its next call goes on from.
+
+        What is remembered depends on the goal, so with another goal (another utterance was heard)
+        it begins anew.
+        """
+        remembered = self._remembered.get(net)
+        if remembered is None or not np.array_equal(remembered.goal, goal):
+            remembered = _RememberedLooks(goal, Carried())
+            self._remembered[net] = remembered
+        return remembered.carried
 
     def point(self, thing: int) -> NDArray[np.float64]:
-        """Return column and row in the front picture of a thing, where it was last seen."""
+        """Return where a thing, given by its track, was last seen: column and row, pixels, (2,)."""
         tracks = self._history.tracks
         height = self._model.body.sight.heights[tracks.classes[thing]]
         return points_of(np.append(tracks.places[thing].astype(np.float64), height))
@@ -175,11 +186,11 @@ class SeenEpisode:
         tool: NDArray[np.floating[Any]],
         planned: PlannedNumbers | None = None,
     ) -> NDArray[np.float64]:
-        """Return the next waypoint (7), after the last look.
+        """Return the next waypoint (7,), as `moves.waypoint` does, after the last look.
 
         Args:
             goal: as `understand` returns it.
-            tool: (7,) of the last look.
+            tool: (7,) pose and opening now.
             planned: the subgoal to follow, for hands.
         """
         body = self._model.body

@@ -49,7 +49,10 @@ def load_recording(path: Path) -> ExpertRecording:
 
 
 def _recording_of(arrays: dict[str, NDArray[Any]]) -> ExpertRecording:
-    """Return the recording of a file's arrays."""
+    """Return a recording, given the arrays of its file by name.
+
+    Pictures are PNG files as bytes, by the number of their look: ``picture_16`` is of look 16.
+    """
     fields: dict[str, Any] = {"pictures": {}}
     for name, array in arrays.items():
         if name.startswith(_PICTURE):

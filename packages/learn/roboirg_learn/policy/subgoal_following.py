@@ -44,7 +44,9 @@ class SubgoalNamer:
         self._subgoal = ""
 
     def next(self, goal: NDArray[np.float32]) -> str:
-        """Return the subgoal; its point stays as long as the same thing is meant.
+        """Return the subgoal after the last look, in words with a point.
+
+        While kind and thing stay the same the words do, too: the point does not follow the thing.
 
         Args:
             goal: as `GoalLayout.numbers` returns it.
@@ -54,8 +56,9 @@ class SubgoalNamer:
         look = self._seen.looks - 1
         chosen = self._seen.choose(self._body.planner, goal, self._planned(look))
         self._history.name(chosen.kind, look)
+        # Chosen are places among the recent looks; before the first look there is none.
         recent = [recent_looks(look)[place] for place in chosen.to_keep]
-        self._history.choose(kept for kept in recent if kept >= 0)
+        self._history.choose(number for number in recent if number >= 0)
 
         is_same = chosen.kind == self._last_kind and chosen.thing == self._last_thing
         if not is_same:
@@ -65,7 +68,10 @@ class SubgoalNamer:
         return self._subgoal
 
     def _planned(self, look: int) -> PlannedNumbers:
-        """Return what the planner is given at a look; which looks to keep it says itself."""
+        """Return the planner's input at a look: what it named, and the looks that it keeps.
+
+        `to_keep` is a label of training, so it is empty here.
+        """
         return PlannedNumbers(
             context=self._history.context(look)[None],
             kept_looks=self._history.kept(self._seen.video_looks, look)[None],
@@ -73,13 +79,13 @@ class SubgoalNamer:
         )
 
     def _words(self, chosen: NetworkChoice) -> str:
-        """Return a subgoal with the point where its thing was last seen."""
+        """Return a chosen subgoal in words, with the pixel at which its thing was last seen."""
         point = None if chosen.thing is None else self._seen.point(chosen.thing)
         return self._body.forms[chosen.kind].at(point)
 
 
 class LearnedHands(LearnedPolicy):
-    """Follows subgoals, those of any planner; without one, those of its own.
+    """Moves towards subgoals: those of any planner, or else those of its own planner.
 
     Attributes:
         subgoal: the one it follows.
@@ -96,7 +102,7 @@ class LearnedHands(LearnedPolicy):
         self._namer = SubgoalNamer(self.model, self.seen)
 
     def follow(self, subgoal: str) -> None:
-        """Set the subgoal; words of no known form change nothing."""
+        """Follow a subgoal of another planner from now on; unknown words change nothing."""
         self._namer = None
         self._take(subgoal)
 
@@ -107,12 +113,13 @@ class LearnedHands(LearnedPolicy):
             self._take(self._namer.next(self.understand()))
         if self._request is None:
             return np.append(observation["end_effector"], GRIPPER_UNCHANGED)[None]
-        nothing = np.zeros(self.model.body.goals.size, np.float32)
-        chosen = seen.decide(nothing, tool_of(observation), requests_for_hands([self._request]))
+        # Hands are trained without goal: the subgoal is all that they are given.
+        no_goal = np.zeros(self.model.body.goals.size, np.float32)
+        chosen = seen.decide(no_goal, tool_of(observation), requests_for_hands([self._request]))
         return chosen[None]
 
     def _take(self, subgoal: str) -> None:
-        """Set the subgoal if its words have a known form."""
+        """Set the subgoal if its words have a known form; else keep the one before."""
         found = encode_request(subgoal, self.model.body.sight)
         if found is not None:
             self.subgoal = subgoal

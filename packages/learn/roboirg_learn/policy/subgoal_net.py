@@ -51,8 +51,8 @@ class ContextInput(nn.Module):
         has_point = context[:, :, None, -3:-2]
         from_point = places - context[:, :, None, -2:]
         nearness = (-from_point.norm(dim=-1, keepdim=True) * NEARNESS).exp()
-        scaled = from_point * AWAY_SCALE
-        numbers = torch.cat([scaled, nearness, torch.ones_like(nearness)], -1) * has_point
+        parts = [from_point * AWAY_SCALE, nearness, torch.ones_like(nearness)]
+        numbers = torch.cat(parts, -1) * has_point
         to_all = self.every(context)
         return to_all, to_all[:, :, None] + self.pointed(numbers)
 

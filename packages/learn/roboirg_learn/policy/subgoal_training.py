@@ -13,7 +13,7 @@ from roboirg_learn.policy.sight import Sight
 from roboirg_learn.policy.subgoals import encode_request, recorded_subgoals
 
 IS_VIDEO = 6
-"""Where the numbers of the tool have whether a look is one of the video."""
+"""Column in the numbers of the tool: 1 if the look is one of the video, else 0."""
 
 
 def with_planner_inputs(
@@ -24,22 +24,26 @@ def with_planner_inputs(
     sight: Sight,
     rng: np.random.Generator,
 ) -> EpisodeNumbers:
-    """Return an episode with what hands or a planner are given; of other bodies as it is.
+    """Return an episode with the subgoals that hands or a planner are given.
+
+    Episodes of other bodies are returned as they are.
 
     Args:
         memory: a name of `MEMORIES`.
-        recorded: the episode.
-        numbers: the same for the network.
+        recorded: the episode and its recording.
+        numbers: the same as network input.
         forms: number of forms of subgoals, for a planner.
-        sight: of the camera.
+        sight: classes of things and their heights.
         rng: moves the points of subgoals.
     """
     if memory == HANDS:
         done = numbers.done.tolist()
         subgoals = recorded_subgoals(recorded.recording, recorded.episode, done, rng)
-        asked = requests_for_hands([_encode_known_request(subgoal, sight) for subgoal in subgoals])
+        requests = requests_for_hands(
+            [_encode_known_request(subgoal, sight) for subgoal in subgoals]
+        )
         # Hands know what they are asked for, and no goal.
-        return numbers._replace(goal=np.zeros_like(numbers.goal), planned=asked)
+        return numbers._replace(goal=np.zeros_like(numbers.goal), planned=requests)
     if memory in PLANNERS:
         chooses = memory == KEYFRAME_PLANNER
         video = int(numbers.looks.tool[:, IS_VIDEO].sum())
@@ -51,7 +55,11 @@ def with_planner_inputs(
 
 
 def _encode_known_request(subgoal: str, sight: Sight) -> NDArray[np.float32]:
-    """Return the numbers of a subgoal; raise if it has no known form."""
+    """Return a subgoal as numbers for hands (REQUEST_SIZE,).
+
+    Raises:
+        InvalidValueError: its words have no known form.
+    """
     found = encode_request(subgoal, sight)
     if found is None:
         raise InvalidValueError(f"The subgoal {subgoal!r} has no form that hands know.")

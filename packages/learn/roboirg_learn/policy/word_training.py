@@ -72,11 +72,11 @@ def check_words(plan: ReaderPlan) -> None:
 def train_policy_reader(
     body: TrainedBody, plan: ReaderPlan, folder: Path, name: str, workers: int, progress: Progress
 ) -> TrainedReader:
-    """Return a reader that has learned what instructions mean in scenes that a body sees.
+    """Train a reader of words for a body: it names task and goal of an instruction in a scene.
 
     Args:
         body: of a file; its detector sees the scenes.
-        plan: how.
+        plan: its tasks, settings, passes and seed.
         folder: for what is learned on the way, from which an interrupted training goes on.
         name: of the reader, among those of the folder.
         workers: processes that draw; 0 uses this one.
@@ -99,13 +99,16 @@ def train_policy_reader(
 
 
 def _vocabulary(lessons: Sequence[Lesson], body: TrainedBody) -> Vocabulary:
-    """Return the words of lessons with the classes, tasks and parts of goals of a body."""
+    """Return the words of lessons, with classes, tasks and parts of goals as the body has them."""
     words = words_of(lesson.given.text for lesson in lessons)
     return Vocabulary(words, body.sight.classes, body.goals.tasks, body.goals.parts)
 
 
 def _lessons(plan: ReaderPlan, episodes: Sequence[Episode], scenes: SeenScenes) -> list[Lesson]:
-    """Return the instructions of episodes; without settings nothing is said."""
+    """Return what a reader learns: an instruction, what is seen at first, and the goal meant.
+
+    A plan without settings makes a reader without words: one empty instruction for each episode.
+    """
     instructions = [(episode, "") for episode in episodes]
     if plan.settings:
         instructions = list(instructions_of(episodes, plan))
@@ -119,7 +122,10 @@ def _lessons(plan: ReaderPlan, episodes: Sequence[Episode], scenes: SeenScenes) 
 def _view_scenes(
     body: TrainedBody, episodes: Sequence[Episode], workers: int, progress: Progress
 ) -> SeenScenes:
-    """Return what a body sees at first in episodes; no expert plays them."""
+    """Draw the first pictures of episodes, and return what the body's detector finds in them.
+
+    No expert plays the episodes.
+    """
     looks = {}
     positions = []
     for episode, views in parallel_map(look, episodes, workers):
@@ -160,5 +166,5 @@ class TaskCourse(Course[Lesson]):
 
 
 def _without_some_words(text: str, rng: random.Random) -> str:
-    """Return a text without some of its words."""
+    """Return a text without a random tenth of its words (`FORGOTTEN_WORDS`)."""
     return " ".join(word for word in text.split() if rng.random() >= FORGOTTEN_WORDS)
