@@ -161,7 +161,7 @@ def learn_policy(
     ] = False,
     workers: Workers = None,
 ) -> None:
-    """Train a policy that body_plan on pictures and words: records the expert, then learns.
+    """Train a policy that acts on pictures and words: records the expert, then learns.
 
     It becomes two files: a body, and a reader of words for it. What is there already is used again.
     A plan may have, under `training`: scenes, drawn, goals, detector_epochs, body_epochs,

@@ -39,7 +39,7 @@ NO_PICTURE: Pixels = np.zeros((0, 0, 3), np.uint8)
 """Stands for the picture where only labels were asked for."""
 
 
-look = partial(labeled_views, later=LATER_STEP)
+views_at_start = partial(labeled_views, later=LATER_STEP)
 """Returns labeled front pictures of an episode: its first one; with a video, also a later one."""
 
 
@@ -80,7 +80,7 @@ def draw_missing(
     Args:
         folder: of the files, one for each episode.
         episodes: all of them.
-        draw: `look`, with labels, or `views_as_played`, without.
+        draw: `views_at_start`, with labels, or `views_as_played`, without.
         workers: processes that draw; 0 uses this one.
         show: called after each episode with how many are done, and how many there are.
     """

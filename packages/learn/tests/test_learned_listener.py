@@ -18,7 +18,7 @@ from roboirg.policies.by_name.finding import make_policy, read_policy
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
-from roboirg_learn.labeled_views import look
+from roboirg_learn.labeled_views import views_at_start
 from roboirg_learn.listener import listener_study, study_report
 from roboirg_learn.listener.listener_study import VARIANTS
 from roboirg_learn.listener.study_report import trained_rate
@@ -46,7 +46,7 @@ def test_labels_are_what_is_visible_and_where():
     places = [item.position[:2] for item in episode.scene.objects]
     cubes = {"cube red", "cube green", "cube blue"}
 
-    first, later = look(episode)
+    first, later = views_at_start(episode)
 
     assert cubes <= set(first.names)
     assert "container" not in first.names  # they appear over the cubes
@@ -170,7 +170,7 @@ def test_it_learns_and_its_file_is_the_same_listener(trained):
     again = load_model(path)
     assert again.vocabulary == model.vocabulary
     assert again.about["settings"] == ["explicit", "direct"]
-    picture = look(get_episode("StopCube", "train", 0))[0].picture
+    picture = views_at_start(get_episode("StopCube", "train", 0))[0].picture
     texts = {
         visit: f"Stop the cube on the target during its {word} visit by pressing the button."
         for visit, word in ((2, "second"), (3, "third"), (4, "fourth"), (5, "fifth"))
@@ -249,7 +249,7 @@ def test_an_encoder_of_one_s_own_is_trained_and_loaded(few, torch, tmp_path, mon
     save_model(model, tmp_path / "own.safetensors")
     again = load_model(tmp_path / "own.safetensors")
     assert again.about["encoders"] == {"shades": {"size": 4}, "words": {}}
-    picture = look(get_episode("StopCube", "val", 0))[0].picture
+    picture = views_at_start(get_episode("StopCube", "val", 0))[0].picture
     with torch.no_grad():
         mine, theirs, dark = (
             reader.reader([reader.see([seen])._replace(task="StopCube", text="Stop it.")])[0]

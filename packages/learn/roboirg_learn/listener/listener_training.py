@@ -20,7 +20,7 @@ from pydantic import PositiveInt
 
 from roboirg.extension.episodes import ENVIRONMENT_VERSION, Episode, episodes_of
 from roboirg.extension.sight import LabeledView
-from roboirg_learn.labeled_views import draw_missing, look, read_views
+from roboirg_learn.labeled_views import draw_missing, read_views, views_at_start
 from roboirg_learn.listener.detector_net import INPUT_SIZE, DetectorNet, detector_loss
 from roboirg_learn.listener.encoders import ENCODERS
 from roboirg_learn.listener.learned_model import LearnedModel, Without, hide_inputs
@@ -176,7 +176,7 @@ def see_episodes(
     """
     splits = TrainingSplits.of(plan.reader)
     every_episode = (*splits.learned, *splits.held_back)
-    draw_missing(folder, every_episode, look, workers, partial(progress, "pictures"))
+    draw_missing(folder, every_episode, views_at_start, workers, partial(progress, "pictures"))
 
     needs_pixels = _needs_pixels(plan)
     labeled = LabeledEpisodes(

@@ -15,7 +15,7 @@ from torch.nn import functional
 
 from roboirg.extension.commands import InvalidValueError, parallel_map
 from roboirg.extension.episodes import Episode, episodes_of
-from roboirg_learn.labeled_views import look
+from roboirg_learn.labeled_views import views_at_start
 from roboirg_learn.listener.encoders import ENCODERS
 from roboirg_learn.listener.object_relations import ObjectsInView, corners_of
 from roboirg_learn.listener.reader_plan import ReaderPlan
@@ -128,7 +128,7 @@ def _view_scenes(
     """
     looks = {}
     positions = []
-    for episode, views in parallel_map(look, episodes, workers):
+    for episode, views in parallel_map(views_at_start, episodes, workers):
         looks[episode.key] = body.see([view.picture for view in views])
         positions.append(views[0].positions)
         progress("scenes", len(looks), len(episodes))
