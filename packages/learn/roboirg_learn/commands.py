@@ -124,6 +124,7 @@ def _run_study(plan: TrainingPlan, out: Path, workers: int) -> None:
 
     _check_folder(out, "--study needs a folder as --out")
     answers = run_study(plan, out, workers, _print_tenths())
+    # The listeners of a study differ in these, so the page does not show them.
     shown = {**plan.about, "seeds": plan.seeds}
     for name in ("tasks", "settings", "without"):
         del shown[name]
@@ -329,7 +330,7 @@ def _plan_changes(words: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
 
 def _print_tenths() -> Progress:
     """Return a function that prints progress to stderr: each tenth, and whatever has a note."""
-    shown: dict[str, int] = {}
+    shown: dict[str, int] = {}  # the last tenth of each kind of work
 
     def progress(work: str, done: int, total: int, note: str = "") -> None:
         tenth = 10 * done // total

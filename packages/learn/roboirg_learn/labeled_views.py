@@ -125,9 +125,16 @@ def _path(folder: Path, episode: Episode) -> Path:
 def _store(
     folder: Path, draw: Callable[[Episode], tuple[LabeledView, ...]], episode: Episode
 ) -> None:
-    """Draw the views of an episode and write them; runs in worker processes."""
+    """Draw the views of an episode and write them to its file; runs in worker processes.
+
+    Args:
+        folder: of the files.
+        draw: returns the views of an episode.
+        episode: to draw.
+    """
     stored = []
     for view in draw(episode):
+        # OpenCV has blue first.
         _, png = cv2.imencode(".png", view.picture[..., ::-1])
         centers = view.centers.tolist()
         stored.append(_StoredView(png.tobytes(), view.names, centers, view.positions.tolist()))

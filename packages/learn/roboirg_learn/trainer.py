@@ -118,6 +118,7 @@ class Training:
         self._optimizer = torch.optim.AdamW(
             course.net.parameters(), lr=course.rate, weight_decay=0.01
         )
+        # The rate rises for a tenth of all steps, then falls along a cosine.
         total = max(course.epochs * course.steps, 1)
         if total == SPOILED_TOTAL:
             total += 1

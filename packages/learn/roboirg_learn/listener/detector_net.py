@@ -109,7 +109,16 @@ def block(
 
 
 def detector_loss(net: DetectorNet, views: Sequence[LabeledView], classes: Sequence[str]) -> Tensor:
-    """Return the loss of a batch: class in all cells, offset in those with an object."""
+    """Return the loss of a batch of labeled pictures.
+
+    It adds that of the class of every cell, where background weighs little, and the mean distance
+    of the offset in cells with an object.
+
+    Args:
+        net: that learns.
+        views: uint8 pictures (256, 256, 3) with labels.
+        classes: names in the order of their numbers.
+    """
     labels = _cell_labels(views, classes)
     logits, offsets = net(torch.from_numpy(np.stack([view.picture for view in views])))
     weights = torch.ones(len(classes) + 1)
@@ -135,7 +144,14 @@ class CellLabels(NamedTuple):
 
 
 def _cell_labels(views: Sequence[LabeledView], classes: Sequence[str]) -> CellLabels:
-    """Return the labels of pictures by cell; in a cell with two objects the later one counts."""
+    """Return what the network should say of each cell of some pictures.
+
+    A cell belongs to the object whose center it has; of two objects the later one counts.
+
+    Args:
+        views: with names and centers, column and row in pixels, of their objects.
+        classes: names in the order of their numbers; 0 is background, so classes begin at 1.
+    """
     numbers = {name: number for number, name in enumerate(classes, start=1)}
     kinds = torch.zeros(len(views), GRID, GRID, dtype=torch.long)
     offsets = torch.zeros(len(views), 2, GRID, GRID)

@@ -52,6 +52,7 @@ class WordEncoder(TokenEncoder):
 
     def __init__(self, vocabulary: Vocabulary) -> None:
         super().__init__()
+        # 0 is padding, 1 an unknown word.
         self._numbers = {word: place + 2 for place, word in enumerate(vocabulary.words)}
         self.words = nn.Embedding(len(vocabulary.words) + 2, WIDTH, padding_idx=PADDING)
         self.order = nn.Parameter(torch.randn(MAX_WORDS, WIDTH) * 0.02)
@@ -75,6 +76,7 @@ class ObjectEncoder(TokenEncoder):
     def __init__(self, vocabulary: Vocabulary) -> None:
         super().__init__()
         classes = len(vocabulary.classes)
+        # One layer for each property of an object; a token is the sum of what they return.
         self.kinds = nn.Embedding(classes, WIDTH)
         self.views = nn.Embedding(VIEWS, WIDTH)
         self.places = nn.Linear(4 * WAVES + 2, WIDTH)

@@ -38,6 +38,7 @@ class ListenerNet(nn.Module):
         super().__init__()
         self.encoders = make_encoders(vocabulary, settings)
         self._tasks = {task: place for place, task in enumerate(vocabulary.tasks)}
+        # The task is the first token, from which the parts of answers are scored.
         self.tasks = nn.Embedding(len(vocabulary.tasks), WIDTH)
         self.encoder = transformer(WIDTH, HEADS, LAYERS)
         self.answer = nn.Linear(WIDTH, len(vocabulary.parts))

@@ -336,6 +336,7 @@ class DetectorCourse(Course[LabeledView]):
         return detector_loss(self.net, batch, self._classes)
 
     def score(self) -> dict[str, float]:
+        """Return the mean loss of held-back pictures."""
         groups = batches(self._held_back, random.Random(0))
         losses = [float(self.loss(group)) for group in groups]
         return {"held back": sum(losses) / len(losses)}

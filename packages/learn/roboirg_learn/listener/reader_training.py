@@ -158,11 +158,13 @@ class ReaderCourse(Course[Lesson]):
         self.steps = batch_count(lessons)
 
     def batches(self, epoch: int) -> Iterator[list[Lesson]]:
+        """Yield all lessons in batches, with other words unknown in each pass."""
         rng = random.Random(f"{self._seed}/{epoch}")
         lessons = [_with_unknown_words(lesson, rng) for lesson in self._lessons]
         return even_batches(lessons, rng, _length)
 
     def loss(self, batch: Sequence[Lesson]) -> torch.Tensor:
+        """Return the mean cross-entropy; lessons are scored one by one, as tasks differ in goals."""
         losses = []
         for lesson, scores in self._scored(batch):
             goal = torch.tensor([lesson.goal])
@@ -170,6 +172,7 @@ class ReaderCourse(Course[Lesson]):
         return torch.stack(losses).mean()
 
     def score(self) -> dict[str, float]:
+        """Return the share of held-back lessons whose goal scores best; {} without any."""
         if not self._held_back:
             return {}
         right = 0

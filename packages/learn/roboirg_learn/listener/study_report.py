@@ -118,7 +118,13 @@ def _variance_of_mean(tasks: Sequence[Verdicts], by_seed: Verdicts) -> _Variance
 
 
 def write_study(answers: Iterable[StudyAnswer], about: Mapping[str, Any], folder: Path) -> Path:
-    """Write the page of a study, and return its path."""
+    """Write the page of a study, ``study.md``, and return its path.
+
+    Args:
+        answers: of all listeners.
+        about: how they were trained, for the head of the page.
+        folder: of the study.
+    """
     trained = ", ".join(f"{name} {value}" for name, value in about.items())
     parts = ["# What a listener learns", f"Trained with: {trained}."]
     parts.append(tables_text(study_rates(answers)))

@@ -114,18 +114,22 @@ class BodyNet(nn.Module):
         self, classes: int, parts: int, at_things: Sequence[bool], memory: str, context: int = 0
     ) -> None:
         super().__init__()
+        # What is seen becomes tokens: things by class and place, the robot by its tool and goal.
         self.kinds = nn.Embedding(classes, WIDTH)
         self.spot = _two_layers(SPOT_NUMBERS)
         self.tool = _two_layers(TOOL_NUMBERS)
         self.unseen = nn.Parameter(torch.randn(WIDTH) * 0.02)
         self.goal = nn.Linear(parts, WIDTH)
+        # What is remembered is added, and the tokens are mixed.
         self.memory = MEMORIES[memory]()
         self.encoder = transformer(WIDTH, HEADS, LAYERS)
+        # From the mixed tokens: kind of waypoint, completed stages, and the thing for each kind.
         self.move = nn.Linear(WIDTH, len(at_things))
         self.done = nn.Linear(WIDTH, MOST_DONE + 1)
         self.query = nn.Embedding(len(at_things), WIDTH)
         self.key = nn.Linear(WIDTH, WIDTH)
         self.mixed = nn.Linear(WIDTH, WIDTH)
+        # Only of hands and planners.
         self.given = ContextInput(context) if context else None
         self.keeps = KeepScore() if memory == KEYFRAME_PLANNER else None
 

@@ -131,6 +131,7 @@ class BodyCourse(Course[EpisodeNumbers]):
         ]
 
     def batches(self, epoch: int) -> Iterator[list[EpisodeNumbers]]:
+        """Yield the episodes to learn from, those of about equal length together."""
         if not self._learned or epoch % NEW_NOISE_EVERY == 0:
             self._draw_noise(epoch // NEW_NOISE_EVERY)
         rng = random.Random(f"{self._plan.seed}/{epoch}")
@@ -140,6 +141,7 @@ class BodyCourse(Course[EpisodeNumbers]):
         return body_loss(self.net, to_batch(batch))
 
     def score(self) -> dict[str, float]:
+        """Return the shares of right decisions in the episodes that are held back."""
         counts: BodyScore = score(self.net, self._held_back)
         return counts.measures
 
@@ -269,7 +271,12 @@ class BodyScore:
 
 @torch.no_grad()
 def score(body: BodyNet, episodes: Sequence[EpisodeNumbers]) -> BodyScore:
-    """Return how often a body is right in episodes: kind, thing and completed stages."""
+    """Return how often a body is right about the kind of waypoint, the thing, and the stages done.
+
+    Args:
+        body: the network.
+        episodes: with the right decisions.
+    """
     body.eval()
     counts = BodyScore()
     for start in range(0, len(episodes), BATCH):

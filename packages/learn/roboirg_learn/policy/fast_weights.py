@@ -135,14 +135,17 @@ class FastWeightMemory(LookMemory):
 
     def __init__(self) -> None:
         super().__init__()
+        # How tokens become queries, keys and values for the fast weights.
         self.frames = FrameTokens()
         self.projected = nn.Linear(WIDTH, 3 * WIDTH, bias=False)
         self.norms = nn.ModuleList(nn.LayerNorm(HEAD_WIDTH) for _ in range(3))
         self.rate = nn.Linear(WIDTH, FAST_HEADS)
+        # The fast weights at the beginning of an episode, and the norm of what they predict.
         weights = torch.randn(FAST_HEADS, HEAD_WIDTH, HEAD_WIDTH) / math.sqrt(HEAD_WIDTH)
         self.weights = nn.Parameter(weights)
         self.scale = nn.Parameter(torch.zeros(FAST_HEADS, 1, HEAD_WIDTH))
         self.shift = nn.Parameter(torch.zeros(FAST_HEADS, 1, HEAD_WIDTH))
+        # What is read goes through a small transformer, to which the body attends.
         self.norm = nn.LayerNorm(WIDTH)
         self.out = nn.Linear(WIDTH, WIDTH, bias=False)
         self.narrow = nn.Linear(WIDTH, EXPERT_WIDTH)

@@ -84,11 +84,13 @@ class Modulation(nn.Module):
 
     def __init__(self) -> None:
         super().__init__()
+        # Queries are of the body's tokens, keys and values (one head) of those of looks.
         self.norm = nn.RMSNorm(WIDTH)
         self.query = nn.Linear(WIDTH, WIDTH, bias=False)
         self.keyed = nn.Linear(WIDTH, 2 * (WIDTH // HEADS), bias=False)
         self.out = nn.Linear(WIDTH, WIDTH, bias=False)
         self.scale_shift = nn.Linear(WIDTH, 2 * WIDTH)
+        # Almost no change at first, so that the body learns as without memory.
         nn.init.normal_(self.scale_shift.weight, std=INITIAL_WEIGHT_STD)
         nn.init.zeros_(self.scale_shift.bias)
 

@@ -44,7 +44,10 @@ class JointChunks:
         return self.policy.metadata
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode, and see the video, whose pictures are all or every eighth."""
+        """Begin an episode, and look at the video.
+
+        The video's pictures are of every step or of every eighth; without a video it is empty.
+        """
         self._robot = ObservedRobot()
         self._steps = 0
         self._gripper = 1.0  # open

@@ -91,7 +91,10 @@ class _Published:
         return self._rates[system, setting]
 
     def changes(self, settings: Sequence[str]) -> Differences:
-        """Return for each system and setting its success less that with explicit words."""
+        """Return how each published system's success differs from its explicit success.
+
+        By system, then by setting.
+        """
         found: dict[str, dict[str, Difference]] = {}
         for system in SYSTEMS.values():
             explicit = self.rates(system, EXPLICIT)
@@ -101,7 +104,10 @@ class _Published:
         return found
 
     def gains(self, settings: Sequence[str]) -> Differences:
-        """Return for each system and setting its success less that of the system without memory."""
+        """Return how each system's success differs from that of the system without memory.
+
+        By system, then by setting; both are published.
+        """
         found: dict[str, dict[str, Difference]] = {system: {} for system in OTHER_SYSTEMS}
         for name in settings:
             first = self.rates(WITHOUT_MEMORY_SYSTEM, name)

@@ -259,6 +259,7 @@ class ThingDetectorCourse(Course[LabeledPicture]):
         return [list(self._sight.classes), list(self._plan.tasks), self._count, self.epochs]
 
     def batches(self, epoch: int) -> Iterator[list[LabeledPicture]]:
+        """Yield all pictures in random batches, moved and mirrored anew in each pass."""
         self._decode()
         variation = np.random.default_rng((self._plan.seed, epoch))
         rng = random.Random(f"{self._plan.seed}/{epoch}")

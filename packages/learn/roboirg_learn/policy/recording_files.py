@@ -22,7 +22,10 @@ _PICTURE = "picture_"
 
 
 def save_recording(recorded: ExpertRecording, path: Path) -> None:
-    """Write a recording, whole or not at all."""
+    """Write a recording as a NumPy archive (.npz), whole or not at all.
+
+    Each picture is an array of its own with the bytes of a PNG file: ``picture_16`` is of look 16.
+    """
     fields = recorded._asdict()
     pictures = fields.pop("pictures")
     arrays = {name: np.asarray(value) for name, value in fields.items()}

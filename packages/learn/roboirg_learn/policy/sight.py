@@ -178,7 +178,10 @@ class _NoisyThings(NamedTuple):
 def _draw_noisy_things(
     recorded: ExpertRecording, sight: Sight, rng: np.random.Generator
 ) -> _NoisyThings:
-    """Draw at which looks a detector finds each object of an episode, and where it places it."""
+    """Draw what a detector would find: at which looks each object, and where, with errors.
+
+    It finds what is visible, of a learned class, on the table, and not lost by chance.
+    """
     kinds = sight.kinds(recorded.classes)  # -1 for a class that is not learned
     positions = recorded.things[..., :3].astype(np.float64)
     is_found = _draw_is_not_lost(recorded, positions, rng)

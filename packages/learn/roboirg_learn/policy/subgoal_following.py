@@ -107,7 +107,11 @@ class LearnedHands(LearnedPolicy):
         self._take(subgoal)
 
     def act(self, observation: Observation) -> NDArray[np.float64]:
-        """Return the next waypoint (1, 7); without a subgoal the tool stays where it is."""
+        """Return the next waypoint towards the subgoal, as an array of one row (1, 7).
+
+        As long as no other planner has set a subgoal, its own planner names one. Without any
+        subgoal the tool stays where it is.
+        """
         seen = self.watch(observation)
         if self._namer is not None:
             self._take(self._namer.next(self.understand()))

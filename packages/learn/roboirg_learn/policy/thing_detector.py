@@ -68,6 +68,7 @@ class ThingDetector(nn.Module):
             *block(second, third),
             *block(third, fourth, dilation=2),
         )
+        # In each cell a score of each class; and column, row, cosine and sine of a thing.
         self.scores = nn.Conv2d(fourth, classes, 1)
         self.details = nn.Conv2d(fourth, 4, 1)
         bias: Any = self.scores.bias

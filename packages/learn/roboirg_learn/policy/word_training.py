@@ -155,10 +155,12 @@ class TaskCourse(Course[Lesson]):
         self.steps = batch_count(lessons)
 
     def batches(self, epoch: int) -> Iterator[list[Lesson]]:
+        """Yield the lessons in random batches; the seed also decides which words are left out."""
         self._rng.seed(f"{self._seed}/{epoch}")
         return batches(self._lessons, self._rng)
 
     def loss(self, batch: Sequence[Lesson]) -> torch.Tensor:
+        """Return the mean cross-entropy of the tasks, named from texts that lack some words."""
         texts = [_without_some_words(lesson.given.text, self._rng) for lesson in batch]
         right = [self._tasks.index(lesson.given.task) for lesson in batch]
         scores = self.net(texts, [lesson.given.seen for lesson in batch])
