@@ -101,7 +101,12 @@ def learn_listener(
 
 
 def _listener_plan(words: PlanWords, without: str) -> TrainingPlan:
-    """Return how a listener is trained."""
+    """Return how a listener is trained, from the words of the command and its plan file.
+
+    Args:
+        words: what was given.
+        without: what it does not get: none, pictures, video or words.
+    """
     from roboirg_learn.listener.learned_model import WITHOUTS
     from roboirg_learn.listener.listener_training import TrainingPlan
 
@@ -113,12 +118,13 @@ def _listener_plan(words: PlanWords, without: str) -> TrainingPlan:
 
 
 def _run_study(plan: TrainingPlan, out: Path, workers: int) -> None:
-    """Train and compare several listeners; print the page with their tables."""
+    """Train and compare the listeners of the study; print the path of the page with tables."""
     from roboirg_learn.listener.listener_study import run_study
     from roboirg_learn.listener.study_report import write_study
 
     _check_folder(out, "--study needs a folder as --out")
     answers = run_study(plan, out, workers, _print_tenths())
+    # The listeners of a study differ in these, so the page does not show them.
     shown = {**plan.about, "seeds": plan.seeds}
     for name in ("tasks", "settings", "without"):
         del shown[name]
@@ -169,27 +175,35 @@ def learn_policy(
     from roboirg_learn.policy.policy_plan import MEMORY_NAMES, BodyPlan
 
     words = PlanWords(context, plan, TRAINING, POLICY_OPTIONS)
-    reads = _reader_plan(words, words.tasks(tasks), settings)
+    reader_plan = _reader_plan(words, words.tasks(tasks), settings)
     memory = known_name("memory", memory, MEMORY_NAMES)
-    acts = BodyPlan(reads.tasks, memory, **words.choices(BodyPlan))
+    body_plan = BodyPlan(reader_plan.tasks, memory, **words.choices(BodyPlan))
     if paper and memory != USUAL_MEMORY:
         raise InvalidValueError("--paper has its memories from the plan: training.memories.")
     _check_folder(out, "--out needs a folder")
     check_learn_support()
     with locked(out / ".lock", f"Another command learns in {str(out)!r}."):
         if paper:
-            _play_paper(acts, reads, words, out, worker_count(workers))
+            _play_paper(body_plan, reader_plan, words, out, worker_count(workers))
             return
         from roboirg_learn.policy.policy_training import trained_files
 
-        files = trained_files(acts, reads, out, worker_count(workers), _print_tenths())
-    print_policy(files, reads)
+        files = trained_files(body_plan, reader_plan, out, worker_count(workers), _print_tenths())
+    print_policy(files, reader_plan)
 
 
 def _reader_plan(
     words: PlanWords, tasks: tuple[str, ...], settings: str, **usual: int
 ) -> ReaderPlan:
-    """Return how a reader is trained; what a plan does not have is as usual."""
+    """Return how a reader of words is trained.
+
+    Args:
+        words: the command's options and its plan file.
+        tasks: names of tasks.
+        settings: those whose instructions it hears, as given as an option; "none" for a reader
+            without words.
+        usual: values of fields that the plan file does not have, in place of `ReaderPlan`'s.
+    """
     from roboirg_learn.listener.reader_plan import ReaderPlan
     from roboirg_learn.listener.vocabulary import WORD_POOLS
 
@@ -229,26 +243,28 @@ def learn_reader(
     from roboirg_learn.policy.policy_files import PolicyFiles
     from roboirg_learn.policy.trained_body import load_body
     from roboirg_learn.policy.trained_reader import save_reader
-    from roboirg_learn.policy.word_training import check_words, teach_reader
+    from roboirg_learn.policy.word_training import check_words, train_policy_reader
 
     words = PlanWords(context, plan, TRAINING, READER_OPTIONS)
     check_output_file(out)
-    acts = load_body(body)
+    body_plan = load_body(body)
     if tasks == "all":
-        tasks = ",".join(acts.goals.tasks)
-    reads = _reader_plan(words, words.tasks(tasks), settings)
-    for task in reads.tasks:
-        known_name("task of this body", task, acts.goals.tasks)
-    check_words(reads)
+        tasks = ",".join(body_plan.goals.tasks)
+    reader_plan = _reader_plan(words, words.tasks(tasks), settings)
+    for task in reader_plan.tasks:
+        known_name("task of this body", task, body_plan.goals.tasks)
+    check_words(reader_plan)
     work = out.parent / "reader-work"
     work.mkdir(exist_ok=True)
-    reader = teach_reader(acts, reads, work, out.stem, worker_count(workers), _print_tenths())
+    reader = train_policy_reader(
+        body_plan, reader_plan, work, out.stem, worker_count(workers), _print_tenths()
+    )
     save_reader(reader, out)
-    print_policy(PolicyFiles(body, out), reads)
+    print_policy(PolicyFiles(body, out), reader_plan)
 
 
 def print_policy(files: PolicyFiles, plan: ReaderPlan) -> None:
-    """Print how the instructions that a policy has heard are played."""
+    """Print the command that plays a trained policy with the settings that its reader learned."""
     heard = ",".join(plan.settings) or "explicit"
     if plan.heard == "all":  # tasks without one of the settings are played in the others
         heard = plan.heard
@@ -260,9 +276,17 @@ def print_policy(files: PolicyFiles, plan: ReaderPlan) -> None:
 
 
 def _play_paper(
-    acts: BodyPlan, reads: ReaderPlan, words: PlanWords, out: Path, workers: int
+    body_plan: BodyPlan, reader_plan: ReaderPlan, words: PlanWords, out: Path, workers: int
 ) -> None:
-    """Train a policy for each mechanism of the paper, play its tables, and print the page."""
+    """Train a policy for each memory, play the paper's experiment, and print the page's path.
+
+    Args:
+        body_plan: of the bodies; the experiment sets the memory of each.
+        reader_plan: of their reader.
+        words: the command's options and its plan file, which has the experiment.
+        out: folder for files, runs and the page.
+        workers: processes that record and play.
+    """
     import roboirg
     from roboirg.extension.commands import write_atomically
     from roboirg_learn.policy.paper_experiment import (
@@ -278,8 +302,8 @@ def _play_paper(
 
     experiment = ExperimentPlan(**words.choices(ExperimentPlan))
     check_experiment(experiment)
-    files = train_rows(experiment, acts, reads, out, workers, _print_tenths())
-    changes = _changes(words, reads.tasks)
+    files = train_rows(experiment, body_plan, reader_plan, out, workers, _print_tenths())
+    changes = _plan_changes(words, reader_plan.tasks)
     results = {}
     for part in experiment.parts:
         options = part_options(part, experiment, files, changes)
@@ -295,8 +319,8 @@ def _play_paper(
     typer.echo(str(page))
 
 
-def _changes(words: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
-    """Return the options that the parts of the paper's experiment take from a plan."""
+def _plan_changes(words: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
+    """Return the options that a plan file changes in all parts of the paper's experiment."""
     changes: dict[str, Any] = {"tasks": tasks}
     for name in ("episodes", "split"):
         if name in words.fields:
@@ -305,8 +329,8 @@ def _changes(words: PlanWords, tasks: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _print_tenths() -> Progress:
-    """Return a function that prints progress where it has a note or another tenth is done."""
-    shown: dict[str, int] = {}
+    """Return a function that prints progress to stderr: each tenth, and whatever has a note."""
+    shown: dict[str, int] = {}  # the last tenth of each kind of work
 
     def progress(work: str, done: int, total: int, note: str = "") -> None:
         tenth = 10 * done // total

@@ -30,7 +30,17 @@ SPACES = ("waypoint", "joint_angle")
 def _checked_path(
     spec: str, name: str, options: Mapping[str, str], known: tuple[str, ...] = ()
 ) -> Path:
-    """Return the path that a spec names, if its options are known."""
+    """Return the path in a policy's spec, after checking that its options are known.
+
+    Args:
+        spec: the whole, such as ``trained:body.safetensors?reader=reader.safetensors``.
+        name: the path in it.
+        options: those after the question mark.
+        known: names of options that there are.
+
+    Raises:
+        InvalidValueError: there is no path, or an option is unknown.
+    """
     for option in options:
         known_name(f"option of {spec.partition(':')[0]}:", option, known)
     if not name:
@@ -38,15 +48,20 @@ def _checked_path(
     return Path(name)
 
 
-def _learned(spec: str, name: str, options: Mapping[str, str]) -> Callable[[int], Any]:
-    """Return what makes listeners that learned."""
+def _learned_listener_maker(
+    spec: str, name: str, options: Mapping[str, str]
+) -> Callable[[int], Any]:
+    """Return a function from a seed to the learned listener of a file, for ``learned:FILE``."""
     from roboirg_learn.listener.learned_listener import LearnedListener
 
     return functools.partial(LearnedListener, _checked_path(spec, name, options))
 
 
-def _trained(spec: str, name: str, options: Mapping[str, str]) -> Callable[[int], Any]:
-    """Return what makes learned policies; with ``hands=…`` learned planners with those hands."""
+def _trained_policy_maker(spec: str, name: str, options: Mapping[str, str]) -> Callable[[int], Any]:
+    """Return a function from a seed to a trained policy, for ``trained:BODY?reader=FILE``.
+
+    With ``hands=POLICY`` it is a planner, which names subgoals, and another policy follows them.
+    """
     body = _checked_path(spec, name, options, (READER, ACTIONS, HANDS))
     if not options.get(READER):
         raise InvalidValueError(
@@ -60,11 +75,18 @@ def _trained(spec: str, name: str, options: Mapping[str, str]) -> Callable[[int]
         return lambda seed: make_learned(files, seed, actions)
     if ACTIONS in options:
         raise InvalidValueError(f"Policy {spec!r} has other hands, which have their own actions.")
-    return lambda seed: _planner_with(hands, files, seed, spec)
+    return lambda seed: _planner_for_hands(hands, files, seed, spec)
 
 
-def _planner_with(hands: str, files: PolicyFiles, seed: int, spec: str) -> object:
-    """Return a learned planner whose subgoals other hands follow."""
+def _planner_for_hands(hands: str, files: PolicyFiles, seed: int, spec: str) -> object:
+    """Return the planner of two files, whose subgoals another policy follows.
+
+    Args:
+        hands: spec of the policy that follows.
+        files: of a body with a planner, and its reader.
+        seed: of the policy that follows.
+        spec: of the whole, for messages.
+    """
     from roboirg_learn.policy.subgoal_following import LearnedPlanner
 
     model = _load(files)
@@ -78,7 +100,9 @@ def _planner_with(hands: str, files: PolicyFiles, seed: int, spec: str) -> objec
 def make_learned(
     files: PolicyFiles, seed: int = 0, actions: str = SPACES[0]
 ) -> LearnedPolicy | JointChunks:
-    """Return the policy of two files; one with a planner follows the subgoals of others, too.
+    """Return the policy of a body's and a reader's file.
+
+    If the body has a planner, the policy can also follow the subgoals of another planner.
 
     Args:
         files: of its body and its reader.
@@ -103,19 +127,26 @@ def make_learned(
 
 
 def _load(files: PolicyFiles) -> PolicyModel:
-    """Return what files hold now."""
+    """Return the policy of two files as they are now; loaded files are used again."""
     check_learn_support()
-    return _model(files, files.changed)
+    return _cached_model(files, files.changed)
 
 
 @functools.lru_cache(maxsize=4)
-def _model(files: PolicyFiles, changed: tuple[int, ...]) -> PolicyModel:
-    """Return what files that were written then hold; episodes change nothing in it."""
+def _cached_model(files: PolicyFiles, changed: tuple[int, ...]) -> PolicyModel:
+    """Return the policy of two files, kept in memory as long as the files do not change.
+
+    Many episodes share it, as playing changes nothing in it.
+
+    Args:
+        files: of body and reader.
+        changed: when they were written; only makes a call with changed files another one.
+    """
     del changed
     from roboirg_learn.policy.policy_model import load_policy
 
     return load_policy(files)
 
 
-LEARNED = PolicyKind("learned", _learned)
-TRAINED = PolicyKind("trained", _trained, has_weights=True)
+LEARNED = PolicyKind("learned", _learned_listener_maker)
+TRAINED = PolicyKind("trained", _trained_policy_maker, has_weights=True)

@@ -39,18 +39,18 @@ NO_PICTURE: Pixels = np.zeros((0, 0, 3), np.uint8)
 """Stands for the picture where only labels were asked for."""
 
 
-look = partial(labeled_views, later=LATER_STEP)
-"""Returns labeled pictures of an episode's start; of one with a video, also a later one."""
+views_at_start = partial(labeled_views, later=LATER_STEP)
+"""Returns labeled front pictures of an episode: its first one; with a video, also a later one."""
 
 
 def pictures_to_see(first: Pixels, frames: Sequence[Pixels] | Pixels, every: int) -> list[Pixels]:
-    """Return the pictures that a listener looks at.
+    """Return the one or two front pictures that a listener looks at.
 
-    Of a video, its first frame and the one at `LATER_STEP`, or the last one; without a video, the
-    first picture of the policy's turn.
+    Of a video, its first frame and the one at control step `LATER_STEP`, or else the last one;
+    without a video, `first` alone.
 
     Args:
-        first: that picture.
+        first: the first picture after the instruction, when it is the policy's turn.
         frames: of the video, up to that step; may be empty.
         every: control steps between two frames.
     """
@@ -60,12 +60,12 @@ def pictures_to_see(first: Pixels, frames: Sequence[Pixels] | Pixels, every: int
     return [frames[0], frames[later]]
 
 
-def look_as_played(episode: Episode) -> tuple[LabeledView, ...]:
-    """Return the pictures that a listener looks at when it plays an episode; without labels."""
+def views_as_played(episode: Episode) -> tuple[LabeledView, ...]:
+    """Return what a listener looks at when it plays an episode, as views without labels."""
     first, frames = shown_to_policy(episode, LATER_STEP)
     pictures = pictures_to_see(first, frames, LATER_STEP)
-    nowhere = _points_of([])
-    return tuple(LabeledView(picture, (), nowhere, nowhere) for picture in pictures)
+    no_points = _points_of([])
+    return tuple(LabeledView(picture, (), no_points, no_points) for picture in pictures)
 
 
 def draw_missing(
@@ -75,7 +75,15 @@ def draw_missing(
     workers: int,
     show: Callable[[int, int], object],
 ) -> None:
-    """Draw the views of episodes that a folder does not have, by `look` or `look_as_played`."""
+    """Draw the views of those episodes that a folder does not have, and store them there.
+
+    Args:
+        folder: of the files, one for each episode.
+        episodes: all of them.
+        draw: `views_at_start`, with labels, or `views_as_played`, without.
+        workers: processes that draw; 0 uses this one.
+        show: called after each episode with how many are done, and how many there are.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     missing = [episode for episode in episodes if not _path(folder, episode).exists()]
     done = len(episodes) - len(missing)
@@ -85,7 +93,16 @@ def draw_missing(
 
 
 def read_views(folder: Path, episode: Episode, *, pictures: bool) -> tuple[LabeledView, ...]:
-    """Return the views of an episode from a folder, or only their labels."""
+    """Return the views of an episode from a folder.
+
+    Args:
+        folder: to which `draw_missing` wrote them.
+        episode: of which they are.
+        pictures: whether to decode the pictures; else only the labels are loaded.
+
+    Raises:
+        InvalidValueError: the file cannot be read.
+    """
     path = _path(folder, episode)
     try:
         stored = msgspec.msgpack.decode(path.read_bytes(), type=list[_StoredView])
@@ -108,9 +125,16 @@ def _path(folder: Path, episode: Episode) -> Path:
 def _store(
     folder: Path, draw: Callable[[Episode], tuple[LabeledView, ...]], episode: Episode
 ) -> None:
-    """Draw the views of an episode and write them; runs in worker processes."""
+    """Draw the views of an episode and write them to its file; runs in worker processes.
+
+    Args:
+        folder: of the files.
+        draw: returns the views of an episode.
+        episode: to draw.
+    """
     stored = []
     for view in draw(episode):
+        # OpenCV has blue first.
         _, png = cv2.imencode(".png", view.picture[..., ::-1])
         centers = view.centers.tolist()
         stored.append(_StoredView(png.tobytes(), view.names, centers, view.positions.tolist()))

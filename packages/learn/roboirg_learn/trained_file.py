@@ -38,7 +38,7 @@ class TrainedFile(NamedTuple):
 
     @property
     def version(self) -> str:
-        """Fingerprint of plan and tensors; in what layout they are stored is no part."""
+        """Fingerprint of plan, tensors' names and numbers; the file's layout does not change it."""
         content = json.dumps(self.about["plan"], sort_keys=True)
         for name, tensor in sorted(self.tensors.items()):
             numbers = short_hash(tensor.numpy().tobytes())
@@ -46,9 +46,12 @@ class TrainedFile(NamedTuple):
         return short_hash(content)
 
     def load(self, nets: nn.ModuleDict) -> None:
-        """Give networks the weights that the file has under their names, ready to be used."""
-        own = {name: tensor for name, tensor in self.tensors.items() if "." in name}
-        nets.load_state_dict(own)
+        """Load the file's weights into networks, by their names, and set them to evaluation.
+
+        A name without a dot is no weight, but another number that the file keeps.
+        """
+        weights = {name: tensor for name, tensor in self.tensors.items() if "." in name}
+        nets.load_state_dict(weights)
         nets.eval()
 
 
@@ -77,12 +80,12 @@ def save_trained(
 
 
 def load_trained(path: Path, kind: str, read: Callable[[TrainedFile], Trained]) -> Trained:
-    """Return what was learned.
+    """Load a file of `save_trained`, and return what `read` makes of its content.
 
     Args:
         path: the file.
-        kind: as in `save_trained`.
-        read: makes the result of the file's content.
+        kind: what it must be: ``listener``, ``body`` or ``reader``.
+        read: builds the networks and loads their weights.
 
     Raises:
         InvalidValueError: the file is none of that kind.
@@ -102,14 +105,14 @@ def load_trained(path: Path, kind: str, read: Callable[[TrainedFile], Trained]) 
 
 
 def _reason(error: Exception) -> str:
-    """Return in a few words why a file could not be loaded."""
+    """Return why a file could not be loaded, for the middle of a message, without full stop."""
     if isinstance(error, (OSError, InvalidValueError)):
         return str(error).removesuffix(".")
     return "it is damaged, or was not written by this version"
 
 
 def save_unfinished(content: Mapping[str, Any], path: Path) -> None:
-    """Write what was learned on the way, whole or not at all.
+    """Write the state of an unfinished training, whole or not at all.
 
     Raises:
         InvalidValueError: the file cannot be written.
@@ -120,7 +123,14 @@ def save_unfinished(content: Mapping[str, Any], path: Path) -> None:
 
 
 def load_unfinished(path: Path, made_of: object) -> dict[str, Any] | None:
-    """Return what was learned on the way; None unless it was made of the same."""
+    """Return the state of an unfinished training.
+
+    None if there is no file, or if it is of another training: one with another `made_of`, all that
+    the result depends on.
+
+    Raises:
+        InvalidValueError: the file cannot be read.
+    """
     try:
         content: dict[str, Any] = torch.load(path, weights_only=True)
     except FileNotFoundError:

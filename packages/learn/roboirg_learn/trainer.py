@@ -22,7 +22,7 @@ BATCH = 32
 RISING_SHARE = 0.1
 """Of all steps, those in which the rate rises."""
 SPOILED_TOTAL = 10
-"""With so many steps the rising tenth would last no time, by which PyTorch divides."""
+"""Number of steps at which PyTorch's schedule divides by 0: its rising tenth takes no time."""
 MOST_GRADIENT = 1.0
 """Norm to which gradients are clipped."""
 Item = TypeVar("Item")
@@ -38,7 +38,7 @@ class Progress(Protocol):
 
 
 def part_of(progress: Progress, name: str) -> Progress:
-    """Return a progress that names what it is a part of."""
+    """Return a progress that puts a name before the work: "detector" → "small-ttt: detector"."""
     return lambda work, *done: progress(f"{name}: {work}", *done)
 
 
@@ -50,7 +50,7 @@ class KeptTraining(NamedTuple):
 
 
 def batch_count(lessons: Sequence[object]) -> int:
-    """Return the number of batches of lessons."""
+    """Return how many batches lessons make, the last one maybe smaller."""
     return math.ceil(len(lessons) / BATCH)
 
 
@@ -64,10 +64,17 @@ def batches(lessons: Sequence[Item], rng: random.Random, size: int = BATCH) -> I
 def even_batches(
     lessons: Sequence[Item], rng: random.Random, length: Callable[[Item], int], size: int = BATCH
 ) -> Iterator[list[Item]]:
-    """Yield batches of lessons that are about equally long, which wastes no time on padding."""
-    mixed = sorted(rng.sample(lessons, len(lessons)), key=length)
-    found = [mixed[start : start + size] for start in range(0, len(mixed), size)]
-    yield from rng.sample(found, len(found))
+    """Yield batches of lessons of about equal length, in random order, so that little is padding.
+
+    Args:
+        lessons: mixed first, so that those of equal length meet others in each pass.
+        rng: mixes lessons and batches.
+        length: of a lesson.
+        size: most lessons of a batch.
+    """
+    by_length = sorted(rng.sample(lessons, len(lessons)), key=length)
+    groups = [by_length[start : start + size] for start in range(0, len(by_length), size)]
+    yield from rng.sample(groups, len(groups))
 
 
 class Course(ABC, Generic[Item]):
@@ -111,6 +118,7 @@ class Training:
         self._optimizer = torch.optim.AdamW(
             course.net.parameters(), lr=course.rate, weight_decay=0.01
         )
+        # The rate rises for a tenth of all steps, then falls along a cosine.
         total = max(course.epochs * course.steps, 1)
         if total == SPOILED_TOTAL:
             total += 1
@@ -120,11 +128,14 @@ class Training:
         self._curve: list[dict[str, float]] = []
 
     def run(self, show: Callable[[int, int, str], None], kept: KeptTraining) -> Curve:
-        """Learn in all passes, or go on where a training that was kept ended.
+        """Train the network for all epochs, or go on where a kept training stopped.
+
+        Returns the loss and the scores of each epoch.
 
         Args:
-            show: called after each pass with its number from 1, with all, and how well it goes.
-            kept: where the training is kept.
+            show: called after each epoch with its number from 1, the number of all, and a note of
+                loss and scores.
+            kept: the file in which the training is kept after each epoch.
         """
         self._restore(kept)
         epochs = self._course.epochs
@@ -141,7 +152,7 @@ class Training:
         return self._curve
 
     def _learn_from(self, batches: Iterable[Sequence[Any]]) -> float:
-        """Take a step for each batch; returns the mean loss."""
+        """Take one step of the optimizer for each batch; return the mean loss before the steps."""
         self._net.train()
         losses = []
         for batch in batches:
@@ -156,11 +167,11 @@ class Training:
 
     @property
     def _parts(self) -> dict[str, Any]:
-        """What changes from step to step, by its name in the file."""
+        """What has a state that changes from step to step, by its name in the kept file."""
         return {"net": self._net, "optimizer": self._optimizer, "schedule": self._schedule}
 
     def _restore(self, kept: KeptTraining) -> None:
-        """Take up the training of a file, with PyTorch's random numbers, if it fits."""
+        """Load the training of a file, with PyTorch's random state, if it is of this training."""
         state = load_unfinished(kept.path, kept.made_of)
         if state is None or "found" not in state:
             return
@@ -170,7 +181,7 @@ class Training:
         self._curve = state["found"]
 
     def _keep(self, kept: KeptTraining) -> None:
-        """Write all that is needed to go on after this pass."""
+        """Write all that is needed to go on after this epoch: states, curve, and random numbers."""
         state = {name: part.state_dict() for name, part in self._parts.items()}
         state["random"] = torch.get_rng_state()
         state["found"] = self._curve

@@ -18,7 +18,7 @@ from roboirg.policies.by_name.finding import make_policy, read_policy
 from roboirg.policies.vlm.goal_schema import goal_schema
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
-from roboirg_learn.labeled_views import look
+from roboirg_learn.labeled_views import views_at_start
 from roboirg_learn.listener import listener_study, study_report
 from roboirg_learn.listener.listener_study import VARIANTS
 from roboirg_learn.listener.study_report import trained_rate
@@ -46,7 +46,7 @@ def test_labels_are_what_is_visible_and_where():
     places = [item.position[:2] for item in episode.scene.objects]
     cubes = {"cube red", "cube green", "cube blue"}
 
-    first, later = look(episode)
+    first, later = views_at_start(episode)
 
     assert cubes <= set(first.names)
     assert "container" not in first.names  # they appear over the cubes
@@ -113,7 +113,7 @@ def test_a_rate_of_one_has_an_interval_below_it():
 
 def scene_of(*views):
     """What is seen of a scene with containers and red cubes."""
-    from roboirg_learn.listener.object_relations import SeenObjects, TablePlane, relate
+    from roboirg_learn.listener.object_relations import SeenObjects, TablePlane, locate_and_rank
 
     classes = ("container", "cube red")
     seen = []
@@ -121,7 +121,7 @@ def scene_of(*views):
         numbers = np.array([classes.index(name) for name, *_ in view], np.int64)
         places = np.array([place for _, *place in view], np.float32)
         seen.append(SeenObjects(numbers, places))
-    return relate(seen, TablePlane(np.eye(3), np.zeros((4, 2))), classes)
+    return locate_and_rank(seen, TablePlane(np.eye(3), np.zeros((4, 2))), classes)
 
 
 def plan_of(detector_epochs=1, **changes):
@@ -170,7 +170,7 @@ def test_it_learns_and_its_file_is_the_same_listener(trained):
     again = load_model(path)
     assert again.vocabulary == model.vocabulary
     assert again.about["settings"] == ["explicit", "direct"]
-    picture = look(get_episode("StopCube", "train", 0))[0].picture
+    picture = views_at_start(get_episode("StopCube", "train", 0))[0].picture
     texts = {
         visit: f"Stop the cube on the target during its {word} visit by pressing the button."
         for visit, word in ((2, "second"), (3, "third"), (4, "fourth"), (5, "fifth"))
@@ -190,11 +190,11 @@ def test_it_learns_and_its_file_is_the_same_listener(trained):
 
 def test_by_place_other_goals_of_a_scene_are_told_too(torch):
     from roboirg_learn.listener.reader_plan import ReaderPlan
-    from roboirg_learn.listener.reader_training import said
+    from roboirg_learn.listener.reader_training import instructions_of
 
     episode = get_episode("ButtonUnmask", "train", 3)
     plan = ReaderPlan((episode.task,), ("explicit", "spatial"), goals=3)
-    told = list(said([episode], plan))
+    told = list(instructions_of([episode], plan))
     explicit, *others = [episode.goal for episode, _ in told]
     assert explicit == episode.goal
     by_place = others
@@ -249,7 +249,7 @@ def test_an_encoder_of_one_s_own_is_trained_and_loaded(few, torch, tmp_path, mon
     save_model(model, tmp_path / "own.safetensors")
     again = load_model(tmp_path / "own.safetensors")
     assert again.about["encoders"] == {"shades": {"size": 4}, "words": {}}
-    picture = look(get_episode("StopCube", "val", 0))[0].picture
+    picture = views_at_start(get_episode("StopCube", "val", 0))[0].picture
     with torch.no_grad():
         mine, theirs, dark = (
             reader.reader([reader.see([seen])._replace(task="StopCube", text="Stop it.")])[0]
@@ -272,17 +272,17 @@ def test_wrong_encoders_end_before_pictures_are_drawn(torch, tmp_path):
 
 
 def test_what_a_variant_does_not_get_changes_nothing(torch):
-    from roboirg_learn.listener.learned_model import hide
+    from roboirg_learn.listener.learned_model import hide_inputs
     from roboirg_learn.listener.vocabulary import ListenerInput
 
     seen = scene_of([("cube red", 0.0, 0.1)], [("container", 0.0, 0.1)])
     given = ListenerInput("StopCube", "Stop it.", seen)
-    assert hide(given, "none") is given
-    assert hide(given, "words").text == ""
-    assert len(hide(given, "pictures").seen.kinds) == 0
-    assert len(hide(given, "video").seen.kinds) == 0
+    assert hide_inputs(given, "none") is given
+    assert hide_inputs(given, "words").text == ""
+    assert len(hide_inputs(given, "pictures").seen.kinds) == 0
+    assert len(hide_inputs(given, "video").seen.kinds) == 0
     without_video = given._replace(seen=scene_of([("cube red", 0.0, 0.1)]))
-    assert hide(without_video, "video") is without_video
+    assert hide_inputs(without_video, "video") is without_video
 
 
 @pytest.fixture

@@ -168,13 +168,13 @@ def trainer(recorded, out):
 @pytest.mark.parametrize("seed", range(4))
 def test_moved_and_mirrored_pictures_keep_their_labels(seed):
     pytest.importorskip("torch")
-    from roboirg_learn.policy.thing_detector import LabeledPicture, varied
+    from roboirg_learn.policy.thing_detector import LabeledPicture, augmented
 
     picture = np.zeros((256, 256, 3), np.uint8)
     picture[100, 50] = 255
     turns = turns_of(np.array([0.2]))
     view = LabeledPicture(picture, np.array([0]), np.array([[50.5, 100.5]]), turns)
-    found = varied(view, np.random.default_rng(seed))
+    found = augmented(view, np.random.default_rng(seed))
     ((row, column),) = np.argwhere(found.picture[..., 0] == 255)
     assert found.points.tolist() == [[column + 0.5, row + 0.5]]
     is_mirrored = column > 128

@@ -86,7 +86,7 @@ def first_of(batch, looks, things):
     return batch._replace(
         **dict(zip(batch._fields, parts, strict=False)),
         tool=batch.tool[:, :looks],
-        there=batch.there[:, :looks],
+        has_look=batch.has_look[:, :looks],
         decisions=last,
     )
 
@@ -121,14 +121,14 @@ def test_padding_changes_nothing(memory):
     short = batch._replace(
         **{
             name: getattr(batch, name)[:, :9]
-            for name in ("classes", "places", "turns", "seen", "known", "tool", "there")
+            for name in ("classes", "places", "turns", "seen", "known", "tool", "has_look")
         }
     )
-    there = batch.there.clone()
+    has_look = batch.has_look.clone()
 
-    there[:, 9:] = False
+    has_look[:, 9:] = False
 
-    assert same(body(batch._replace(there=there)), body(short))
+    assert same(body(batch._replace(has_look=has_look)), body(short))
 
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))

@@ -10,9 +10,9 @@ from roboirg_learn.listener.object_relations import (
     SeenObjects,
     TablePlane,
     fit_plane,
-    nothing_of,
-    relate,
+    locate_and_rank,
     relation_count,
+    without_objects,
 )
 
 CLASSES = ("button", "container", "cube blue", "cube red")
@@ -32,7 +32,7 @@ def objects_of(*items):
 
 
 def scene_of(*views):
-    return relate([objects_of(*view) for view in views], FLAT, CLASSES)
+    return locate_and_rank([objects_of(*view) for view in views], FLAT, CLASSES)
 
 
 def rank(scene, number, landmark):
@@ -133,7 +133,7 @@ def distance(item):
 
 
 def test_nothing_is_left_of_a_scene_that_is_not_looked_at():
-    left = nothing_of(scene_of([("cube red", 0.0, 0.0)]))
+    left = without_objects(scene_of([("cube red", 0.0, 0.0)]))
     assert left.looks == 0
     assert all(len(part) == 0 for part in left[:4])
     assert left.relations.shape[1] == relation_count(len(CLASSES))

@@ -8,21 +8,21 @@ from roboirg.extension.sight import ExpertRecording, points_of
 from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 from roboirg_learn.policy.planner_history import (
-    KEYS,
+    MAX_CHOSEN,
+    MAX_SWITCHES,
     RECENT,
-    SWITCHES,
     VIDEO_FRAMES,
     PlannerHistory,
     context_size,
+    ideal_planner_inputs,
     recent_looks,
-    replayed,
 )
 from roboirg_learn.policy.sight import Sight
 from roboirg_learn.policy.subgoals import (
-    FARTHEST,
-    MARKS,
+    MOST_POINT_NOISE,
+    REQUEST_WORDS,
     SubgoalForm,
-    asked_numbers,
+    encode_request,
     forms_of,
     recorded_subgoals,
     subgoals_due,
@@ -39,9 +39,9 @@ def test_hands_know_the_subgoals_of_every_task(task):
     for number in range(10):
         for stage in get_episode(task, "train", number).stages:
             subgoal = SubgoalForm(stage.subgoal).at(np.array([100.0, 90.0]))
-            found = asked_numbers(subgoal, SIGHT)
+            found = encode_request(subgoal, SIGHT)
             assert found is not None, subgoal
-            assert found[MARKS.index(stage.primitive.kind.removesuffix("_until"))] or (
+            assert found[REQUEST_WORDS.index(stage.primitive.kind.removesuffix("_until"))] or (
                 stage.primitive.kind == "press_below"
             )
 
@@ -51,11 +51,11 @@ def test_a_point_means_the_place_that_it_was_taken_from():
     subgoal = SubgoalForm("pick up the red cube {at}").at(points_of(place))
     assert split_point(subgoal)[1] is not None
 
-    found = asked_numbers(subgoal, SIGHT)
+    found = encode_request(subgoal, SIGHT)
     assert found[-3] == 1
     assert np.allclose(found[-2:], place[:2], atol=0.004)
-    assert asked_numbers("pick up the red cube", SIGHT)[-3] == 0
-    assert asked_numbers("make me a sandwich", SIGHT) is None
+    assert encode_request("pick up the red cube", SIGHT)[-3] == 0
+    assert encode_request("make me a sandwich", SIGHT) is None
 
 
 def recorded_of(episode, done):
@@ -93,7 +93,7 @@ def test_recordings_yield_the_subgoal_that_is_due_with_a_point_from_its_beginnin
 
     moved = recorded_subgoals(recorded, episode, done, np.random.default_rng(0))
     away = np.subtract(split_point(moved[2])[1], split_point(exact[2])[1])
-    assert 0 < np.abs(away).max() <= FARTHEST + 1
+    assert 0 < np.abs(away).max() <= MOST_POINT_NOISE + 1
 
 
 def test_a_planner_remembers_changes_of_subgoal():
@@ -110,7 +110,7 @@ def test_a_planner_remembers_changes_of_subgoal():
 
     kept = history.kept(video=2, look=19)
     assert [look for look in kept if look >= 0] == [0, 1, 2, 7, 9, 19]
-    assert len(kept) == VIDEO_FRAMES + SWITCHES + 1
+    assert len(kept) == VIDEO_FRAMES + MAX_SWITCHES + 1
 
 
 def test_chosen_looks_in_a_row_become_their_middle_one():
@@ -128,28 +128,28 @@ def test_chosen_looks_in_a_row_become_their_middle_one():
     assert history.kept(video=0, look=60)[:3].tolist() == [6, 22, 40]
 
     history.choose(range(100, 200, 2))
-    assert (history.kept(video=50, look=300) >= 0).sum() == VIDEO_FRAMES + KEYS + RECENT
+    assert (history.kept(video=50, look=300) >= 0).sum() == VIDEO_FRAMES + MAX_CHOSEN + RECENT
 
 
 def test_what_is_replayed_is_what_a_planner_that_is_right_would_be_given():
     forms = np.array([0, 0, 1, 1, 0])
     looks = np.array([1, 4, 6, 9, 12])
-    planned = replayed(forms, looks, 0, 2, chooses=True)
+    planned = ideal_planner_inputs(forms, looks, 0, 2, chooses=True)
     history = PlannerHistory(2, chooses=True)
     for number, (form, look) in enumerate(zip(forms, looks, strict=True)):
         assert np.array_equal(planned.context[number], history.context(look))
-        assert np.array_equal(planned.kept[number], history.kept(0, look))
+        assert np.array_equal(planned.kept_looks[number], history.kept(0, look))
         history.name(form, look)
         if look in history.switches:
             history.choose([look])
 
-    assert planned.keys[:, -1].tolist() == [1, 0, 1, 0, 1]
+    assert planned.to_keep[:, -1].tolist() == [1, 0, 1, 0, 1]
 
-    unasked = replayed(np.array([0, -1, 1]), np.array([1, 2, 6]), 0, 2, chooses=True)
-    assert (unasked.keys[1] == -1).all()
+    unasked = ideal_planner_inputs(np.array([0, -1, 1]), np.array([1, 2, 6]), 0, 2, chooses=True)
+    assert (unasked.to_keep[1] == -1).all()
     assert np.array_equal(unasked.context[2], planned.context[2])
-    assert planned.keys[0, :-2].tolist() == [-1] * (RECENT - 2)
-    assert [recent_looks(9)[place] for place in np.flatnonzero(planned.keys[3] == 1)] == [6]
+    assert planned.to_keep[0, :-2].tolist() == [-1] * (RECENT - 2)
+    assert [recent_looks(9)[place] for place in np.flatnonzero(planned.to_keep[3] == 1)] == [6]
 
 
 @pytest.fixture(params=["subgoal", "keyframes"])
@@ -261,13 +261,13 @@ def test_hands_know_no_goal_and_planners_point_at_what_is_out_of_sight(saved):
         *(rng.normal(0, 0.1, (looks, things, 2)).astype(np.float32) for _ in range(2)),
         seen, np.ones_like(seen), rng.normal(0, 1, (looks, TOOL_NUMBERS)).astype(np.float32),
     )  # fmt: skip
-    planned = replayed(np.array([0, 1]), np.array([2, 5]), 0, size, chooses=True)
+    planned = ideal_planner_inputs(np.array([0, 1]), np.array([2, 5]), 0, size, chooses=True)
     goal = np.zeros(model.goals.size, np.float32)
     nothing = np.array([-1, -1])
     numbers = EpisodeNumbers(shown, goal, np.array([2, 5]), *[nothing] * 3, planned)
     answer = model.planner(to_batch([numbers]))
     assert (answer.things[0, 1, :, 1] > -1e3).all()
-    assert (answer.keys is None) == (model.plan["memory"] == "subgoal")
+    assert (answer.keep_scores is None) == (model.plan["memory"] == "subgoal")
     context = planned._replace(context=planned.context + 1)
     other = model.planner(to_batch([numbers._replace(planned=context)]))
     assert not torch.equal(answer.moves, other.moves)

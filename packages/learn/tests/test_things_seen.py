@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from roboirg.extension.sight import points_of
-from roboirg_learn.policy.moves import RAREST, LookDecision, Move, common_moves, waypoint
+from roboirg_learn.policy.moves import LEAST_SHARE, LookDecision, Move, common_moves, waypoint
 from roboirg_learn.policy.sight import Sight
 from roboirg_learn.policy.tracks import MOST_TRACKS, LookTokens, Tracks
 
@@ -111,7 +111,7 @@ def test_a_move_from_the_tool_keeps_its_angle():
 
 def test_rare_moves_are_not_learned():
     usual, rare = (Move(True, 0.0, 0.0, z, "align", 0.0) for z in (0.1, 0.2))
-    often = [LookDecision(0, usual, 0)] * round(3 / RAREST)
+    often = [LookDecision(0, usual, 0)] * round(3 / LEAST_SHARE)
     once = [LookDecision(0, rare, 0)]
 
     assert common_moves([often, once]) == (usual,)

@@ -61,7 +61,11 @@ class DetectorNet(nn.Module):
 
     @torch.no_grad()
     def find(self, pictures: Sequence[NDArray[np.uint8]]) -> list[SeenObjects]:
-        """Return the objects of each picture: cells that are surer than all their neighbors."""
+        """Return the objects found in each picture: uint8 (256, 256, 3).
+
+        An object is where a cell's best class scores at least as much as those of all eight
+        neighbors, and more than `MIN_SCORE`.
+        """
         logits, offsets = self(torch.from_numpy(np.stack(pictures)))
         scores, kinds = logits.softmax(dim=1)[:, 1:].max(dim=1)  # without background
         peaks = functional.max_pool2d(scores[:, None], 3, stride=1, padding=1)[:, 0]
@@ -73,7 +77,14 @@ class DetectorNet(nn.Module):
 
 
 def _objects_at(is_object: Tensor, scores: Tensor, kinds: Tensor, offsets: Tensor) -> SeenObjects:
-    """Return the objects of one picture, given what the network says of its cells."""
+    """Return the objects of one picture, the surest first, at most `MAX_OBJECTS`.
+
+    Args:
+        is_object: (GRID, GRID) whether a cell has one.
+        scores: (GRID, GRID) of the best class.
+        kinds: (GRID, GRID) numbers of classes.
+        offsets: (2, GRID, GRID) column and row of the center in the cell, in cells.
+    """
     rows, columns = torch.nonzero(is_object, as_tuple=True)
     surest = scores[rows, columns].argsort(descending=True)[:MAX_OBJECTS]
     rows = rows[surest]
@@ -86,7 +97,10 @@ def _objects_at(is_object: Tensor, scores: Tensor, kinds: Tensor, offsets: Tenso
 def block(
     inputs: int, outputs: int, size: int = 3, stride: int = 1, dilation: int = 1
 ) -> tuple[nn.Module, ...]:
-    """Return a convolution that keeps the size up to its stride, normalized and rectified."""
+    """Return the layers of a convolution, batch normalization and ReLU.
+
+    Rows and columns are divided by the stride; at stride 1 they stay as they are.
+    """
     padding = dilation * (size // 2)
     convolution = nn.Conv2d(
         inputs, outputs, size, stride=stride, padding=padding, dilation=dilation, bias=False
@@ -95,17 +109,26 @@ def block(
 
 
 def detector_loss(net: DetectorNet, views: Sequence[LabeledView], classes: Sequence[str]) -> Tensor:
-    """Return the loss of a batch: the class of each cell, and where in its cell a center is."""
+    """Return the loss of a batch of labeled pictures.
+
+    It adds that of the class of every cell, where background weighs little, and the mean distance
+    of the offset in cells with an object.
+
+    Args:
+        net: that learns.
+        views: uint8 pictures (256, 256, 3) with labels.
+        classes: names in the order of their numbers.
+    """
     labels = _cell_labels(views, classes)
     logits, offsets = net(torch.from_numpy(np.stack([view.picture for view in views])))
     weights = torch.ones(len(classes) + 1)
     weights[0] = BACKGROUND_WEIGHT
-    wrong_kinds = functional.cross_entropy(logits, labels.kinds, weights)
+    kind_loss = functional.cross_entropy(logits, labels.kinds, weights)
 
     has_object = (labels.kinds > 0)[:, None]
     distances = functional.l1_loss(offsets, labels.offsets, reduction="none")
-    misplaced = (distances * has_object).sum()
-    return wrong_kinds + misplaced / has_object.sum().clamp(min=1)
+    offset_loss = (distances * has_object).sum()
+    return kind_loss + offset_loss / has_object.sum().clamp(min=1)
 
 
 class CellLabels(NamedTuple):
@@ -121,7 +144,14 @@ class CellLabels(NamedTuple):
 
 
 def _cell_labels(views: Sequence[LabeledView], classes: Sequence[str]) -> CellLabels:
-    """Return the labels of pictures by cell; in a cell with two objects the later one counts."""
+    """Return what the network should say of each cell of some pictures.
+
+    A cell belongs to the object whose center it has; of two objects the later one counts.
+
+    Args:
+        views: with names and centers, column and row in pixels, of their objects.
+        classes: names in the order of their numbers; 0 is background, so classes begin at 1.
+    """
     numbers = {name: number for number, name in enumerate(classes, start=1)}
     kinds = torch.zeros(len(views), GRID, GRID, dtype=torch.long)
     offsets = torch.zeros(len(views), 2, GRID, GRID)

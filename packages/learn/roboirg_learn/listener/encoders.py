@@ -52,18 +52,20 @@ class WordEncoder(TokenEncoder):
 
     def __init__(self, vocabulary: Vocabulary) -> None:
         super().__init__()
+        # 0 is padding, 1 an unknown word.
         self._numbers = {word: place + 2 for place, word in enumerate(vocabulary.words)}
         self.words = nn.Embedding(len(vocabulary.words) + 2, WIDTH, padding_idx=PADDING)
         self.order = nn.Parameter(torch.randn(MAX_WORDS, WIDTH) * 0.02)
 
     def forward(self, inputs: Sequence[ListenerInput]) -> InputTokens:
+        """Return a token for each word of each text, padded to the longest."""
         rows = [torch.tensor(self._row(given.text), dtype=torch.long) for given in inputs]
         numbers = pad_sequence(rows, batch_first=True, padding_value=PADDING)
         order = self.order[: numbers.shape[1]]
         return InputTokens(self.words(numbers) + order, numbers != PADDING)
 
     def _row(self, text: str) -> list[int]:
-        """Return the numbers of the last words; the command stands at the end."""
+        """Return the numbers of the last `MAX_WORDS` words: at the end of a text is the command."""
         words = split_words(text)[-MAX_WORDS:]
         return [self._numbers.get(word, UNKNOWN) for word in words]
 
@@ -74,12 +76,14 @@ class ObjectEncoder(TokenEncoder):
     def __init__(self, vocabulary: Vocabulary) -> None:
         super().__init__()
         classes = len(vocabulary.classes)
+        # One layer for each property of an object; a token is the sum of what they return.
         self.kinds = nn.Embedding(classes, WIDTH)
         self.views = nn.Embedding(VIEWS, WIDTH)
         self.places = nn.Linear(4 * WAVES + 2, WIDTH)
         self.relations = nn.Linear(relation_count(classes), WIDTH, bias=False)
 
     def forward(self, inputs: Sequence[ListenerInput]) -> InputTokens:
+        """Return a token for each object that is seen, padded to the input with most objects."""
         kinds = _padded([given.seen.kinds for given in inputs])
         views = _padded([given.seen.views for given in inputs])
         places = _padded([given.seen.positions for given in inputs]) / METERS
@@ -92,7 +96,7 @@ class ObjectEncoder(TokenEncoder):
 
 
 def _padded(arrays: Sequence[NDArray[Any]]) -> Tensor:
-    """Return arrays of objects in one, each filled up with zeros to the longest."""
+    """Return n arrays (objects, …) as one tensor (n, most objects, …), filled up with zeros."""
     return pad_sequence([torch.from_numpy(array) for array in arrays], batch_first=True)
 
 
@@ -102,7 +106,11 @@ ENCODERS: dict[str, type[TokenEncoder]] = {"words": WordEncoder, "objects": Obje
 def make_encoders(
     vocabulary: Vocabulary, settings: Mapping[str, Mapping[str, Any]]
 ) -> nn.ModuleDict:
-    """Return untrained encoders.
+    """Return untrained encoders by name, for a reader of words.
+
+    Args:
+        vocabulary: words and classes that they encode.
+        settings: by the name of each encoder, its keyword arguments.
 
     Raises:
         UnknownNameError: there is none of that name.
@@ -119,9 +127,13 @@ def make_encoders(
 
 
 def waves(places: Tensor, count: int) -> Tensor:
-    """Return places (..., 2) with sines and cosines of `count` rising frequencies.
+    """Return places followed by sines and cosines of them: (..., 4 * count + 2).
 
-    A network tells places near each other apart by the fast ones, and far ones by the slow.
+    A network separates places near each other by the fast waves, and far ones by the slow.
+
+    Args:
+        places: (..., 2) in units that the slowest wave spans about once.
+        count: number of frequencies, each twice the one before.
     """
     scales = math.pi * 2.0 ** torch.arange(count)
     angles = (places[..., None] * scales).flatten(-2)

@@ -46,13 +46,16 @@ class LearnedListener(ScriptedPolicy):
         return {"trained": self._model.about, "understood": understood}
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Understand the instruction, or first hear the rest of it."""
+        """Begin an episode; the instruction is understood when it has been heard to its end."""
         self._demonstration = demonstration
         self.understood = None
         super().reset(instruction, demonstration)
 
     def decide(self, env: RoboIRGEnv, instruction: str) -> Goal | None:
-        """Return the goal that is understood; None if the scene does not have it."""
+        """Return the goal that the listener understands, to be executed; None to hold still.
+
+        A goal that the scene does not have cannot be executed.
+        """
         frames = self._demonstration.get("front_rgb", ())
         pictures = pictures_to_see(env.picture("front"), frames, FRAMES_EVERY)
         self._demonstration = {}

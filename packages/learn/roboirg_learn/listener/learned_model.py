@@ -17,8 +17,8 @@ from roboirg_learn.listener.detector_net import DetectorNet
 from roboirg_learn.listener.listener_net import ListenerNet
 from roboirg_learn.listener.object_relations import (
     TablePlane,
-    nothing_of,
-    relate,
+    locate_and_rank,
+    without_objects,
 )
 from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary
 from roboirg_learn.trained_file import TrainedFile, load_trained, save_trained
@@ -59,7 +59,7 @@ class LearnedModel:
         return nn.ModuleDict({"detector": self.detector, "reader": self.reader})
 
     def understand(self, task: str, text: str, pictures: Sequence[Pixels]) -> Goal:
-        """Return the best goal of a task for an instruction.
+        """Return the goal of a task that the listener takes an instruction to mean.
 
         Args:
             task: name of the task.
@@ -69,7 +69,7 @@ class LearnedModel:
         return self.understand_seen(self.see(pictures)._replace(task=task, text=text))
 
     def understand_seen(self, given: ListenerInput) -> Goal:
-        """Return the best goal for an instruction, of a scene that has been seen.
+        """Return the goal that an instruction means, given what `see` returned of its scene.
 
         Raises:
             InvalidValueError: it was not trained on the task.
@@ -81,20 +81,27 @@ class LearnedModel:
             )
         goals = list(goal_schema(given.task).goals.values())
         with torch.no_grad():
-            (scores,) = self.reader([hide(given, self.without)])
+            (scores,) = self.reader([hide_inputs(given, self.without)])
         return goals[int(scores.argmax())]
 
     def see(self, pictures: Sequence[Pixels]) -> ListenerInput:
-        """Return what is seen in pictures, without task and words."""
-        seen = relate(self.detector.find(pictures), self.plane, self.vocabulary.classes)
+        """Return the objects found in pictures as an input that has no task and words yet."""
+        seen = locate_and_rank(self.detector.find(pictures), self.plane, self.vocabulary.classes)
         return ListenerInput("", "", seen, tuple(pictures))
 
 
-def hide(given: ListenerInput, without: Without) -> ListenerInput:
-    """Return an input without pictures, video or words."""
+def hide_inputs(given: ListenerInput, without: Without) -> ListenerInput:
+    """Return an input without what a listener does not get.
+
+    Without the video nothing is seen of a scene that has one, which is seen in two pictures.
+
+    Args:
+        given: what there is.
+        without: pictures, video or words; "none" hides nothing.
+    """
     has_video = given.seen.looks > 1
     if without == "pictures" or (without == "video" and has_video):
-        return given._replace(seen=nothing_of(given.seen), pictures=())
+        return given._replace(seen=without_objects(given.seen), pictures=())
     if without == "words":
         return given._replace(text="")
     return given
@@ -124,6 +131,7 @@ def load_model(path: Path) -> LearnedModel:
 
 
 def _read(file: TrainedFile) -> LearnedModel:
+    """Return the listener of a file: networks made by its plan, then given its weights."""
     plan = file.about["plan"]
     vocabulary = Vocabulary.of(file.about["vocabulary"])
     plane = TablePlane(file.tensors["matrix"].numpy(), file.tensors["corners"].numpy())

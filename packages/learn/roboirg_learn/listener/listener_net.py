@@ -38,13 +38,18 @@ class ListenerNet(nn.Module):
         super().__init__()
         self.encoders = make_encoders(vocabulary, settings)
         self._tasks = {task: place for place, task in enumerate(vocabulary.tasks)}
+        # The task is the first token, from which the parts of answers are scored.
         self.tasks = nn.Embedding(len(vocabulary.tasks), WIDTH)
         self.encoder = transformer(WIDTH, HEADS, LAYERS)
         self.answer = nn.Linear(WIDTH, len(vocabulary.parts))
         self.goals = {task: _goal_parts(task, vocabulary.parts) for task in vocabulary.tasks}
 
     def forward(self, inputs: Sequence[ListenerInput]) -> list[Tensor]:
-        """Return for each input the scores of its task's goals, in the order of the schema."""
+        """Return for each input the scores (goals,) of its task's goals, in the schema's order.
+
+        The transformer reads a token of the task and those of all encoders. From the task's token
+        every part of an answer gets a score; a goal's score is the sum of its parts'.
+        """
         numbers = torch.tensor([self._tasks[given.task] for given in inputs])
         values = [self.tasks(numbers)[:, None]]
         is_there = [torch.ones(len(inputs), 1, dtype=torch.bool)]
@@ -55,13 +60,13 @@ class ListenerNet(nn.Module):
 
         is_padding = ~torch.cat(is_there, 1)
         encoded = self.encoder(torch.cat(values, 1), src_key_padding_mask=is_padding)
-        parts = self.answer(encoded[:, 0])  # of the token of the task
-        goals = [self.goals[given.task] for given in inputs]
-        return [goal @ row for goal, row in zip(goals, parts, strict=True)]
+        part_scores = self.answer(encoded[:, 0])  # of the token of the task
+        goal_parts = [self.goals[given.task] for given in inputs]
+        return [parts @ scores for parts, scores in zip(goal_parts, part_scores, strict=True)]
 
 
 def transformer(width: int, heads: int, layers: int) -> nn.TransformerEncoder:
-    """Return untrained layers of attention, for tokens of `width` numbers."""
+    """Return an untrained transformer encoder for tokens (n, tokens, width), without dropout."""
     layer = nn.TransformerEncoderLayer(
         width, heads, 2 * width, dropout=0.0, batch_first=True, norm_first=True
     )
@@ -69,7 +74,7 @@ def transformer(width: int, heads: int, layers: int) -> nn.TransformerEncoder:
 
 
 def _goal_parts(task: str, parts: Sequence[str]) -> Tensor:
-    """Return for each goal of a task 1 at each of its parts, else 0: (goals, parts)."""
+    """Return which parts each goal of a task has: 1 or 0, (goals, parts), in the schema's order."""
     answers = list(goal_schema(task).goals)
     found = torch.zeros(len(answers), len(parts))
     for row, answer in zip(found, answers, strict=True):

@@ -22,7 +22,7 @@ from roboirg.extension.episodes import (
     plain_settings,
     spoken,
 )
-from roboirg_learn.labeled_views import Pixels, draw_missing, look_as_played, read_views
+from roboirg_learn.labeled_views import Pixels, draw_missing, read_views, views_as_played
 from roboirg_learn.listener.vocabulary import WORD_POOLS, WordPool
 
 if TYPE_CHECKING:
@@ -57,10 +57,13 @@ class StudyVariant(NamedTuple):
     hears: tuple[str, ...] = ()
 
     def plan(self, common: TrainingPlan) -> TrainingPlan:
-        """Return how it is trained."""
+        """Return the plan of this listener: the common one with its own settings and inputs.
+
+        A harder setting is added only where the plain one that it builds on is heard.
+        """
         settings = self.settings or common.reader.settings
-        added = [name for name in self.hears if all_settings()[name].plain in settings]
-        reader = common.reader._replace(settings=(*settings, *added))
+        harder = [name for name in self.hears if all_settings()[name].plain in settings]
+        reader = common.reader._replace(settings=(*settings, *harder))
         return common._replace(reader=reader, without=self.without)
 
 
@@ -140,9 +143,12 @@ class _Study:
         self._scenes: SeenEpisodes | None = None
 
     def trained(self, variant: StudyVariant, plan: TrainingPlan) -> LearnedModel:
-        """Return a listener: that of its file if it has the same plan, else a new one."""
+        """Return a trained listener: that of its file if it has the same plan, else a new one.
+
+        A new one makes old answers wrong, so their file is removed.
+        """
         from roboirg_learn.listener.learned_model import load_model, save_model
-        from roboirg_learn.listener.listener_training import teach
+        from roboirg_learn.listener.listener_training import train_on_scenes
         from roboirg_learn.trained_file import END
         from roboirg_learn.trainer import part_of
 
@@ -156,14 +162,14 @@ class _Study:
         scenes = self._seen_scenes()
         self._answer_file(variant, plan.reader).unlink(missing_ok=True)
         kept = self._work / f"reader-{name}.pt"
-        model = teach(scenes, plan, kept, part_of(self._progress, name))
+        model = train_on_scenes(scenes, plan, kept, part_of(self._progress, name))
         save_model(model, path)
         return model
 
     def answers(
         self, variant: StudyVariant, plan: ReaderPlan, model: LearnedModel
     ) -> Iterator[StudyAnswer]:
-        """Yield the answers of a listener, which are those of its file if there is one."""
+        """Yield a listener's answers; if its file does not exist, ask it, and write them first."""
         path = self._answer_file(variant, plan)
         if not path.exists():
             found = _answers(model, variant.name, plan, self._test_episodes())
@@ -176,7 +182,7 @@ class _Study:
         return self._folder / f"{variant.name}-{plan.seed}.jsonl"
 
     def _seen_scenes(self) -> SeenEpisodes:
-        """Return what a detector of this seed sees of the scenes of training."""
+        """Return the scenes of training as this seed's detector sees them; cached."""
         from roboirg_learn.listener.listener_training import see_episodes
 
         if self._scenes is None:
@@ -184,11 +190,11 @@ class _Study:
         return self._scenes
 
     def _test_episodes(self) -> list[ShownEpisode]:
-        """Return the episodes of the test split with the pictures that a listener looks at."""
+        """Return test episodes with the pictures that a listener looks at; cached."""
         if not self._tested:
             episodes = episodes_of(self._common.reader.tasks, "test")
             show = partial(self._progress, "test pictures")
-            draw_missing(self._work, episodes, look_as_played, self._workers, show)
+            draw_missing(self._work, episodes, views_as_played, self._workers, show)
             for episode in episodes:
                 views = read_views(self._work, episode, pictures=True)
                 pictures = [view.picture for view in views]
@@ -199,11 +205,18 @@ class _Study:
 def _answers(
     model: LearnedModel, name: str, plan: ReaderPlan, shown: Sequence[ShownEpisode]
 ) -> Iterator[StudyAnswer]:
-    """Yield what a listener understands of all instructions of the episodes."""
+    """Yield what a listener understands of all test instructions of some episodes.
+
+    Args:
+        model: the listener.
+        name: of the listener.
+        plan: has its seed.
+        shown: episodes with the pictures that it looks at.
+    """
     # Every scene has many instructions, and is looked at once.
     seen = {scene.episode.key: model.see(scene.pictures) for scene in shown}
     episodes = [scene.episode for scene in shown]
-    for setting, pool in _asked():
+    for setting, pool in _tested_settings():
         for episode, text in spoken(episodes, [setting], pool):
             task = episode.task
             goal = model.understand_seen(seen[episode.key]._replace(task=task, text=text))
@@ -219,8 +232,8 @@ def _answers(
             )
 
 
-def _asked() -> Iterator[tuple[str, WordPool]]:
-    """Yield each setting with the pool of words in which it is spoken."""
+def _tested_settings() -> Iterator[tuple[str, WordPool]]:
+    """Yield each setting that is tested with a pool of words in which it is spoken."""
     for setting in plain_settings():
         for pool in WORD_POOLS:
             yield setting, pool

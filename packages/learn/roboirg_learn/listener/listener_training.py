@@ -20,22 +20,22 @@ from pydantic import PositiveInt
 
 from roboirg.extension.episodes import ENVIRONMENT_VERSION, Episode, episodes_of
 from roboirg.extension.sight import LabeledView
-from roboirg_learn.labeled_views import draw_missing, look, read_views
+from roboirg_learn.labeled_views import draw_missing, read_views, views_at_start
 from roboirg_learn.listener.detector_net import INPUT_SIZE, DetectorNet, detector_loss
 from roboirg_learn.listener.encoders import ENCODERS
-from roboirg_learn.listener.learned_model import LearnedModel, Without, hide
+from roboirg_learn.listener.learned_model import LearnedModel, Without, hide_inputs
 from roboirg_learn.listener.object_relations import (
     SeenObjects,
     TablePlane,
     fit_plane,
-    relate,
+    locate_and_rank,
 )
 from roboirg_learn.listener.reader_plan import ReaderPlan
 from roboirg_learn.listener.reader_training import (
     Lesson,
     check_reader,
+    instructions_of,
     lesson_of,
-    said,
     train_reader,
 )
 from roboirg_learn.listener.vocabulary import ListenerInput, make_vocabulary
@@ -153,14 +153,18 @@ class LabeledEpisodes(NamedTuple):
 def train_listener(
     plan: TrainingPlan, folder: Path, name: str, workers: int, progress: Progress
 ) -> LearnedModel:
-    """Return a listener that has learned from the train split and random scenes.
+    """Train a listener on the train split and random scenes, and return it.
 
-    Pictures, the detector and the reader on the way stay in the folder, and are used again as far
-    as they fit. The name is the listener's among those of the folder.
+    Args:
+        plan: how it is trained.
+        folder: keeps pictures, detector and reader, which are used again as far as they fit.
+        name: of the listener, among those of the folder.
+        workers: processes that draw pictures; 0 uses this one.
+        progress: called with a kind of work, what is done of it, and all of it.
     """
     check_reader(plan.reader)
     scenes = see_episodes(plan, folder, workers, progress)
-    return teach(scenes, plan, folder / f"reader-{name}-{plan.reader.seed}.pt", progress)
+    return train_on_scenes(scenes, plan, folder / f"reader-{name}-{plan.reader.seed}.pt", progress)
 
 
 def see_episodes(
@@ -168,11 +172,11 @@ def see_episodes(
 ) -> SeenEpisodes:
     """Train a detector on the pictures of the train split, and look at all episodes.
 
-    Of random scenes the labels stand for what the detector would find.
+    In random scenes, which are many, it does not look: their labels stand for what it would find.
     """
     splits = TrainingSplits.of(plan.reader)
     every_episode = (*splits.learned, *splits.held_back)
-    draw_missing(folder, every_episode, look, workers, partial(progress, "pictures"))
+    draw_missing(folder, every_episode, views_at_start, workers, partial(progress, "pictures"))
 
     needs_pixels = _needs_pixels(plan)
     labeled = LabeledEpisodes(
@@ -189,7 +193,7 @@ def see_episodes(
 def _trained_detector(
     labeled: LabeledEpisodes, plan: TrainingPlan, folder: Path, progress: Progress
 ) -> DetectorNet:
-    """Return a detector that has learned; its file after each pass stays in the folder."""
+    """Return a trained detector; a finished or interrupted training of the folder goes on."""
     course = DetectorCourse(labeled, plan)
     kept = KeptTraining(folder / f"detector-{plan.reader.seed}.pt", course.made_of)
     Training(course).run(partial(progress, "detector"), kept)
@@ -202,7 +206,7 @@ def _needs_pixels(plan: TrainingPlan) -> bool:
 
 
 def _read_each(folder: Path, episodes: Iterable[Episode], *, pictures: bool) -> ViewsByKey:
-    """Return the views of episodes, or only their labels."""
+    """Return the stored views of episodes by the episode's key, with pictures or only labels."""
     return {episode.key: read_views(folder, episode, pictures=pictures) for episode in episodes}
 
 
@@ -215,7 +219,7 @@ def _views_in(views_by_key: ViewsByKey) -> list[LabeledView]:
 
 
 def _plane_of(labeled: LabeledEpisodes) -> TablePlane:
-    """Return where on the table the points of pictures are, learned from all labels."""
+    """Return the map from places in pictures to the table, fitted to all labels."""
     views = _views_in(labeled.by_key)
     centers = np.concatenate([view.centers for view in views])
     positions = np.concatenate([view.positions for view in views])
@@ -225,19 +229,35 @@ def _plane_of(labeled: LabeledEpisodes) -> TablePlane:
 def _see_each(
     labeled: LabeledEpisodes, detector: DetectorNet, plane: TablePlane, *, keeps_pictures: bool
 ) -> dict[str, ListenerInput]:
-    """Return what is seen of each episode, by its key, without task and words."""
+    """Return what is seen of each episode, by its key, as inputs without task and words yet.
+
+    Args:
+        labeled: all episodes; of random scenes the labels are taken, else the detector looks.
+        detector: trained.
+        plane: maps pictures to the table.
+        keeps_pictures: whether the pictures themselves are part of the inputs.
+    """
     classes = labeled.classes
     seen = {}
     for key, views in labeled.by_key.items():
         pictures = tuple(view.picture for view in views)
-        found = _labels(views, classes) if key in labeled.random else detector.find(pictures)
-        objects = relate(found, plane, classes)
+        found = _as_detected(views, classes) if key in labeled.random else detector.find(pictures)
+        objects = locate_and_rank(found, plane, classes)
         seen[key] = ListenerInput("", "", objects, pictures if keeps_pictures else ())
     return seen
 
 
-def teach(scenes: SeenEpisodes, plan: TrainingPlan, kept: Path, progress: Progress) -> LearnedModel:
-    """Return a listener that has learned to read; `kept` is its file after each pass."""
+def train_on_scenes(
+    scenes: SeenEpisodes, plan: TrainingPlan, kept: Path, progress: Progress
+) -> LearnedModel:
+    """Train the reader of a listener on scenes that its detector has seen; return the listener.
+
+    Args:
+        scenes: episodes with what is seen of them.
+        plan: how it is trained.
+        kept: file in which the training is kept after each pass.
+        progress: called after each pass.
+    """
     reader_plan = plan.reader
     torch.manual_seed(reader_plan.seed)
     lessons = _lessons(scenes.episodes, scenes.seen, reader_plan)
@@ -246,12 +266,12 @@ def teach(scenes: SeenEpisodes, plan: TrainingPlan, kept: Path, progress: Progre
     vocabulary = make_vocabulary(texts, scenes.classes, reader_plan.tasks)
 
     reader = train_reader(
-        _hidden(lessons, plan.without),
+        _hide_from_lessons(lessons, plan.without),
         vocabulary,
         reader_plan,
         progress,
         KeptTraining(kept, plan.about),
-        _hidden(held_back, plan.without),
+        _hide_from_lessons(held_back, plan.without),
     )
     return LearnedModel(vocabulary, scenes.detector, scenes.plane, reader, plan.without, plan.about)
 
@@ -259,21 +279,26 @@ def teach(scenes: SeenEpisodes, plan: TrainingPlan, kept: Path, progress: Progre
 def _lessons(
     episodes: Sequence[Episode], seen: Mapping[str, ListenerInput], plan: ReaderPlan
 ) -> list[Lesson]:
-    """Return what is said of episodes, with what is seen of them and the goals that are meant."""
+    """Return the lessons of episodes: each an instruction, what is seen, and the goal it means."""
     lessons = []
-    for episode, text in said(episodes, plan):
+    for episode, text in instructions_of(episodes, plan):
         given = seen[episode.key]._replace(task=episode.task, text=text)
         lessons.append(lesson_of(given, episode))
     return lessons
 
 
-def _hidden(lessons: Iterable[Lesson], without: Without) -> list[Lesson]:
-    """Return lessons without what the listener does not get."""
-    return [lesson._replace(given=hide(lesson.given, without)) for lesson in lessons]
+def _hide_from_lessons(lessons: Iterable[Lesson], without: Without) -> list[Lesson]:
+    """Return lessons without what the listener does not get: pictures, video or words."""
+    return [lesson._replace(given=hide_inputs(lesson.given, without)) for lesson in lessons]
 
 
-def _labels(views: Iterable[LabeledView], classes: Sequence[str]) -> list[SeenObjects]:
-    """Return labels as if the detector had found them."""
+def _as_detected(views: Iterable[LabeledView], classes: Sequence[str]) -> list[SeenObjects]:
+    """Return the labels of views as if the detector had found those objects.
+
+    Args:
+        views: labeled pictures.
+        classes: names in the order of their numbers.
+    """
     numbers = {name: number for number, name in enumerate(classes)}
     found = []
     for view in views:
@@ -300,7 +325,7 @@ class DetectorCourse(Course[LabeledView]):
 
     @property
     def made_of(self) -> list[object]:
-        """All that the detector depends on, apart from the seed."""
+        """What must be equal for a kept training to go on; the seed is in its file's name."""
         tasks = list(self._plan.reader.tasks)
         return [tasks, list(self._classes), self.epochs, ENVIRONMENT_VERSION]
 
@@ -311,6 +336,7 @@ class DetectorCourse(Course[LabeledView]):
         return detector_loss(self.net, batch, self._classes)
 
     def score(self) -> dict[str, float]:
+        """Return the mean loss of held-back pictures."""
         groups = batches(self._held_back, random.Random(0))
         losses = [float(self.loss(group)) for group in groups]
         return {"held back": sum(losses) / len(losses)}

@@ -42,7 +42,7 @@ class ReaderPlan(NamedTuple):
 
     @property
     def heard(self) -> str:
-        """Which settings it hears, for names of files."""
+        """The settings that it hears as one word for names of files: all, none or a-b."""
         if set(self.settings) == set(plain_settings()):
             return "all"
         return "-".join(self.settings) or WORDLESS
@@ -56,6 +56,6 @@ class ReaderPlan(NamedTuple):
 
 
 def as_plain(about: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a file says about a plan, with the version of the environment."""
+    """Return a plan as plain JSON data (lists for tuples), with the environment's version."""
     whole = {**about, "environment_version": ENVIRONMENT_VERSION}
     return dict(json.loads(json.dumps(whole)))

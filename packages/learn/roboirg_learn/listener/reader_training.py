@@ -42,8 +42,12 @@ FORGOTTEN_WORDS = 0.05
 """Share of the words that are unknown in training, so that new ones do no harm."""
 
 
-def said(episodes: Sequence[Episode], plan: ReaderPlan) -> Iterator[tuple[Episode, str]]:
-    """Yield the instructions of episodes, and of more goals of each scene, as a plan has them."""
+def instructions_of(episodes: Sequence[Episode], plan: ReaderPlan) -> Iterator[tuple[Episode, str]]:
+    """Yield episodes with instructions that a reader learns from, in the settings of its plan.
+
+    Explicit words and harder settings are spoken for the episode's own goal only; all others for
+    more goals of the same scene, too, because there the meaning hangs on what is in it.
+    """
     known = all_settings()
     for_own_goal = []
     for_every_goal = []
@@ -53,12 +57,18 @@ def said(episodes: Sequence[Episode], plan: ReaderPlan) -> Iterator[tuple[Episod
         else:
             for_every_goal.append(name)
     yield from spoken(episodes, for_own_goal, plan.words)
-    more = list(with_more_goals(episodes, plan.goals, plan.seed))
-    yield from spoken(more, for_every_goal, plan.words)
+    with_goals = list(with_more_goals(episodes, plan.goals, plan.seed))
+    yield from spoken(with_goals, for_every_goal, plan.words)
 
 
 def with_more_goals(episodes: Iterable[Episode], goals: int, seed: int) -> Iterator[Episode]:
-    """Yield each episode, and again with other goals of its scene."""
+    """Yield each episode, then copies of it with other goals that its scene allows.
+
+    Args:
+        episodes: any.
+        goals: how many goals each scene has in all, if it allows so many.
+        seed: of the choice.
+    """
     rng = random.Random(seed)
     for episode in episodes:
         yield episode
@@ -69,7 +79,13 @@ def with_more_goals(episodes: Iterable[Episode], goals: int, seed: int) -> Itera
 
 
 def check_reader(plan: ReaderPlan) -> None:
-    """Raise early what would else be raised after pictures are drawn, or never."""
+    """Check a plan before pictures are drawn for it.
+
+    Raises:
+        InvalidValueError: a task has no words, no task has the settings, or an encoder does not
+            take its own settings.
+        UnknownNameError: there is no encoder of a name.
+    """
     tasks = plan.tasks
     plain = spoken(episodes_of(tasks, "train", 1), ["explicit"], "train")
     with_words = {episode.task for episode, _ in plain}
@@ -92,7 +108,7 @@ class Lesson(NamedTuple):
 
 
 def lesson_of(given: ListenerInput, episode: Episode) -> Lesson:
-    """Return an instruction with its goal, the episode's own."""
+    """Return an instruction with the number of the goal that it means: the episode's own."""
     schema = goal_schema(episode.task)
     answers = list(schema.goals)
     return Lesson(given, answers.index(schema.answers[episode.goal]))
@@ -106,7 +122,7 @@ def train_reader(
     kept: KeptTraining,
     held_back: Sequence[Lesson] = (),
 ) -> ListenerNet:
-    """Return a reader that has learned from instructions.
+    """Train a reader: a network that scores the goals that an instruction may mean.
 
     Args:
         lessons: the instructions.
@@ -142,11 +158,13 @@ class ReaderCourse(Course[Lesson]):
         self.steps = batch_count(lessons)
 
     def batches(self, epoch: int) -> Iterator[list[Lesson]]:
+        """Yield all lessons in batches, with other words unknown in each pass."""
         rng = random.Random(f"{self._seed}/{epoch}")
         lessons = [_with_unknown_words(lesson, rng) for lesson in self._lessons]
         return even_batches(lessons, rng, _length)
 
     def loss(self, batch: Sequence[Lesson]) -> torch.Tensor:
+        """Return the mean cross-entropy; lessons are scored one by one, as tasks differ in goals."""
         losses = []
         for lesson, scores in self._scored(batch):
             goal = torch.tensor([lesson.goal])
@@ -154,6 +172,7 @@ class ReaderCourse(Course[Lesson]):
         return torch.stack(losses).mean()
 
     def score(self) -> dict[str, float]:
+        """Return the share of held-back lessons whose goal scores best; {} without any."""
         if not self._held_back:
             return {}
         right = 0
@@ -169,7 +188,7 @@ class ReaderCourse(Course[Lesson]):
 
 
 def _with_unknown_words(lesson: Lesson, rng: random.Random) -> Lesson:
-    """Return a lesson in which some words have become unknown ones, written "…"."""
+    """Return a lesson with a random twentieth of its words replaced by the unknown word "…"."""
     words = []
     for word in lesson.given.text.split():
         is_forgotten = rng.random() < FORGOTTEN_WORDS

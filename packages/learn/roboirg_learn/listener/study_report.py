@@ -30,7 +30,7 @@ _SECTIONS = (
     _Section("Words of the training pool", "train", has_rival=False),
     _Section("Held-out words with rivals", HELD_OUT, has_rival=True),
 )
-_NOTHING = "–"
+_NO_RATE = "–"
 """In the place of a rate that there is not."""
 _NOTE = (
     "Right answers in percent, with the 95 % interval over trainings and scenes: means over tasks "
@@ -60,24 +60,27 @@ class TrainedRate(NamedTuple):
 
 
 def trained_rate(tasks: Sequence[Verdicts]) -> TrainedRate:
-    """Return the mean of tasks with its interval.
+    """Return the mean share of right answers over tasks, with its 95 % interval.
 
     The interval adds the variance between trainings, which all answer the same instructions, to
     that between scenes within tasks. It is Student's with Satterthwaite's degrees of freedom, so
     that few trainings that differ make it long; with a single one it is over scenes only.
+
+    Args:
+        tasks: of each task 1 for a right answer, else 0: (training seeds, episodes).
     """
     by_seed = np.mean([verdicts.mean(axis=1) for verdicts in tasks], axis=0)
     rate = float(by_seed.mean())
-    apart = _variance_of_mean(tasks, by_seed)
+    variance = _variance_of_mean(tasks, by_seed)
     count = sum(verdicts.shape[1] for verdicts in tasks)
-    if not apart.total:
+    if not variance.total:
         interval: tuple[float, float] = without_spread(rate, count)
     else:
         from scipy import special  # SciPy's statistics take a second to import
 
-        quantile = float(special.stdtrit(apart.freedom, UPPER_END))
-        half = quantile * math.sqrt(apart.total)
-        interval = max(0.0, rate - half), min(1.0, rate + half)
+        quantile = float(special.stdtrit(variance.freedom, UPPER_END))
+        half_width = quantile * math.sqrt(variance.total)
+        interval = max(0.0, rate - half_width), min(1.0, rate + half_width)
     return TrainedRate(rate, interval, tuple(by_seed.tolist()))
 
 
@@ -89,7 +92,12 @@ class _Variance(NamedTuple):
 
 
 def _variance_of_mean(tasks: Sequence[Verdicts], by_seed: Verdicts) -> _Variance:
-    """Return the variance between trainings and between scenes, added."""
+    """Return the variance of the mean: that between trainings, and that between scenes.
+
+    Args:
+        tasks: of each task 1 for a right answer, else 0: (training seeds, episodes).
+        by_seed: (training seeds,) the mean over tasks.
+    """
     seeds = len(by_seed)
     trainings = float(by_seed.var(ddof=1)) / seeds if seeds > 1 else 0.0
     scenes = 0.0
@@ -100,16 +108,23 @@ def _variance_of_mean(tasks: Sequence[Verdicts], by_seed: Verdicts) -> _Variance
         count += episodes
     scenes /= len(tasks) ** 2
 
+    # Satterthwaite: the variances added are one estimate with so many degrees of freedom.
     total = trainings + scenes
     if not total:
         return _Variance(0.0, 0.0)
-    of_trainings = trainings**2 / max(1, seeds - 1)
-    of_scenes = scenes**2 / max(1, count - len(tasks))
-    return _Variance(total, total**2 / (of_trainings + of_scenes))
+    trainings_part = trainings**2 / max(1, seeds - 1)
+    scenes_part = scenes**2 / max(1, count - len(tasks))
+    return _Variance(total, total**2 / (trainings_part + scenes_part))
 
 
 def write_study(answers: Iterable[StudyAnswer], about: Mapping[str, Any], folder: Path) -> Path:
-    """Write the page of a study, and return its path."""
+    """Write the page of a study, ``study.md``, and return its path.
+
+    Args:
+        answers: of all listeners.
+        about: how they were trained, for the head of the page.
+        folder: of the study.
+    """
     trained = ", ".join(f"{name} {value}" for name, value in about.items())
     parts = ["# What a listener learns", f"Trained with: {trained}."]
     parts.append(tables_text(study_rates(answers)))
@@ -125,7 +140,7 @@ def study_rates(answers: Iterable[StudyAnswer]) -> dict[ListenerCell, TrainedRat
 
 
 def tables_text(found: Mapping[ListenerCell, TrainedRate]) -> str:
-    """Return a table for each kind of words as Markdown."""
+    """Return the tables of a study as Markdown: a row for each listener, a column a setting."""
     seeds = max(len(rate.by_seed) for rate in found.values())
     trainings = "1 training seed" if seeds == 1 else f"{seeds} training seeds"
     note = _NOTE.format(trainings)
@@ -140,7 +155,7 @@ def tables_text(found: Mapping[ListenerCell, TrainedRate]) -> str:
 
 
 def _settings_of(section: _Section, found: Iterable[ListenerCell]) -> list[str]:
-    """Return the settings of a section that were answered, in order."""
+    """Return the settings that a table shows, in order; those without answers are left out."""
     answered = {cell.setting for cell in found if cell.pool == section.pool}
     settings = []
     for setting in all_settings():
@@ -151,7 +166,10 @@ def _settings_of(section: _Section, found: Iterable[ListenerCell]) -> list[str]:
 
 
 def _verdicts(answers: Iterable[StudyAnswer]) -> dict[ListenerCell, list[Verdicts]]:
-    """Return the verdicts of each cell by task."""
+    """Return for each cell of the tables one array for each task: 1 where an answer is right.
+
+    An array is (training seeds, episodes); all seeds answered the same episodes in one order.
+    """
     by_task: dict[tuple[ListenerCell, str], dict[int, list[bool]]] = defaultdict(dict)
     for answer in answers:
         cell = ListenerCell(answer.listener, answer.words, answer.setting)
@@ -166,14 +184,17 @@ def _verdicts(answers: Iterable[StudyAnswer]) -> dict[ListenerCell, list[Verdict
 def _rows(
     found: Mapping[ListenerCell, TrainedRate], pool: str, settings: Sequence[str]
 ) -> Iterator[tuple[str, str, list[str]]]:
-    """Yield two rows for each listener: how often it is right, and how often with each seed."""
+    """Yield two rows for each listener: percent of right answers, and that of each seed.
+
+    A row is the listener's title, what it shows, and a text for each setting.
+    """
     for variant in VARIANTS:
         right = []
         by_seed = []
         for setting in settings:
             rate = found.get(ListenerCell(variant.name, pool, setting))
             right.append(_with_interval(rate))
-            by_seed.append(_NOTHING if rate is None else _percent(rate.by_seed))
+            by_seed.append(_NO_RATE if rate is None else _percent(rate.by_seed))
         yield variant.title, "right", right
         yield variant.title, "by seed", by_seed
 
@@ -181,7 +202,7 @@ def _rows(
 def _with_interval(rate: TrainedRate | None) -> str:
     """Return a rate in percent with its interval, as in "50.0 (40.0–60.0)"."""
     if rate is None:
-        return _NOTHING
+        return _NO_RATE
     return f"{_percent([rate.rate])} ({_percent(rate.interval, '–')})"
 
 

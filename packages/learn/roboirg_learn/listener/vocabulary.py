@@ -30,7 +30,7 @@ def _number_words() -> dict[str, str]:
     return found
 
 
-_NUMBERS = _number_words()
+_DIGIT_WORDS = _number_words()
 WordPool = Literal["train", "test"]
 WORD_POOLS: tuple[WordPool, ...] = get_args(WordPool)
 USUAL_ENCODERS: Mapping[str, dict[str, Any]] = {"words": {}, "objects": {}}
@@ -76,7 +76,7 @@ class ListenerInput(NamedTuple):
 
 def split_words(text: str) -> list[str]:
     """Return the words and stops of a text, in lower case; digits up to 10 become words."""
-    return [_NUMBERS.get(word, word) for word in _WORD.findall(text.lower())]
+    return [_DIGIT_WORDS.get(word, word) for word in _WORD.findall(text.lower())]
 
 
 def words_of(texts: Iterable[str]) -> tuple[str, ...]:
@@ -103,7 +103,7 @@ def parts_of(answer: str) -> list[str]:
 
 
 def parts_of_tasks(tasks: Iterable[str]) -> tuple[str, ...]:
-    """Return the parts of all answers of tasks, in the order of their numbers."""
+    """Return the parts that the answers of tasks can have, sorted; a part's place is its number."""
     found = set()
     for task in tasks:
         for answer in goal_schema(task).goals:

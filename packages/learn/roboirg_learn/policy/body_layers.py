@@ -13,10 +13,13 @@ LAYERS = 2
 
 
 class Join:
-    """What a memory does in one layer; this one does nothing. n sequences, L tokens."""
+    """What a memory changes in one layer of the body; this one changes nothing.
+
+    n sequences, one for each decision, of L tokens.
+    """
 
     def attended(self, keys: Tensor, values: Tensor, seen: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Return what the tokens attend to.
+        """Return keys, values and mask for attention; a memory may append tokens of its own.
 
         Args:
             keys: (n, HEADS, L, size) of the tokens.
@@ -31,23 +34,25 @@ class Join:
 
 
 def run_layer(layer: Any, tokens: Tensor, seen: Tensor, join: Join) -> Tensor:  # noqa: ANN401
-    """Return the tokens after one layer: attention, then a feed-forward network.
+    """Return the tokens after one transformer layer, in which a memory may take part.
+
+    The same as calling PyTorch's layer, step by step, because its own call has no place for `join`.
 
     Args:
-        layer: one of a body's encoder, whose layers are run one by one.
+        layer: ``nn.TransformerEncoderLayer``; norms come first.
         tokens: (n, L, WIDTH).
-        seen: (n, L) whether there is a token.
-        join: of a memory.
+        seen: (n, L) whether a token may be attended to.
+        join: what the memory changes in attention and feed-forward input.
     """
     attention = layer.self_attn
     projected = functional.linear(
         layer.norm1(tokens), attention.in_proj_weight, attention.in_proj_bias
     )
     queries, keys, values = (split_heads(part) for part in projected.chunk(3, -1))
-    open_to = seen[:, None, None].expand(-1, 1, tokens.shape[1], -1)
-    keys, values, open_to = join.attended(keys, values, open_to)
-    found = functional.scaled_dot_product_attention(queries, keys, values, open_to)
-    attended = tokens + attention.out_proj(join_heads(found))
+    may_attend = seen[:, None, None].expand(-1, 1, tokens.shape[1], -1)
+    keys, values, may_attend = join.attended(keys, values, may_attend)
+    mixed = functional.scaled_dot_product_attention(queries, keys, values, may_attend)
+    attended = tokens + attention.out_proj(join_heads(mixed))
 
     hidden = layer.linear1(join.modulated(layer.norm2(attended)))
     after: Tensor = attended + layer.linear2(functional.relu(hidden))

@@ -23,7 +23,7 @@ from torch.nn import functional
 
 from roboirg.extension.commands import write_atomically
 from roboirg_learn.policy.body_net import MOST_DONE, BodyAnswer, BodyNet, EpisodeBatch
-from roboirg_learn.policy.memories import CLOSED
+from roboirg_learn.policy.memories import BLOCKED_SCORE
 from roboirg_learn.policy.moves import LookDecision
 from roboirg_learn.policy.policy_data import (
     EpisodeNumbers,
@@ -32,7 +32,7 @@ from roboirg_learn.policy.policy_data import (
 )
 from roboirg_learn.policy.policy_plan import BodyPlan, Recorded
 from roboirg_learn.policy.sight import Sight
-from roboirg_learn.policy.subgoal_training import with_planned
+from roboirg_learn.policy.subgoal_training import with_planner_inputs
 from roboirg_learn.policy.trained_body import GoalLayout, Kind, make_body
 from roboirg_learn.trainer import Course, KeptTraining, Progress, Training, even_batches
 
@@ -47,7 +47,7 @@ COUNT_WEIGHT = 0.5
 NEW_NOISE_EVERY = 2
 """Passes after which the noise of the detector is drawn anew."""
 HELD_BACK = 10
-"""Of every ten episodes of a task, the second shows how training goes and is not learned from."""
+"""Of so many episodes of a task the second is held back: it only measures how training goes."""
 
 
 class BodyLesson(NamedTuple):
@@ -78,7 +78,15 @@ def train_body(
     folder: Path,
     progress: Progress,
 ) -> BodyNet:
-    """Return a body, or a planner, that has learned from recordings; write how it learned."""
+    """Train a body or a planner on recordings; write its learning curve next to its file.
+
+    Args:
+        plan: memory, seed and number of passes.
+        lessons: recorded episodes with the decisions to learn.
+        layout: classes, goals, and what it chooses among.
+        folder: for the training that is kept after each pass, and the curve as JSON.
+        progress: called after each pass.
+    """
     course = BodyCourse(plan, lessons, layout)
     path = folder / f"body-{plan.memory}-{plan.seed}.pt"
     kept = KeptTraining(path, course.made_of)
@@ -112,7 +120,7 @@ class BodyCourse(Course[EpisodeNumbers]):
 
     @property
     def made_of(self) -> list[Any]:
-        """All that the body depends on, apart from memory and seed."""
+        """What must be equal for a kept training to go on; its file's name has memory and seed."""
         sight, goals, kinds = self._layout
         return [
             [lesson.recorded.episode.key for lesson in self._lessons],
@@ -123,6 +131,7 @@ class BodyCourse(Course[EpisodeNumbers]):
         ]
 
     def batches(self, epoch: int) -> Iterator[list[EpisodeNumbers]]:
+        """Yield the episodes to learn from, those of about equal length together."""
         if not self._learned or epoch % NEW_NOISE_EVERY == 0:
             self._draw_noise(epoch // NEW_NOISE_EVERY)
         rng = random.Random(f"{self._plan.seed}/{epoch}")
@@ -132,11 +141,16 @@ class BodyCourse(Course[EpisodeNumbers]):
         return body_loss(self.net, to_batch(batch))
 
     def score(self) -> dict[str, float]:
+        """Return the shares of right decisions in the episodes that are held back."""
         counts: BodyScore = score(self.net, self._held_back)
         return counts.measures
 
     def _draw_noise(self, times: int) -> None:
-        """Let a detector see all episodes anew; `times` before this one."""
+        """Turn all episodes into network input with newly drawn mistakes of the detector.
+
+        Args:
+            times: how often that was done before; it seeds the noise.
+        """
         rng = np.random.default_rng((self._plan.seed, times))
         self._learned = []
         self._held_back = []
@@ -146,18 +160,21 @@ class BodyCourse(Course[EpisodeNumbers]):
             group.append(episode)
 
     def _seen(self, lesson: BodyLesson, rng: np.random.Generator) -> EpisodeNumbers:
-        """Return an episode as a detector would have seen it, with the subgoals it needs."""
+        """Return an episode as network input, with the subgoals that hands and planners need."""
         sight = self._layout.sight
         kinds = self._layout.kinds
         recorded = lesson.recorded
         goal = self._layout.goals.of_episode(recorded.episode)
         numbers = {kind: number for number, kind in enumerate(kinds)}
         episode = to_numbers(recorded.recording, lesson.decisions, goal, sight, numbers, rng)
-        return with_planned(self._plan.memory, recorded, episode, len(kinds), sight, rng)
+        return with_planner_inputs(self._plan.memory, recorded, episode, len(kinds), sight, rng)
 
 
 def held_back(tasks: Sequence[str]) -> list[bool]:
-    """Return which episodes are not learned from, given the task of each."""
+    """Return for each episode, given its task, whether it is held back from learning.
+
+    It is the second, twelfth, … episode of each task.
+    """
     seen: Counter[str] = Counter()
     is_held_back = []
     for task in tasks:
@@ -172,10 +189,11 @@ def _length(episode: EpisodeNumbers) -> int:
 
 
 def body_loss(body: BodyNet, batch: EpisodeBatch) -> Tensor:
-    """Return the loss of kinds of waypoints, of things given the right kind, and of the count.
+    """Return the loss of a batch: of kinds of waypoints, things, and numbers of completed stages.
 
-    The number of completed stages is not acted on, but at each decision it says what a memory
-    should have kept, which the moves show only where a count ends.
+    Things are scored for the right kind. The number of completed stages is never acted on; it
+    teaches the memory at each decision what to keep, as the moves do only where a count ends. A
+    planner that chooses looks to keep learns these, too.
     """
     answer: BodyAnswer = body(batch)
     has_move = batch.moves >= 0
@@ -187,15 +205,21 @@ def body_loss(body: BodyNet, batch: EpisodeBatch) -> Tensor:
     choices = _thing_choices(answer.things, batch)
     if len(choices.right):
         loss = loss + functional.cross_entropy(choices.scores, choices.right)
-    if answer.keys is not None and batch.planned is not None:
-        loss = loss + _keys_loss(answer.keys, batch.planned.keys)
+    if answer.keep_scores is not None and batch.planned is not None:
+        loss = loss + _keep_loss(answer.keep_scores, batch.planned.to_keep)
     return loss
 
 
-def _keys_loss(scores: Tensor, wanted: Tensor) -> Tensor:
-    """Return the loss of which looks are kept; wanted is 1 or 0, or -1 where there is no look."""
-    has_look = wanted >= 0
-    return functional.binary_cross_entropy_with_logits(scores[has_look], wanted[has_look].float())
+def _keep_loss(scores: Tensor, wanted: Tensor) -> Tensor:
+    """Return the loss of choosing which of the recent looks to keep.
+
+    Args:
+        scores: (B, D, RECENT) logits.
+        wanted: (B, D, RECENT) 1 to keep, 0 not to; -1 where nothing is learned.
+    """
+    has_label = wanted >= 0
+    labels = wanted[has_label].float()
+    return functional.binary_cross_entropy_with_logits(scores[has_label], labels)
 
 
 class ThingChoices(NamedTuple):
@@ -211,13 +235,19 @@ class ThingChoices(NamedTuple):
 
 
 def _thing_choices(things: Tensor, batch: EpisodeBatch) -> ThingChoices:
-    """Return the choices of things, given the right kinds, where the right thing is possible."""
+    """Return the scores of things at those decisions whose right thing can be chosen.
+
+    Args:
+        things: (B, D, M, K) logits of things for each kind of waypoint; those of the right kind
+            are taken.
+        batch: with the right kinds and things.
+    """
     is_at_thing = (batch.moves >= 0) & (batch.things >= 0)
     kinds = batch.moves[is_at_thing][:, None, None].expand(-1, 1, things.shape[-1])
     scores = things[is_at_thing].gather(1, kinds)[:, 0]
     right = batch.things[is_at_thing]
-    # What is not seen cannot be chosen without memory.
-    is_possible = scores.gather(1, right[:, None])[:, 0] > CLOSED / 2
+    # Without memory a thing out of sight is blocked, and nothing could be learned.
+    is_possible = scores.gather(1, right[:, None])[:, 0] > BLOCKED_SCORE / 2
     return ThingChoices(scores[is_possible], right[is_possible])
 
 
@@ -229,7 +259,7 @@ class BodyScore:
         self._all: Counter[str] = Counter()
 
     def add(self, measure: str, found: Tensor, wanted: Tensor) -> None:
-        """Count what is found, for a name of `MEASURES`."""
+        """Count how many of the found numbers (n,) are as wanted (n,); a name of `MEASURES`."""
         self._right[measure] += int((found == wanted).sum())
         self._all[measure] += len(wanted)
 
@@ -241,7 +271,12 @@ class BodyScore:
 
 @torch.no_grad()
 def score(body: BodyNet, episodes: Sequence[EpisodeNumbers]) -> BodyScore:
-    """Return how often a body is right about the decisions of episodes."""
+    """Return how often a body is right about the kind of waypoint, the thing, and the stages done.
+
+    Args:
+        body: the network.
+        episodes: with the right decisions.
+    """
     body.eval()
     counts = BodyScore()
     for start in range(0, len(episodes), BATCH):

@@ -29,17 +29,17 @@ from roboirg_learn.policy.memories import (
     Looks,
     MaskedTokens,
     Remembered,
-    at_frames,
-    seen_now,
+    choose_only_seen,
+    tokens_at_looks,
 )
 
 FAST_HEADS = 2
 HEAD_WIDTH = WIDTH // FAST_HEADS
 EXPERT_WIDTH = WIDTH // 2
-LAST = 8
-"""Looks whose tokens the body sees, the present one included."""
-RATE = 0.01
-"""Inner rate before anything is learned."""
+READ_LOOKS = 8
+"""Most recent looks whose tokens the body attends to, the present one included."""
+INITIAL_RATE = 0.01
+"""Learning rate of an inner step before anything is learned."""
 MOST_RATE = 0.1
 """The greatest inner rate."""
 MOST_CHANGE = 5.0
@@ -59,15 +59,24 @@ class FastNorm(NamedTuple):
     shift: Tensor
 
     def __call__(self, values: Tensor) -> Tensor:
-        """Return values over their root mean square, scaled and shifted."""
-        return values / _size_of(values) * (1.0 + self.scale) + self.shift
+        """Return values (n, heads, m, size) over their root mean square, scaled and shifted."""
+        return values / _root_mean_square(values) * (1.0 + self.scale) + self.shift
 
     def pull_back(self, values: Tensor, error: Tensor) -> Tensor:
-        """Return the gradient at the values, of an error of what becomes of them."""
-        size = _size_of(values)
-        even = values / size
+        """Return the gradient of the loss at the values, which is backpropagation by hand.
+
+        Inner steps also run under ``torch.no_grad``, so autograd cannot compute it.
+
+        Args:
+            values: (n, heads, m, size) what was normalized.
+            error: the gradient of the loss at the normalized values, of the same shape.
+        """
+        size = _root_mean_square(values)
+        normalized = values / size
         scaled = error * (1.0 + self.scale)
-        return (scaled - even * (scaled * even).mean(-1, keepdim=True)) / size
+        # Changing a value also changes the size that all are divided by.
+        through_size = normalized * (scaled * normalized).mean(-1, keepdim=True)
+        return (scaled - through_size) / size
 
 
 class Fast(NamedTuple):
@@ -82,34 +91,34 @@ class Fast(NamedTuple):
     biases: Tensor
 
     def after(self, keys: Tensor, values: Tensor, rates: Tensor, norm: FastNorm) -> Fast:
-        """Return the weights after one step on a mini-batch of m tokens.
+        """Return the fast weights after one step of gradient descent on m tokens.
 
-        The step goes down half the squared distance of what they predict from a key to the value
-        less the key, each token weighed by its rate.
+        The loss of a token is half the squared distance between the prediction from its key and
+        ``value - key``: `read` adds its input back, so only the residual is learned.
 
         Args:
             keys: (n, heads, m, size).
             values: (n, heads, m, size).
-            rates: (n, heads, m, 1); 0 for a token that is not there.
-            norm: of what is predicted.
+            rates: (n, heads, m, 1) learning rate of each token; 0 for padding.
+            norm: applied to predictions.
         """
         predicted = keys @ self.weights + self.biases
         error = norm(predicted) - (values - keys)
-        change = rates * norm.pull_back(predicted, error)
-        of_weights = _clipped(keys.transpose(-1, -2) @ change)
-        of_biases = _clipped(change.sum(-2, keepdim=True))
-        return Fast(self.weights - of_weights, self.biases - of_biases)
+        gradient = rates * norm.pull_back(predicted, error)
+        weight_step = _clipped(keys.transpose(-1, -2) @ gradient)
+        bias_step = _clipped(gradient.sum(-2, keepdim=True))
+        return Fast(self.weights - weight_step, self.biases - bias_step)
 
     def read(self, queries: Tensor, norm: FastNorm) -> Tensor:
-        """Return what the weights predict from queries, added to them."""
+        """Return queries (n, heads, m, size) plus the weights' predictions from them."""
         return norm(queries @ self.weights + self.biases) + queries
 
 
 class FastState(NamedTuple):
-    """Fast weights after some looks, and what they gave at each (B, T, m, WIDTH)."""
+    """Fast weights after T looks, and what was read from them at each (B, T, m, WIDTH)."""
 
     fast: Fast
-    given: Tensor
+    read_values: Tensor
 
 
 class InnerStep(NamedTuple):
@@ -126,79 +135,90 @@ class FastWeightMemory(LookMemory):
 
     def __init__(self) -> None:
         super().__init__()
+        # How tokens become queries, keys and values for the fast weights.
         self.frames = FrameTokens()
         self.projected = nn.Linear(WIDTH, 3 * WIDTH, bias=False)
         self.norms = nn.ModuleList(nn.LayerNorm(HEAD_WIDTH) for _ in range(3))
         self.rate = nn.Linear(WIDTH, FAST_HEADS)
+        # The fast weights at the beginning of an episode, and the norm of what they predict.
         weights = torch.randn(FAST_HEADS, HEAD_WIDTH, HEAD_WIDTH) / math.sqrt(HEAD_WIDTH)
         self.weights = nn.Parameter(weights)
         self.scale = nn.Parameter(torch.zeros(FAST_HEADS, 1, HEAD_WIDTH))
         self.shift = nn.Parameter(torch.zeros(FAST_HEADS, 1, HEAD_WIDTH))
+        # What is read goes through a small transformer, to which the body attends.
         self.norm = nn.LayerNorm(WIDTH)
         self.out = nn.Linear(WIDTH, WIDTH, bias=False)
         self.narrow = nn.Linear(WIDTH, EXPERT_WIDTH)
         self.layers = nn.ModuleList(ExpertLayer() for _ in range(LAYERS))
 
     def forward(self, looks: Looks, decisions: Tensor) -> Remembered:
+        """Return what the memory adds to each layer of the body at decisions (B, D).
+
+        All looks (B, T) update the fast weights in turn; the body attends to the tokens of the
+        `READ_LOOKS` looks up to each decision, as they were read at their own time.
+        """
         tokens = self.frames(looks)
-        given = self._through_time(tokens, looks.carried or Carried())
-        values = tokens.values + self.out(self.norm(given))
-        recent = decisions[..., None] - torch.arange(LAST - 1, -1, -1)
-        narrow = at_frames(MaskedTokens(self.narrow(values), tokens.there), recent)
+        read_values = self._through_time(tokens, looks.carried or Carried())
+        values = tokens.values + self.out(self.norm(read_values))
+        recent = decisions[..., None] - torch.arange(READ_LOOKS - 1, -1, -1)
+        narrow = tokens_at_looks(MaskedTokens(self.narrow(values), tokens.mask), recent)
         joins: list[Join] = []
         for layer in self.layers:
             values, join = layer(narrow)
             narrow = narrow._replace(values=values)
             joins.append(join)
-        return seen_now(looks, decisions, joins)
+        return choose_only_seen(looks, decisions, joins)
 
     def _through_time(self, tokens: MaskedTokens, carried: Carried) -> Tensor:
-        """Return what the weights give at each look (B, T, m, WIDTH), after its own update.
+        """Update the fast weights look by look; return what is read at each (B, T, m, WIDTH).
 
-        At looks that were taken in before it is what was given then.
+        Each look first updates the weights with its m tokens and then reads them. Looks of an
+        earlier call are not repeated: what they read is in `carried`, which is brought up to date.
         """
         count = tokens.values.shape[2]
-        new = MaskedTokens(tokens.values[:, carried.looks :], tokens.there[:, carried.looks :])
+        new = MaskedTokens(tokens.values[:, carried.looks :], tokens.mask[:, carried.looks :])
         steps = self._inner_steps(new)
-        fast, given = self._first_state(new, carried)
+        fast, read_values = self._first_state(new, carried)
         norm = FastNorm(self.scale, self.shift)
-        found = []
+        new_reads = []
         for step in steps:
             fast = fast.after(step.keys, step.values, step.rates, norm)
-            found.append(fast.read(step.queries, norm))
+            new_reads.append(fast.read(step.queries, norm))
 
-        room = count - given.shape[2]
-        given = functional.pad(given, (0, 0, 0, room))
-        if found:
-            joined = torch.stack(found, 1).transpose(2, 3).flatten(3)
-            given = torch.cat([given, joined], 1)
-        carried.looks = given.shape[1]
-        carried.state = FastState(fast, given)
-        return given
+        # New looks may show things that earlier ones had no tokens for.
+        new_tokens = count - read_values.shape[2]
+        read_values = functional.pad(read_values, (0, 0, 0, new_tokens))
+        if new_reads:
+            joined = torch.stack(new_reads, 1).transpose(2, 3).flatten(3)
+            read_values = torch.cat([read_values, joined], 1)
+        carried.looks = read_values.shape[1]
+        carried.state = FastState(fast, read_values)
+        return read_values
 
     def _inner_steps(self, tokens: MaskedTokens) -> list[InnerStep]:
-        """Return what the weights are updated and read with at each look."""
-        batch, length, count = tokens.there.shape
+        """Return queries, keys, values and rates for each look of tokens (B, T, m, WIDTH)."""
+        batch, length, count = tokens.mask.shape
         projected = self.projected(tokens.values)
         thirds = projected.reshape(batch, length, count, 3, FAST_HEADS, HEAD_WIDTH).unbind(3)
-        looks = []
+        parts_by_look = []  # queries, keys, values: each a (B, heads, m, size) for every look
         for norm, part in zip(self.norms, thirds, strict=True):
-            looks.append(norm(part).transpose(2, 3).unbind(1))  # each (B, heads, m, size)
+            parts_by_look.append(norm(part).transpose(2, 3).unbind(1))
         rates = self._rates(tokens).unbind(1)
-        return [InnerStep(*look) for look in zip(*looks, rates, strict=True)]
+        return [InnerStep(*look) for look in zip(*parts_by_look, rates, strict=True)]
 
     def _rates(self, tokens: MaskedTokens) -> Tensor:
-        """Return the inner rate (B, T, heads, m, 1) of each token; 0 for one that is not there."""
-        start = math.log(math.expm1(RATE))
+        """Return the learning rate (B, T, heads, m, 1) of each token; 0 for padding."""
+        # The inverse of softplus, so that untrained layers give about INITIAL_RATE.
+        start = math.log(math.expm1(INITIAL_RATE))
         rates = functional.softplus(self.rate(tokens.values) + start).clamp(0.0, MOST_RATE)
-        return (rates * tokens.there[..., None]).transpose(2, 3)[..., None]
+        return (rates * tokens.mask[..., None]).transpose(2, 3)[..., None]
 
     def _first_state(self, tokens: MaskedTokens, carried: Carried) -> FastState:
-        """Return the state before the new looks, whose tokens these are."""
+        """Return the fast weights before the new looks: carried ones, or else learned ones."""
         if carried.state is not None:
             state: FastState = carried.state
             return state
-        batch, _, count = tokens.there.shape
+        batch, _, count = tokens.mask.shape
         weights = self.weights.expand(batch, -1, -1, -1)
         biases = tokens.values.new_zeros(batch, FAST_HEADS, 1, HEAD_WIDTH)
         return FastState(Fast(weights, biases), tokens.values.new_zeros(batch, 0, count, WIDTH))
@@ -218,41 +238,51 @@ class ExpertLayer(nn.Module):
         )
 
     def forward(self, tokens: MaskedTokens) -> tuple[Tensor, ExpertJoin]:
-        """Return the tokens (n, m, EXPERT_WIDTH) after the layer, and what the body sees of them.
+        """Run self-attention and a feed-forward network on a memory's tokens.
+
+        Returns the tokens (n, m, EXPERT_WIDTH) after the layer, and their keys and values for the
+        body's own attention in the same layer.
 
         Args:
-            tokens: before it.
+            tokens: (n, m, EXPERT_WIDTH), with a mask (n, m).
         """
         projected = self.projected(self.norm1(tokens.values))
         queries, keys, values = (split_heads(part, HEADS) for part in projected.chunk(3, -1))
-        open_to = tokens.there[:, None, None]
-        found = functional.scaled_dot_product_attention(queries, keys, values, open_to)
-        attended = tokens.values + self.out(join_heads(found))
+        may_attend = tokens.mask[:, None, None]
+        mixed = functional.scaled_dot_product_attention(queries, keys, values, may_attend)
+        attended = tokens.values + self.out(join_heads(mixed))
         after = attended + self.feed(self.norm2(attended))
-        return after, ExpertJoin(keys, values, tokens.there)
+        return after, ExpertJoin(keys, values, tokens.mask)
 
 
 class ExpertJoin(Join):
-    """Lets the first token, which stands for robot and goal, attend to tokens of a memory.
+    """Lets the body's first token, of robot and goal, attend to a memory's tokens as well.
 
-    Things do not see them.
+    The tokens of things do not attend to them.
     """
 
-    def __init__(self, keys: Tensor, values: Tensor, there: Tensor) -> None:
+    def __init__(self, keys: Tensor, values: Tensor, mask: Tensor) -> None:
         self._keys = keys
         self._values = values
-        self._there = there
+        self._mask = mask
 
     def attended(self, keys: Tensor, values: Tensor, seen: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Return the keys and values of the tokens and of the memory's."""
+        """Return keys, values and mask after appending the memory's tokens.
+
+        Args:
+            keys: (n, heads, L, size) of the body's tokens.
+            values: of the same shape.
+            seen: (n, 1, L, L) whether a token may attend to another; returned as (n, 1, L, L + m)
+                with m tokens of the memory.
+        """
         is_first = torch.arange(keys.shape[2], device=keys.device) == 0
-        added = is_first[None, None, :, None] & self._there[:, None, None]
+        sees_memory = is_first[None, None, :, None] & self._mask[:, None, None]
         every_key = torch.cat([keys, self._keys], 2)
         every_value = torch.cat([values, self._values], 2)
-        return every_key, every_value, torch.cat([seen, added], -1)
+        return every_key, every_value, torch.cat([seen, sees_memory], -1)
 
 
-def _size_of(values: Tensor) -> Tensor:
+def _root_mean_square(values: Tensor) -> Tensor:
     """Return the root mean square of values (…, size), as (…, 1)."""
     return (values.square().mean(-1, keepdim=True) + EPSILON).sqrt()
 

@@ -44,7 +44,10 @@ class JointChunks:
         return self.policy.metadata
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode, and see the video, whose pictures are all or every eighth."""
+        """Begin an episode, and look at the video.
+
+        The video's pictures are of every step or of every eighth; without a video it is empty.
+        """
         self._robot = ObservedRobot()
         self._steps = 0
         self._gripper = 1.0  # open
@@ -56,7 +59,10 @@ class JointChunks:
         self.policy.reset(instruction, video)
 
     def _with_tool(self, video: Demonstration) -> Demonstration:
-        """Return a video with the computed pose of the tool, and every eighth picture."""
+        """Return a video with the tool's pose at each step, computed from joints and fingers.
+
+        Pictures may be of each step or of every eighth already; every eighth is returned.
+        """
         joints = video["joint_positions"]
         fingers = video["gripper"]
         pictures = video["front_rgb"]
@@ -73,7 +79,11 @@ class JointChunks:
         self.policy.hear(text, step)
 
     def act(self, observation: Observation) -> JointTrajectory:
-        """Return the rows until the next look (n, 8), n <= 8."""
+        """Return joint angles with the gripper, rad, until the next look: (n, 8), n <= 8.
+
+        Rows of the waypoint under way go first; when there are none the policy is asked for the
+        next waypoint. A waypoint that cannot be reached has no rows: the robot keeps still.
+        """
         state = self._robot.observe(observation["joint_positions"], observation["gripper"])
         now = cast("Observation", {**observation, **state, "history": ()})
         until_look = LOOK_EVERY - self._steps % LOOK_EVERY
@@ -86,6 +96,7 @@ class JointChunks:
             still = np.append(state["joint_positions"], self._gripper)
             self._rows = next(self._plan, np.tile(still, (until_look, 1)))
         elif until_look == LOOK_EVERY:
+            # In the midst of a waypoint it is time for a look, though not for a decision.
             self.policy.watch(now)
 
         chunk = self._rows[:until_look]

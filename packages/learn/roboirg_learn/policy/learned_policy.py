@@ -48,7 +48,7 @@ class LearnedPolicy:
         return {"trained": {"body": self.model.body.plan, "reader": self.model.reader.plan}}
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
-        """Begin an episode, and see the video."""
+        """Begin an episode: hear the instruction, and look at every eighth step of the video."""
         from roboirg_learn.policy.policy_model import SeenEpisode
 
         self._heard = [instruction]
@@ -66,7 +66,7 @@ class LearnedPolicy:
         self._goal = None
 
     def act(self, observation: Observation) -> NDArray[np.float64]:
-        """Return the next waypoint (1, 7)."""
+        """Return the next waypoint (1, 7), in an array of one row, as `moves.waypoint` makes it."""
         seen = self.watch(observation)
         return seen.decide(self.understand(), tool_of(observation))[None]
 
@@ -77,7 +77,10 @@ class LearnedPolicy:
         return self._goal
 
     def watch(self, observation: Observation) -> SeenEpisode:
-        """See what happened since the last action, and what there is now."""
+        """Look at what was observed since the last action, and now; return the episode so far.
+
+        The last look of the history may be the observation itself, which is not seen twice.
+        """
         looks: list[Mapping[str, Any]] = list(observation.get("history", ()))
         if not looks or not _is_same_moment(looks[-1], observation):
             looks.append(observation)
@@ -87,7 +90,7 @@ class LearnedPolicy:
 
 
 def tool_of(observation: Mapping[str, Any]) -> NDArray[np.float64]:
-    """Return the pose of the tool and the opening of a finger, (7,)."""
+    """Return x, y, z, m, roll, pitch, yaw, rad, of the tool, and a finger's opening, m: (7,)."""
     return np.append(observation["end_effector"], observation["gripper"][0])
 
 

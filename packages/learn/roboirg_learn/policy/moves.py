@@ -22,12 +22,12 @@ HOME = (math.pi, 0.0, 0.0)
 """Roll, pitch and yaw of the tool at the beginning, rad."""
 STAY = "stay"
 """The turn of a tool that stays where it is while the gripper opens or closes."""
-LEAVE = 0.0
+GRIPPER_UNCHANGED = 0.0
 """Gripper value of a waypoint that neither opens nor closes it."""
 XY_GRID = 0.1
 """Meters to which a way in the plane from the tool's place is rounded."""
-RAREST = 0.0005
-"""Share of all waypoints; kinds that are rarer are not learned."""
+LEAST_SHARE = 0.0005
+"""Share of all waypoints; kinds of waypoints that are rarer are not learned."""
 
 
 class Move(NamedTuple):
@@ -66,26 +66,35 @@ class LookDecision(NamedTuple):
 
 
 def decisions_of(recorded: ExpertRecording) -> list[LookDecision]:
-    """Return the decisions of an episode; opening or closing belongs to the move before it."""
+    """Return what the expert decided in an episode: kinds of waypoints, each with look and thing.
+
+    The expert moves, and then opens or closes the gripper in a waypoint of its own. Here both are
+    one decision: the move's, with the gripper's value.
+    """
     found: list[LookDecision] = []
     for number, look in enumerate(recorded.looks.tolist()):
         move = _move_of(recorded, number)
-        has_open_end = bool(found) and found[-1].move.gripper == LEAVE
-        if move.gripper != LEAVE and has_open_end:
-            _end_with(found, move.gripper)
+        follows_move = bool(found) and found[-1].move.gripper == GRIPPER_UNCHANGED
+        if move.gripper != GRIPPER_UNCHANGED and follows_move:
+            _set_gripper_at_end(found, move.gripper)
         else:
             found.append(LookDecision(look, move, int(recorded.anchors[number])))
     return found
 
 
 def _move_of(recorded: ExpertRecording, number: int) -> Move:
-    """Return the kind of a recorded waypoint; one that opens or closes the gripper stays."""
+    """Return the kind of the waypoint with a number in a recording.
+
+    One that opens or closes the gripper stays in place. At a thing only the height is kept; else
+    also the way from the tool, both rounded so that few kinds occur.
+    """
     look = recorded.looks[number]
     action = recorded.actions[number]
     at_thing = bool(recorded.anchors[number] >= 0)
     gripper = float(action[-1])
-    if gripper != LEAVE:
+    if gripper != GRIPPER_UNCHANGED:
         return Move(at_thing, 0.0, 0.0, 0.0, STAY, gripper)
+    # x and y from the tool, z above the table, m.
     x, y, z = action[:3] - np.append(recorded.tool[look, :2], 0.0)
     height = _round(z, Z_GRID)
     turn = recorded.turns[number]
@@ -94,10 +103,14 @@ def _move_of(recorded: ExpertRecording, number: int) -> Move:
     return Move(at_thing, _round(x, XY_GRID), _round(y, XY_GRID), height, turn, gripper)
 
 
-def _end_with(found: list[LookDecision], gripper: float) -> None:
-    """Let the last move open or close the gripper, and the same before it that were not made.
+def _set_gripper_at_end(found: list[LookDecision], gripper: float) -> None:
+    """Set the gripper's value in the last decision, and in repetitions of it just before.
 
-    A move that is not made is decided again at the next look, and so stands several times.
+    A move that could not be made is decided again at the next look, and so is listed several times.
+
+    Args:
+        found: the decisions so far, which are changed in place.
+        gripper: -1 closes it, 1 opens it.
     """
     last = found[-1]
     for number in reversed(range(len(found))):
@@ -109,12 +122,16 @@ def _end_with(found: list[LookDecision], gripper: float) -> None:
 
 
 def common_moves(decisions: Iterable[Sequence[LookDecision]]) -> tuple[Move, ...]:
-    """Return the kinds of waypoints that occur often enough, the commonest first."""
+    """Return the kinds of waypoints that make up at least `LEAST_SHARE`, the commonest first.
+
+    Args:
+        decisions: of each episode.
+    """
     counts: Counter[Move] = Counter()
     for of_episode in decisions:
         counts.update(decision.move for decision in of_episode)
-    least = RAREST * counts.total()
-    return tuple(move for move, count in counts.most_common() if count >= least)
+    least_count = LEAST_SHARE * counts.total()
+    return tuple(move for move, count in counts.most_common() if count >= least_count)
 
 
 def waypoint(
@@ -123,10 +140,10 @@ def waypoint(
     place: NDArray[np.floating],
     turn: NDArray[np.floating],
 ) -> NDArray[np.float64]:
-    """Return the waypoint (7) of a kind.
+    """Return the waypoint of a kind: x, y, z, m, roll, pitch, yaw, rad, and gripper, (7,).
 
     Args:
-        move: its kind.
+        move: its kind; whether x and y are from the thing or from the tool.
         tool: (6,) x, y, z, m, roll, pitch, yaw, rad, of the tool now.
         place: (2,) x and y of the thing, m.
         turn: (2,) cosine and sine of four times the angle of the thing.
@@ -144,7 +161,12 @@ def waypoint(
 
 
 def _nearest_side(angle: float, now: float) -> float:
-    """Return the angle of a side of a square thing that needs the shortest turn from `now`."""
+    """Return the angle, rad, of that side of a square thing to which the tool turns least.
+
+    Args:
+        angle: of one of its sides, rad.
+        now: the yaw of the tool, rad.
+    """
     quarter = math.pi / 2.0
     return angle + quarter * round((now - angle) / quarter)
 

@@ -38,7 +38,7 @@ PARTS: Mapping[str, str] = {
 """The packaged plan that each part of the experiment changes. Resolved forms join the main run."""
 HELD_OUT = "test"
 """The pool of words that is spoken in every split: that of the packaged plans' split."""
-OWN_TASKS = (CONTEXT, PLANNER)
+PARTS_WITH_OWN_TASKS = (CONTEXT, PLANNER)
 """Parts with three tasks of their own."""
 RUNS = "runs"
 """Folder of the runs."""
@@ -91,11 +91,13 @@ def train_rows(
     workers: int,
     progress: Progress,
 ) -> dict[str, PolicyFiles]:
-    """Return the files of each row's policy; what is there already is used again.
+    """Train the policy of each row, one for each memory; return their files by the row's name.
+
+    Files that are there already are used again.
 
     Args:
-        experiment: which rows.
-        plan: of the bodies; the memories are the rows'.
+        experiment: the memories, each a row.
+        plan: of the bodies; its memory is replaced by the row's.
         words: how their reader learns.
         folder: for recordings and files.
         workers: processes that record and draw.
@@ -118,13 +120,15 @@ def part_options(
     files: Mapping[str, PolicyFiles],
     changes: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """Return a part's options of `roboirg.evaluate`: the packaged plan's with the rows as policies.
+    """Return the arguments of `roboirg.evaluate` that play one part of the experiment.
+
+    They are those of the packaged plan, with the trained policies in place of its own.
 
     Args:
         part: a name of `PARTS`.
         experiment: which rows.
         files: of each row.
-        changes: other options; tasks do not change parts with tasks of their own.
+        changes: options that replace the plan's; parts with tasks of their own keep those.
     """
     options = read_plan_file(PARTS[part])
     options.pop("policies", None)
@@ -135,19 +139,24 @@ def part_options(
     if changes.get("split", options["split"]) != options["split"]:
         options["wordings"] = HELD_OUT
     for name, value in changes.items():
-        is_fixed = name == "tasks" and part in OWN_TASKS
+        is_fixed = name == "tasks" and part in PARTS_WITH_OWN_TASKS
         if not is_fixed:
             options[name] = value
     options["policy"] = {row: of_row.spec for row, of_row in files.items()}
     if part == PLANNER:
-        options["policy"] = _with_planners(experiment, options["policy"])
+        options["policy"] = _planner_pairings(experiment, options["policy"])
     return options
 
 
-def _with_planners(experiment: ExperimentPlan, rows: Mapping[str, str]) -> dict[str, str]:
-    """Return the rows with planners, and the same hands and planners with others.
+def _planner_pairings(experiment: ExperimentPlan, rows: Mapping[str, str]) -> dict[str, str]:
+    """Return policies that pair planners with hands, by row: its name → its spec.
 
-    The stronger planner is the interpreter of the words; the stronger hands are the scripted ones.
+    A planner names subgoals, hands follow them. Each trained policy with a planner plays as it is;
+    with a stronger planner, the interpreter of words; and with stronger, scripted hands.
+
+    Args:
+        experiment: the memories of the rows.
+        rows: the spec of each row's policy.
     """
     found = {}
     for memory in experiment.memories:

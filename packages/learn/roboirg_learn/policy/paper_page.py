@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 EXPLICIT = "explicit"
-FIRST = row_name("none")
+WITHOUT_MEMORY_ROW = row_name("none")
 """The row that the others are compared with."""
-WITHOUT_MEMORY, *OTHER_SYSTEMS = SYSTEMS.values()
+WITHOUT_MEMORY_SYSTEM, *OTHER_SYSTEMS = SYSTEMS.values()
 """The paper's system that the others are compared with, and these."""
-LESS_FIRST = "less that of the row without memory, in points"
+LESS_WITHOUT_MEMORY = "less that of the row without memory, in points"
 TRIALS = 150
 """Rollouts behind a published rate."""
 Z_95 = 1.96
@@ -58,21 +58,23 @@ Differences = Mapping[str, Mapping[str, Any]]
 
 
 def answers_text(frames: Mapping[str, pd.DataFrame]) -> str:
-    """Return the paper's questions with the answers of the parts and of its rates.
+    """Return the page's sections: each a question of the paper with a table of answers.
+
+    A table has rows of our small policies, and rows computed from the paper's published rates.
 
     Args:
-        frames: results of the parts that were played, as `roboirg.results` returns them.
+        frames: episodes of the parts that were played, by part, as `roboirg.results` returns them.
     """
     sections: list[str] = []
     if MAIN in frames:
-        sections += _main_questions(_told(frames[MAIN]))
+        sections += _main_questions(_with_words(frames[MAIN]))
     if CONTEXT in frames:
-        sections.append(_stage_question(_told(frames[CONTEXT])))
+        sections.append(_stage_question(_with_words(frames[CONTEXT])))
     return "\n\n".join(sections)
 
 
-def _told(frame: pd.DataFrame) -> pd.DataFrame:
-    """Return the episodes in which the instruction was told, not withheld."""
+def _with_words(frame: pd.DataFrame) -> pd.DataFrame:
+    """Return the episodes in which the policy was given the instruction; in others it gets none."""
     return frame[frame["arm"] == "told"]
 
 
@@ -85,34 +87,45 @@ class _Published:
         }
 
     def rates(self, system: str, setting: str) -> Rates:
-        """Return the rates of a system in a setting, by task."""
+        """Return the published success of a system in a setting by task, percent."""
         return self._rates[system, setting]
 
     def changes(self, settings: Sequence[str]) -> Differences:
-        """Return by system, for each setting, its success less explicit success."""
+        """Return how each published system's success differs from its explicit success.
+
+        By system, then by setting.
+        """
         found: dict[str, dict[str, Difference]] = {}
         for system in SYSTEMS.values():
             explicit = self.rates(system, EXPLICIT)
             found[system] = {
-                name: _independent(self.rates(system, name), explicit) for name in settings
+                name: _published_difference(self.rates(system, name), explicit) for name in settings
             }
         return found
 
     def gains(self, settings: Sequence[str]) -> Differences:
-        """Return by system, for each setting, its success less that of the one without memory."""
+        """Return how each system's success differs from that of the system without memory.
+
+        By system, then by setting; both are published.
+        """
         found: dict[str, dict[str, Difference]] = {system: {} for system in OTHER_SYSTEMS}
         for name in settings:
-            first = self.rates(WITHOUT_MEMORY, name)
+            first = self.rates(WITHOUT_MEMORY_SYSTEM, name)
             for system, gains in found.items():
-                gains[name] = _independent(self.rates(system, name), first)
+                gains[name] = _published_difference(self.rates(system, name), first)
         return found
 
 
-def _main_questions(told: pd.DataFrame) -> Iterator[str]:
-    """Yield the sections that the main experiment answers, each a table."""
+def _main_questions(with_words: pd.DataFrame) -> Iterator[str]:
+    """Yield the sections that the main experiment answers, each a question with a table.
+
+    Args:
+        with_words: episodes of the main part. In the form *implicit* words refer to things; in
+            *resolved* the references are replaced by names.
+    """
     settings = [name for name in plain_settings() if name != EXPLICIT]
     published = _Published()
-    played = told[told["form"] == "implicit"]
+    played = with_words[with_words["form"] == "implicit"]
     changes = _gaps(played, "setting", {"setting": EXPLICIT})
     yield _table(
         "Does explicit success carry over, and which setting costs most?",
@@ -120,11 +133,11 @@ def _main_questions(told: pd.DataFrame) -> Iterator[str]:
         settings,
         {**changes, **published.changes(settings)},
     )
-    if FIRST in set(played["policy"]):
+    if WITHOUT_MEMORY_ROW in set(played["policy"]):
         yield _memory_question(played, [EXPLICIT, *settings], published)
         yield _group_question(played[played["setting"] == EXPLICIT], published)
     yield _retention(settings, changes, published)
-    resolved = _gaps(told, "setting", {"form": "implicit"}, form="resolved")
+    resolved = _gaps(with_words, "setting", {"form": "implicit"}, form="resolved")
     if resolved:
         yield _table(
             "Do resolved forms recover it?",
@@ -135,34 +148,37 @@ def _main_questions(told: pd.DataFrame) -> Iterator[str]:
 
 
 def _memory_question(played: pd.DataFrame, settings: Sequence[str], published: _Published) -> str:
-    """Return by setting what memory adds."""
-    gaps = _gaps(played, "setting", {"policy": FIRST})
+    """Return the table of what memory adds in each setting: ours, then the paper's systems."""
+    gaps = _gaps(played, "setting", {"policy": WITHOUT_MEMORY_ROW})
     return _table(
         "Do memory and referring come apart?",
-        f"Success {LESS_FIRST}.",
+        f"Success {LESS_WITHOUT_MEMORY}.",
         settings,
         {**gaps, **published.gains(settings)},
     )
 
 
 def _group_question(explicit: pd.DataFrame, published: _Published) -> str:
-    """Return by group of tasks what memory adds; tasks with a video are also a group."""
+    """Return the table of what memory adds in each group of tasks, with explicit words.
+
+    Groups are the suites of tasks; all tasks with a video are one more group.
+    """
     is_filmed = explicit["demonstration_steps"] > 0
     filmed = explicit[is_filmed].assign(suite="with a video")
     tasks_of: dict[str, set[str]] = {}
     found: dict[str, dict[str, Any]] = {}
     for frame in (explicit, filmed):
-        if FIRST not in set(frame["policy"]):
+        if WITHOUT_MEMORY_ROW not in set(frame["policy"]):
             continue
         for group, tasks in frame.groupby("suite", sort=False)["task"]:
             tasks_of[str(group)] = set(tasks)
-        for row, gaps in _gaps(frame, "suite", {"policy": FIRST}).items():
+        for row, gaps in _gaps(frame, "suite", {"policy": WITHOUT_MEMORY_ROW}).items():
             found.setdefault(row, {}).update(gaps)
     for system in OTHER_SYSTEMS:
         found[system] = _published_gains(system, tasks_of, published)
     return _table(
         "Where does memory help?",
-        f"Explicit success {LESS_FIRST}, by group of tasks.",
+        f"Explicit success {LESS_WITHOUT_MEMORY}, by group of tasks.",
         list(tasks_of),
         found,
     )
@@ -171,40 +187,56 @@ def _group_question(explicit: pd.DataFrame, published: _Published) -> str:
 def _published_gains(
     system: str, tasks_of: Mapping[str, set[str]], published: _Published
 ) -> dict[str, Difference]:
-    """Return by group of tasks the explicit success of a system less that without memory."""
-    first = published.rates(WITHOUT_MEMORY, EXPLICIT)
+    """Return for each group of tasks what memory adds to a system: a difference of success.
+
+    Args:
+        system: of the paper.
+        tasks_of: the tasks of each group.
+        published: the paper's rates; those with explicit words are compared.
+    """
+    first = published.rates(WITHOUT_MEMORY_SYSTEM, EXPLICIT)
     gains = {}
     for group, tasks in tasks_of.items():
         rates = published.rates(system, EXPLICIT).items()
         of_group = {task: rate for task, rate in rates if task in tasks}
-        gains[group] = _independent(of_group, first)
+        gains[group] = _published_difference(of_group, first)
     return gains
 
 
-def _stage_question(told: pd.DataFrame) -> str:
-    """Return what each further stage of the context costs."""
+def _stage_question(with_words: pd.DataFrame) -> str:
+    """Return the table of what each further stage of the context costs.
+
+    A context is told in stages before the instruction; all are compared with the shortest one.
+    """
     rows = published_rows("context")
     shortest = min(rows, key=lambda row: len(row.options.stages)).label
     longer = [label for label in dict.fromkeys(row.label for row in rows) if label != shortest]
     rates = {(row.model, row.label): row.rates for row in rows}
-    theirs: dict[str, dict[str, Difference]] = {}
+    published_gaps: dict[str, dict[str, Difference]] = {}
     for row in rows:
         if row.label != shortest:
-            difference = _independent(row.rates, rates[row.model, shortest])
-            theirs.setdefault(row.model, {})[row.label] = difference
-    gaps = _gaps(told, "instruction_options", {"instruction_options": shortest})
+            difference = _published_difference(row.rates, rates[row.model, shortest])
+            published_gaps.setdefault(row.model, {})[row.label] = difference
+    gaps = _gaps(with_words, "instruction_options", {"instruction_options": shortest})
     return _table(
         "Does success fall with each stage of the context?",
         f"Success less that in {shortest}, in points.",
         longer,
-        {**gaps, **theirs},
+        {**gaps, **published_gaps},
     )
 
 
 def _gaps(
     frame: pd.DataFrame, column: str, against: Mapping[str, str], form: str = "implicit"
 ) -> dict[str, dict[str, Any]]:
-    """Return the gaps of the groups of policy, a column and a form that have one."""
+    """Return differences of success, by policy and then by the value of a column.
+
+    Args:
+        frame: played episodes.
+        column: such as ``setting``; each of its values is a column of the table.
+        against: what each group is compared with, such as ``{"setting": "explicit"}``.
+        form: of the instructions that are compared.
+    """
     found: dict[str, dict[str, Any]] = {row_name(memory): {} for memory in SYSTEMS}
     for measured in roboirg.measure(frame, ("policy", column, "form"), against):
         policy, name, measured_form = measured.key
@@ -213,10 +245,11 @@ def _gaps(
     return {row: gaps for row, gaps in found.items() if gaps}
 
 
-def _independent(first: Rates, second: Rates) -> Difference:
-    """Return the difference of published rates, the mean over the tasks of the first.
+def _published_difference(first: Rates, second: Rates) -> Difference:
+    """Return the mean difference of two published rates over the tasks that the first has.
 
-    The trials of two published cells are taken as independent, as only their rates are known.
+    Interval and p-value are of a normal approximation, with `TRIALS` rollouts for each rate. The
+    rollouts of the two are taken as independent, because only their rates are known.
     """
     total = 0.0
     variance = 0.0
@@ -234,11 +267,18 @@ def _independent(first: Rates, second: Rates) -> Difference:
     if not spread:
         return Difference(value, None, 1.0)
     interval = value - Z_95 * spread, value + Z_95 * spread
+    # The p-value is two-sided.
     return Difference(value, interval, math.erfc(abs(value) / spread / math.sqrt(2)))
 
 
 def _retention(settings: Sequence[str], changes: Differences, published: _Published) -> str:
-    """Return how much of explicit success is kept in each setting."""
+    """Return the table of the share of explicit success that is kept in each setting, percent.
+
+    Args:
+        settings: the columns.
+        changes: differences to explicit success, by policy and setting, with the shares.
+        published: the paper's rates.
+    """
     cells: dict[str, dict[str, str]] = {}
     for row, gaps in changes.items():
         for setting, gap in gaps.items():
@@ -251,24 +291,33 @@ def _retention(settings: Sequence[str], changes: Differences, published: _Publis
         for setting in settings:
             percent = _percent_kept(published.rates(system, setting), explicit)
             of_system[setting] = f"{percent:.0f}"
-    rows = [("", row, _in_columns(texts, settings)) for row, texts in cells.items()]
+    rows = [("", row, _cells_of_row(texts, settings)) for row, texts in cells.items()]
     note = "Success in each setting by explicit success, in percent."
     return markdown_table("Do planners keep more?", settings, rows, (note,))
 
 
 def _percent_kept(rates: Rates, explicit: Rates) -> float:
-    """Return the sum of rates by that of the explicit rates of the same tasks, in percent."""
+    """Return what percentage of explicit success is kept: of the sums over the same tasks."""
     kept = 0.0
-    whole = 0.0
+    explicit_sum = 0.0
     for task, rate in rates.items():
         if rate is not None:
             kept += float(rate)
-            whole += float(explicit[task] or 0)
-    return 100 * kept / whole
+            explicit_sum += float(explicit[task] or 0)
+    return 100 * kept / explicit_sum
 
 
 def _table(title: str, note: str, columns: Sequence[str], found: Differences) -> str:
-    """Return a table of differences; a star marks p at most 0.05 with Holm's correction by row."""
+    """Return a Markdown table of differences in points, with their 95 % intervals.
+
+    A star marks p ≤ 0.05 after Holm's correction for the several columns of a row.
+
+    Args:
+        title: the question.
+        note: under the table.
+        columns: such as settings.
+        found: by row, then by column.
+    """
     rows = []
     for row, differences in found.items():
         shown = [name for name in columns if name in differences]
@@ -280,12 +329,12 @@ def _table(title: str, note: str, columns: Sequence[str], found: Differences) ->
             texts[name] = _with_interval(
                 100 * difference.value, difference.interval, form, "{:+.0f}"
             )
-        rows.append(("", row, _in_columns(texts, columns)))
+        rows.append(("", row, _cells_of_row(texts, columns)))
     return markdown_table(title, columns, rows, (note, _POINTS))
 
 
-def _in_columns(texts: Mapping[str, str], columns: Sequence[str]) -> list[str]:
-    """Return the cells of a row; a dash where there is none."""
+def _cells_of_row(texts: Mapping[str, str], columns: Sequence[str]) -> list[str]:
+    """Return the text of each column of a row; a dash where it has none."""
     return [texts.get(name, "–") for name in columns]
 
 
@@ -295,9 +344,13 @@ def _with_interval(
     form: str,
     form_of_ends: str = "{:.0f}",
 ) -> str:
-    """Return a value in percent with the ends of its interval, which are from 0 to 1.
+    """Return a value with its interval as text, such as ``-12.0* (-20 to -4)``.
 
-    Example: ``-12.0* (-20 to -4)``.
+    Args:
+        value: in percent or points.
+        interval: from 0 to 1, or -1 to 1 for a difference; None for *no interval*.
+        form: format of the value.
+        form_of_ends: format of the ends, which are turned into percent.
     """
     shown = form.format(value)
     if interval is None:

@@ -23,9 +23,9 @@ from roboirg_learn.policy.subgoal_net import PlannedBatch
 from roboirg_learn.policy.tracks import LookTokens, Tracks
 
 COUNTED_LOOKS = 10
-"""Looks of an episode, besides those of decisions, at which a body learns what is completed."""
-NOT_ASKED = -1
-"""In the place of a move, thing or count that a network is not to say, or does not see."""
+"""Looks without a decision at which a body learns how many stages are completed."""
+NO_LABEL = -1
+"""In the place of a move, thing or count that a network does not learn at a look."""
 HEIGHT_SCALE = 5.0
 FINGER_SCALE = 25.0
 """Per meter, so that these numbers of a tool are about as great as the others."""
@@ -72,11 +72,11 @@ class LookHistory:
     def add(
         self, look: LookTokens, tool: NDArray[np.floating[Any]], *, is_video: bool
     ) -> NDArray[np.int64]:
-        """Add a look; returns the track of each of its things.
+        """Add a look; returns the track of each of its things, -1 for one that is not tracked.
 
         Args:
-            look: the things.
-            tool: (7,) pose and opening; see `ExpertRecording`.
+            look: the n things that it shows.
+            tool: (7,) x, y, z, m, roll, pitch, yaw, rad, and a finger's opening, m.
             is_video: whether it is one of the video.
         """
         tracks_of_look = self.tracks.update(look)
@@ -93,7 +93,10 @@ class LookHistory:
         return tracks_of_look
 
     def numbers(self) -> LookNumbers:
-        """Return all looks; a thing has the place where it was last seen."""
+        """Return all T looks so far as arrays (T, K, …), with K the number of tracked things.
+
+        A thing that is out of sight has the place where it was last seen.
+        """
         count = max(1, self.tracks.count)
         parts = {}
         for name in self._rows[0]:
@@ -102,7 +105,12 @@ class LookHistory:
 
 
 def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray[np.float32]:
-    """Return pose and opening of the tool as numbers of about the same size, `TOOL_NUMBERS`."""
+    """Return the tool's state as input of the network, (TOOL_NUMBERS,), scaled to similar sizes.
+
+    Args:
+        tool: (7,) x, y, z, m, roll, pitch, yaw, rad, and a finger's opening, m.
+        is_video: whether the look is one of the video; 1 or 0 in the last number.
+    """
     x, y, z, _, _, yaw, finger = tool
     height = z * HEIGHT_SCALE
     opening = finger * FINGER_SCALE
@@ -111,20 +119,27 @@ def _tool_numbers(tool: NDArray[np.floating[Any]], *, is_video: bool) -> NDArray
     return np.array([x, y, height, *turn, opening, is_video], np.float32)
 
 
-class AskedMoves:
-    """What a network is to say at some looks of an episode."""
+class LookLabels:
+    """What a network learns to say at some looks of an episode."""
 
     def __init__(self) -> None:
         self._looks: list[int] = []
         self._rows: list[tuple[int, int, int]] = []
 
-    def add(self, look: int, done: int, move: int = NOT_ASKED, thing: int = NOT_ASKED) -> None:
-        """Ask at a look for completed stages, and for a move and a thing at a decision."""
+    def add(self, look: int, done: int, move: int = NO_LABEL, thing: int = NO_LABEL) -> None:
+        """Add the labels of a look.
+
+        Args:
+            look: its number.
+            done: completed stages.
+            move: number of the kind of waypoint, or of the form of subgoal; only at a decision.
+            thing: track of the thing at whose place it is; only at a decision.
+        """
         self._looks.append(look)
         self._rows.append((move, thing, done))
 
     def numbers(self, looks: LookNumbers, goal: NDArray[np.float32]) -> EpisodeNumbers:
-        """Return the episode with what is asked."""
+        """Return an episode as network input with its labels; `goal` as in `EpisodeNumbers`."""
         moves, things, done = np.array(self._rows, np.int64).T
         return EpisodeNumbers(looks, goal, np.array(self._looks, np.int64), moves, things, done)
 
@@ -137,18 +152,18 @@ def to_numbers(
     moves: Mapping[Any, int],
     rng: np.random.Generator,
 ) -> EpisodeNumbers:
-    """Return a recorded episode as a detector would have seen it.
+    """Return a recorded episode as network input and labels, seen as by an imperfect detector.
 
     Args:
         recorded: the episode.
         decisions: of the episode; some looks between them are added, which have no move.
-        goal: (parts,) 1 for each part of its goal.
-        sight: of the camera.
+        goal: (size,) as `GoalLayout.numbers` returns it.
+        sight: classes of things and their heights.
         moves: the number of each kind of waypoint, or of each form of subgoals.
         rng: draws the noise of the detector.
     """
     history = _LabeledHistory()
-    asked = AskedMoves()
+    labels = LookLabels()
     decision_at = {decision.look: decision for decision in decisions}
     skipped = _merged_looks(recorded) - decision_at.keys()
     counted = _counted_looks(recorded, rng)
@@ -160,11 +175,11 @@ def to_numbers(
         done = int(recorded.done[look])
         if look in decision_at:
             decision = decision_at[look]
-            move = moves.get(decision.move, NOT_ASKED)
-            asked.add(now, done, move, history.track(decision.thing))
+            move = moves.get(decision.move, NO_LABEL)
+            labels.add(now, done, move, history.track(decision.thing))
         elif look in counted:
-            asked.add(now, done)
-    return asked.numbers(history.looks.numbers(), goal)
+            labels.add(now, done)
+    return labels.numbers(history.looks.numbers(), goal)
 
 
 class _LabeledHistory:
@@ -185,62 +200,71 @@ class _LabeledHistory:
         return len(self.looks) - 1
 
     def track(self, number: int) -> int:
-        """Return the track of an object; `NOT_ASKED` for none, and for one that was not found."""
+        """Return the track of an object by its number; `NO_LABEL` if it was never found."""
         if number == GHOST:
-            return NOT_ASKED
-        return self._track_of.get(number, NOT_ASKED)
+            return NO_LABEL
+        return self._track_of.get(number, NO_LABEL)
 
 
 def _merged_looks(recorded: ExpertRecording) -> set[int]:
-    """Return the looks at which only the expert decides.
+    """Return the numbers of looks that are not at a multiple of `LOOK_EVERY` control steps.
 
-    Who opens or closes the gripper with the move before does not look at the time between.
+    Between multiples only decisions are looked at. Where the expert decides to use the gripper
+    after a move, a policy does not: it decides both at once, and so has no such look.
     """
     return {look for look in recorded.looks.tolist() if recorded.steps[look] % LOOK_EVERY}
 
 
 def _counted_looks(recorded: ExpertRecording, rng: np.random.Generator) -> set[int]:
-    """Draw the looks at which a body learns what is completed, besides those of decisions."""
-    acting = np.flatnonzero(~recorded.is_video)
-    count = min(COUNTED_LOOKS, len(acting))
-    return set(rng.choice(acting, count, replace=False).tolist())
+    """Draw up to `COUNTED_LOOKS` looks after the video, to learn completed stages at."""
+    looks_after_video = np.flatnonzero(~recorded.is_video)
+    count = min(COUNTED_LOOKS, len(looks_after_video))
+    return set(rng.choice(looks_after_video, count, replace=False).tolist())
 
 
 def to_batch(episodes: Sequence[EpisodeNumbers]) -> EpisodeBatch:
-    """Return episodes padded to the longest."""
+    """Return B episodes in one batch of tensors (B, …), padded to the longest.
+
+    Padding is 0, and `NO_LABEL` in labels, so that it is not learned from.
+    """
     looks = {}
     for name in LookNumbers._fields:
         looks[name] = _pad([getattr(episode.looks, name) for episode in episodes], 0)
-    there = [np.ones(len(episode.looks.tool), bool) for episode in episodes]
+    has_look = [np.ones(len(episode.looks.tool), bool) for episode in episodes]
     return EpisodeBatch(
         **looks,
-        there=_pad(there, 0),
+        has_look=_pad(has_look, 0),
         goals=torch.from_numpy(np.stack([episode.goal for episode in episodes])),
         decisions=_pad([episode.decisions for episode in episodes], 0),
-        moves=_pad([episode.moves for episode in episodes], NOT_ASKED),
-        things=_pad([episode.things for episode in episodes], NOT_ASKED),
-        done=_pad([episode.done for episode in episodes], NOT_ASKED),
-        planned=_planned([episode.planned for episode in episodes if episode.planned is not None]),
+        moves=_pad([episode.moves for episode in episodes], NO_LABEL),
+        things=_pad([episode.things for episode in episodes], NO_LABEL),
+        done=_pad([episode.done for episode in episodes], NO_LABEL),
+        planned=_pad_planned(
+            [episode.planned for episode in episodes if episode.planned is not None]
+        ),
     )
 
 
-def _planned(episodes: Sequence[PlannedNumbers]) -> PlannedBatch | None:
-    """Return the subgoals, or what planners keep, padded; None without any."""
+def _pad_planned(episodes: Sequence[PlannedNumbers]) -> PlannedBatch | None:
+    """Return what hands or planners are given, padded; None for bodies without subgoals."""
     if not episodes:
         return None
-    # A decision that is there for padding sees the first look.
+    # 0 in padding is the first look; -1 everywhere would leave attention without any token.
     return PlannedBatch(
         context=_pad([episode.context for episode in episodes], 0),
-        kept=_pad([episode.kept for episode in episodes], 0),
-        keys=_pad([episode.keys for episode in episodes], NOT_ASKED),
+        kept_looks=_pad([episode.kept_looks for episode in episodes], 0),
+        to_keep=_pad([episode.to_keep for episode in episodes], NO_LABEL),
     )
 
 
 def _pad(arrays: Sequence[NDArray[Any]], fill: int) -> torch.Tensor:
-    """Return arrays in one, each filled up to the greatest size along each axis."""
+    """Return n arrays as one tensor (n, …), each filled up to the greatest size along each axis.
+
+    Example: [1, 2] and [3] with fill 0 → [[1, 2], [3, 0]].
+    """
     shape = np.max([array.shape for array in arrays], axis=0)
     padded = np.full((len(arrays), *shape), fill, arrays[0].dtype)
     for row, array in zip(padded, arrays, strict=True):
-        corner = tuple(slice(size) for size in array.shape)
-        row[corner] = array
+        filled_part = tuple(slice(size) for size in array.shape)
+        row[filled_part] = array
     return torch.from_numpy(padded)

@@ -17,14 +17,14 @@ from roboirg_learn.policy.body_net import BodyAnswer, BodyNet
 from roboirg_learn.policy.memories import Carried
 from roboirg_learn.policy.moves import waypoint
 from roboirg_learn.policy.planner_history import PlannedNumbers
-from roboirg_learn.policy.policy_data import NOT_ASKED, EpisodeNumbers, LookHistory, to_batch
+from roboirg_learn.policy.policy_data import NO_LABEL, EpisodeNumbers, LookHistory, to_batch
 from roboirg_learn.policy.policy_files import PolicyFiles
 from roboirg_learn.policy.tracks import LookTokens
 from roboirg_learn.policy.trained_body import Pictures, TrainedBody, load_body
 from roboirg_learn.policy.trained_reader import TrainedReader, load_reader
 
 FIRST_LOOKS = (0, LATER_STEP // LOOK_EVERY)
-"""Looks at which the reader of words sees a video, two seconds apart; else it sees the first."""
+"""Numbers of the looks at a video that the reader of words sees, two seconds apart."""
 _BATCH = 32
 
 
@@ -65,12 +65,12 @@ class NetworkChoice(NamedTuple):
     Attributes:
         kind: number of the kind of waypoint, or of the form of a subgoal.
         thing: track of the thing; None where there is none.
-        keys: places among the recent looks of those to be kept.
+        to_keep: places among the recent looks of those to be kept.
     """
 
     kind: int
     thing: int | None
-    keys: tuple[int, ...]
+    to_keep: tuple[int, ...]
 
 
 class _RememberedLooks(NamedTuple):
@@ -93,7 +93,7 @@ class SeenEpisode:
     def __init__(self, model: PolicyModel) -> None:
         self._model = model
         self._history = LookHistory()
-        self._first: list[LookTokens] = []
+        self._first_looks: list[LookTokens] = []
         self._remembered: dict[BodyNet, _RememberedLooks] = {}
         self.video_looks = 0
 
@@ -104,27 +104,28 @@ class SeenEpisode:
         *,
         is_video: bool,
     ) -> None:
-        """See pictures of the front camera.
+        """Find the things of front pictures and remember them as looks.
 
         Args:
-            pictures: in the order of time.
-            tools: (7,) the tool's pose and a finger's opening at each.
+            pictures: uint8 (256, 256, 3) each, in the order of time.
+            tools: (7,) at each picture, as `tool_of` returns it.
             is_video: whether they are of the video.
         """
+        # Without a video the reader of words sees the first picture only.
         first_looks = FIRST_LOOKS if is_video else FIRST_LOOKS[:1]
         for start in range(0, len(pictures), _BATCH):
             part = slice(start, start + _BATCH)
             found = self._model.body.see(pictures[part])
             for tokens, tool in zip(found, tools[part], strict=True):
                 if len(self._history) in first_looks:
-                    self._first.append(tokens)
+                    self._first_looks.append(tokens)
                 self._history.add(tokens, tool, is_video=is_video)
         if is_video:
             self.video_looks += len(pictures)
 
     def understand(self, text: str) -> NDArray[np.float32]:
         """Return the goal that an instruction means, as `GoalLayout.numbers` does."""
-        return self._model.reader.understand(text, self._first, self._model.body.goals)
+        return self._model.reader.understand(text, self._first_looks, self._model.body.goals)
 
     @property
     def looks(self) -> int:
@@ -135,36 +136,46 @@ class SeenEpisode:
     def choose(
         self, net: BodyNet, goal: NDArray[np.float32], planned: PlannedNumbers | None
     ) -> NetworkChoice:
-        """Return what a network, body or planner, chooses after the last look."""
-        not_asked = np.array([NOT_ASKED])
+        """Return what a network chooses after the last look.
+
+        Args:
+            net: a body, which chooses a kind of waypoint, or a planner, which chooses a subgoal.
+            goal: as `understand` returns it.
+            planned: for hands the subgoal, for a planner what it named and keeps; else None.
+        """
+        no_label = np.array([NO_LABEL])
         numbers = EpisodeNumbers(
             looks=self._history.numbers(),
             goal=goal,
             decisions=np.array([self.looks - 1]),
-            moves=not_asked,
-            things=not_asked,
-            done=not_asked,
+            moves=no_label,
+            things=no_label,
+            done=no_label,
             planned=planned,
         )
         answer: BodyAnswer = net(to_batch([numbers]), self._carried_for(net, goal))
         kind = int(answer.moves[0, 0].argmax())
         thing = int(answer.things[0, 0, kind].argmax())
         is_there = thing < self._history.tracks.count
-        keys: tuple[int, ...] = ()
-        if answer.keys is not None:
-            keys = tuple(np.flatnonzero(answer.keys[0, 0].numpy() > 0))
-        return NetworkChoice(kind, thing if is_there else None, keys)
+        to_keep: tuple[int, ...] = ()
+        if answer.keep_scores is not None:
+            to_keep = tuple(np.flatnonzero(answer.keep_scores[0, 0].numpy() > 0))
+        return NetworkChoice(kind, thing if is_there else None, to_keep)
 
     def _carried_for(self, net: BodyNet, goal: NDArray[np.float32]) -> Carried:
-        """Return what a network remembers of the looks; with another goal it begins anew."""
-        before = self._remembered.get(net)
-        if before is None or not np.array_equal(before.goal, goal):
-            before = _RememberedLooks(goal, Carried())
-            self._remembered[net] = before
-        return before.carried
+        """Return what a network remembers of the looks so far, which its next call goes on from.
+
+        What is remembered depends on the goal, so with another goal (another utterance was heard)
+        it begins anew.
+        """
+        remembered = self._remembered.get(net)
+        if remembered is None or not np.array_equal(remembered.goal, goal):
+            remembered = _RememberedLooks(goal, Carried())
+            self._remembered[net] = remembered
+        return remembered.carried
 
     def point(self, thing: int) -> NDArray[np.float64]:
-        """Return column and row in the front picture of a thing, where it was last seen."""
+        """Return where a thing, given by its track, was last seen: column and row, pixels, (2,)."""
         tracks = self._history.tracks
         height = self._model.body.sight.heights[tracks.classes[thing]]
         return points_of(np.append(tracks.places[thing].astype(np.float64), height))
@@ -175,11 +186,11 @@ class SeenEpisode:
         tool: NDArray[np.floating[Any]],
         planned: PlannedNumbers | None = None,
     ) -> NDArray[np.float64]:
-        """Return the next waypoint (7), after the last look.
+        """Return the next waypoint (7,), as `moves.waypoint` does, after the last look.
 
         Args:
             goal: as `understand` returns it.
-            tool: (7,) of the last look.
+            tool: (7,) pose and opening now.
             planned: the subgoal to follow, for hands.
         """
         body = self._model.body

@@ -13,7 +13,7 @@ from roboirg_learn.listener.reader_plan import as_plain
 MEMORY_NAMES = ("none", "recurrent", "ttt", "framesamp", "subgoal", "keyframes")
 """The kinds of memory; the last two are a planner's."""
 PLANNERS = ("subgoal", "keyframes")
-CHOOSES = "keyframes"
+KEYFRAME_PLANNER = "keyframes"
 """The planner that chooses what it keeps."""
 HANDS = "hands"
 """The body that follows the subgoals of a planner, and remembers nothing."""

@@ -29,12 +29,12 @@ from roboirg_learn.policy.subgoals import forms_of, subgoals_due
 from roboirg_learn.policy.thing_detector import (
     LabeledPicture,
     ThingDetector,
+    augmented,
     detector_loss,
-    varied,
 )
 from roboirg_learn.policy.trained_body import GoalLayout, TrainedBody, load_body, save_body
 from roboirg_learn.policy.trained_reader import load_reader, save_reader
-from roboirg_learn.policy.word_training import check_words, teach_reader
+from roboirg_learn.policy.word_training import check_words, train_policy_reader
 from roboirg_learn.trained_file import END
 from roboirg_learn.trainer import Course, KeptTraining, Progress, Training, batches
 
@@ -51,8 +51,9 @@ DETECTOR_RATE = 8e-3
 def trained_files(
     plan: BodyPlan, words: ReaderPlan, folder: Path, workers: int, progress: Progress
 ) -> PolicyFiles:
-    """Return the files of a policy that has learned from the disturbed expert in random scenes.
+    """Train the body and the reader of a policy as far as they are missing; return their files.
 
+    The body learns from recordings of the expert, which is disturbed on purpose, in random scenes.
     What is recorded and learned stays in the folder, and is used again by the same plans, and as
     far as it fits by others: bodies with other memories, readers of other words.
 
@@ -79,14 +80,20 @@ def trained_files(
     body = load_body(files.body)
     _check_plan(files.body, body.plan, plan.about)
     if not files.reader.exists():
-        reader = teach_reader(body, words, folder, name, workers, progress)
+        reader = train_policy_reader(body, words, folder, name, workers, progress)
         save_reader(reader, files.reader)
     _check_plan(files.reader, load_reader(files.reader).plan, words.about)
     return files
 
 
 def _check_plan(path: Path, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
-    """Refuse a file that was trained by another plan; what else the file has is no matter."""
+    """Refuse a file that was trained by another plan.
+
+    Args:
+        path: of the file.
+        found: the plan that the file has; it may have more fields than are wanted.
+        wanted: the plan that it should have.
+    """
     if not wanted.items() <= found.items():
         raise InvalidValueError(
             f"{str(path)!r} was trained by another plan; give another folder, or delete it."
@@ -94,7 +101,10 @@ def _check_plan(path: Path, found: Mapping[str, Any], wanted: Mapping[str, Any])
 
 
 def _learn_body(plan: BodyPlan, folder: Path, workers: int, progress: Progress) -> TrainedBody:
-    """Return a body that has learned from recordings, with a planner if the plan has one."""
+    """Return a trained body; with a planner if the memory of the plan is one.
+
+    A planner is a second network like the body's, which learns subgoals instead of waypoints.
+    """
     recorded = record_all(plan, folder, workers, progress)
     body = _body_alone(plan, recorded, folder, progress)
     if plan.memory not in PLANNERS:
@@ -109,7 +119,10 @@ def _learn_body(plan: BodyPlan, folder: Path, workers: int, progress: Progress) 
 def _body_alone(
     plan: BodyPlan, recorded: Sequence[Recorded], folder: Path, progress: Progress
 ) -> TrainedBody:
-    """Return a body without planner; where the plan has one, it follows subgoals."""
+    """Return a trained body without planner: its detector, and the network that moves.
+
+    Where the plan has a planner, that network learns to follow subgoals instead of a goal.
+    """
     sight = sight_of(played.recording for played in recorded)
     goals = GoalLayout(plan.tasks, parts_of_tasks(plan.tasks))
     lessons = [BodyLesson(played, decisions_of(played.recording)) for played in recorded]
@@ -121,13 +134,16 @@ def _body_alone(
 
 
 def _subgoals_of(played: Recorded) -> list[LookDecision]:
-    """Return the subgoals that are due at the decisions of an episode."""
+    """Return the subgoal that is due at each decision of a recorded episode."""
     looks = [decision.look for decision in decisions_of(played.recording)]
     return subgoals_due(played.recording, played.episode, looks)
 
 
 def _check_folder(plan: BodyPlan, folder: Path) -> None:
-    """Refuse a folder whose recordings and detector do not fit; write what they are made for."""
+    """Refuse a folder whose recordings were made for another plan.
+
+    ``recorded.json`` in the folder has what they depend on; it is written if there is none.
+    """
     path = folder / "recorded.json"
     if (folder / RECORDINGS).exists() and not path.exists():
         raise InvalidValueError(
@@ -147,13 +163,16 @@ def _check_folder(plan: BodyPlan, folder: Path) -> None:
 
 
 def record_all(plan: BodyPlan, folder: Path, workers: int, progress: Progress) -> list[Recorded]:
-    """Record what is missing, and return the episodes in which the expert succeeded.
+    """Record the expert in the plan's scenes, and return the episodes in which it succeeded.
+
+    Recordings that the folder has are not made again.
 
     Raises:
         InvalidValueError: it succeeded in none of a task.
     """
     recordings = folder / RECORDINGS
     recordings.mkdir(parents=True, exist_ok=True)
+    # All tasks by turns, so that an interrupted recording has some of each.
     every_scene = episodes_of(plan.tasks, "random", plan.scenes)
     episodes = sorted(every_scene, key=lambda episode: episode.index)
     _record_missing(episodes, plan.drawn, recordings, workers, progress)
@@ -175,7 +194,15 @@ def record_all(plan: BodyPlan, folder: Path, workers: int, progress: Progress) -
 def _record_missing(
     episodes: Sequence[Episode], drawn: int, folder: Path, workers: int, progress: Progress
 ) -> None:
-    """Record the episodes that the folder does not have."""
+    """Record the episodes that the folder does not have, in worker processes.
+
+    Args:
+        episodes: all of them.
+        drawn: of how many scenes of each task pictures are drawn.
+        folder: of the recordings.
+        workers: processes; 0 uses this one.
+        progress: called after each recording.
+    """
     missing = [episode for episode in episodes if not _path(folder, episode).exists()]
     done = len(episodes) - len(missing)
     for _ in parallel_map(partial(_record, folder, drawn), missing, workers):
@@ -188,7 +215,10 @@ def _path(folder: Path, episode: Episode) -> Path:
 
 
 def _record(folder: Path, drawn: int, episode: Episode) -> None:
-    """Record an episode; pictures of some looks are drawn in the first `drawn` ones of a task."""
+    """Record the expert in an episode, and write the recording; runs in worker processes.
+
+    In the first `drawn` episodes of a task every `PICTURE_EVERY`-th look also has a picture.
+    """
     pictures = range(0)
     if episode.index < drawn:
         # Not the same looks in every scene.
@@ -199,7 +229,7 @@ def _record(folder: Path, drawn: int, episode: Episode) -> None:
 def _trained_detector(
     plan: BodyPlan, recorded: Sequence[Recorded], sight: Sight, folder: Path, progress: Progress
 ) -> ThingDetector:
-    """Return the folder's detector if it is of the same plan, or train it."""
+    """Return a trained detector; a finished or interrupted training of the folder goes on."""
     course = ThingDetectorCourse(plan, recorded, sight)
     kept = KeptTraining(folder / "detector.pt", course.made_of)
     Training(course).run(partial(progress, "detector"), kept)
@@ -225,15 +255,16 @@ class ThingDetectorCourse(Course[LabeledPicture]):
 
     @property
     def made_of(self) -> list[Any]:
-        """All that the detector depends on, apart from the seed."""
+        """What must be equal for a kept training to go on: all but the seed."""
         return [list(self._sight.classes), list(self._plan.tasks), self._count, self.epochs]
 
     def batches(self, epoch: int) -> Iterator[list[LabeledPicture]]:
+        """Yield all pictures in random batches, moved and mirrored anew in each pass."""
         self._decode()
         variation = np.random.default_rng((self._plan.seed, epoch))
         rng = random.Random(f"{self._plan.seed}/{epoch}")
         for batch in batches(self._views, rng, DETECTOR_BATCH):
-            yield [varied(view, variation) for view in batch]
+            yield [augmented(view, variation) for view in batch]
 
     def loss(self, batch: Sequence[LabeledPicture]) -> torch.Tensor:
         return detector_loss(self.net, batch)
@@ -246,7 +277,7 @@ class ThingDetectorCourse(Course[LabeledPicture]):
 
 
 def labeled_pictures(recorded: ExpertRecording, sight: Sight) -> Iterator[LabeledPicture]:
-    """Yield the pictures of an episode with what the simulator says is in them."""
+    """Yield the pictures of an episode, each with the things that the simulator shows in it."""
     kinds = sight.kinds(recorded.classes)
     for look, png in recorded.pictures.items():
         is_shown = recorded.visible[look] & (kinds >= 0)

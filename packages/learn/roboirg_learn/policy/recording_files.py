@@ -22,7 +22,10 @@ _PICTURE = "picture_"
 
 
 def save_recording(recorded: ExpertRecording, path: Path) -> None:
-    """Write a recording, whole or not at all."""
+    """Write a recording as a NumPy archive (.npz), whole or not at all.
+
+    Each picture is an array of its own with the bytes of a PNG file: ``picture_16`` is of look 16.
+    """
     fields = recorded._asdict()
     pictures = fields.pop("pictures")
     arrays = {name: np.asarray(value) for name, value in fields.items()}
@@ -49,7 +52,10 @@ def load_recording(path: Path) -> ExpertRecording:
 
 
 def _recording_of(arrays: dict[str, NDArray[Any]]) -> ExpertRecording:
-    """Return the recording of a file's arrays."""
+    """Return a recording, given the arrays of its file by name.
+
+    Pictures are PNG files as bytes, by the number of their look: ``picture_16`` is of look 16.
+    """
     fields: dict[str, Any] = {"pictures": {}}
     for name, array in arrays.items():
         if name.startswith(_PICTURE):

@@ -19,19 +19,19 @@ COLUMNS = 256
 NEAR_TOOL = 0.07
 """Meters in the plane from the tool within which the hand may hide a thing."""
 HIDDEN_LOOKS = 5
-"""Looks for which a thing that is lost stays lost, and what is not there is found."""
+"""Looks in a block: a thing that is lost, or a ghost, stays so for a whole block."""
 GHOST = -1
-"""Number of the object where none is."""
+"""In the place of an object's number for a ghost: a thing that is found but is not there."""
 PLACE_NOISE = 0.7
 """Standard deviation of the places that a detector finds, pixels."""
 TURN_NOISE = 0.2
 """Standard deviation of the angles that it finds, rad."""
-LOST = 0.02
+LOST_RATE = 0.02
 """Mean probability that a thing is not found; some things are lost more often."""
-LOST_NEAR_TOOL = 0.15
+LOST_RATE_NEAR_TOOL = 0.15
 """The same near the tool."""
 GHOST_RATE = 0.04
-"""Probability that something is found that is not there, where something else is."""
+"""Probability that a block of looks has a ghost."""
 
 
 class Sight(NamedTuple):
@@ -46,14 +46,19 @@ class Sight(NamedTuple):
     heights: NDArray[np.float64]
 
     def kinds(self, names: Sequence[str]) -> NDArray[np.int64]:
-        """Return the numbers of classes; -1 for one that is not known."""
+        """Return the number of each class name, (n,); -1 for one that is not known."""
         numbers = {name: number for number, name in enumerate(self.classes)}
         return np.array([numbers.get(name, -1) for name in names], np.int64)
 
     def places(
         self, classes: NDArray[np.int64], points: NDArray[np.floating]
     ) -> NDArray[np.float32]:
-        """Return x and y (n, 2), m, of points (n, 2), column and row, of things on the table."""
+        """Return where things in a front picture stand on the table: x and y, m, (n, 2).
+
+        Args:
+            classes: (n,) numbers of their classes, which give their heights.
+            points: (n, 2) column and row in the picture, pixels.
+        """
         return places_of(points, self.heights[classes])
 
 
@@ -66,7 +71,11 @@ def turns_of(angles: NDArray[np.floating]) -> NDArray[np.float32]:
 
 
 def sight_of(recorded: Iterable[ExpertRecording]) -> Sight:
-    """Return the classes of things that episodes show, each with its height when first seen."""
+    """Return the classes of things that episodes show, each with its height on the table.
+
+    The height is the median, over episodes, of that at the first look that shows a thing: later it
+    may be lifted.
+    """
     heights: dict[str, list[float]] = {}
     for recording in recorded:
         for number, name in enumerate(recording.classes):
@@ -92,7 +101,13 @@ class LabeledLook(NamedTuple):
     def with_ghost(
         self, kind: int, place: NDArray[np.float32], turn: NDArray[np.float32]
     ) -> LabeledLook:
-        """Return the same with a thing that is not there."""
+        """Return the look with a thing added that is not there.
+
+        Args:
+            kind: number of its class.
+            place: (2,) x and y, m.
+            turn: (2,) as `turns_of` returns it.
+        """
         tokens = LookTokens(
             np.append(self.tokens.classes, kind),
             np.vstack([self.tokens.places, place]),
@@ -104,12 +119,13 @@ class LabeledLook(NamedTuple):
 def labeled_looks(
     recorded: ExpertRecording, sight: Sight, rng: np.random.Generator
 ) -> Iterator[LabeledLook]:
-    """Yield what a detector might find at each look.
+    """Yield what an imperfect detector might find at each look of a recording.
 
     A detector loses things, mistakes their places and angles a little, and now and then finds a
-    ghost: a thing of any class at the place of another.
+    ghost: a thing of any class at the place of another. The body learns from this, so that it
+    bears such mistakes.
     """
-    things = _noisy_things(recorded, sight, rng)
+    things = _draw_noisy_things(recorded, sight, rng)
     looks, objects = things.is_found.shape
     ghosts = _draw_ghosts(looks, objects, len(sight.classes), rng)
     for look in range(looks):
@@ -159,13 +175,16 @@ class _NoisyThings(NamedTuple):
         return LabeledLook(tokens, objects)
 
 
-def _noisy_things(
+def _draw_noisy_things(
     recorded: ExpertRecording, sight: Sight, rng: np.random.Generator
 ) -> _NoisyThings:
-    """Draw what a detector would find of the objects of an episode."""
-    kinds = sight.kinds(recorded.classes)
+    """Draw what a detector would find: at which looks each object, and where, with errors.
+
+    It finds what is visible, of a learned class, on the table, and not lost by chance.
+    """
+    kinds = sight.kinds(recorded.classes)  # -1 for a class that is not learned
     positions = recorded.things[..., :3].astype(np.float64)
-    is_found = _is_not_lost(recorded, positions, rng)
+    is_found = _draw_is_not_lost(recorded, positions, rng)
     points = points_of(positions)
     is_found &= recorded.visible & (kinds >= 0) & _is_on_table(points)
 
@@ -176,23 +195,33 @@ def _noisy_things(
     return _NoisyThings(kinds, is_found, places, turns)
 
 
-def _is_not_lost(
+def _draw_is_not_lost(
     recorded: ExpertRecording, positions: NDArray[np.float64], rng: np.random.Generator
 ) -> NDArray[np.bool_]:
-    """Draw whether a detector does not lose things that are visible (looks, objects)."""
+    """Draw at which looks a detector does not lose each object: True, (looks, objects).
+
+    Args:
+        recorded: with the tool's place at each look.
+        positions: (looks, objects, 3) of the objects, m.
+        rng: draws.
+    """
     from_tool = positions[..., :2] - recorded.tool[:, None, :2]
     distances = np.hypot(from_tool[..., 0], from_tool[..., 1])
-    probabilities = np.where(distances < NEAR_TOOL, LOST_NEAR_TOOL, LOST)
+    probabilities = np.where(distances < NEAR_TOOL, LOST_RATE_NEAR_TOOL, LOST_RATE)
     looks, objects = distances.shape
     # A detector has trouble with the same thing again and again.
     probabilities = probabilities * rng.exponential(1.0, objects)
-    # What hides a thing does so for a while.
+    # What hides a thing does so for a while: one draw for each block of looks.
     drawn = rng.random((_block_count(looks), objects)).repeat(HIDDEN_LOOKS, axis=0)
     return drawn[:looks] >= probabilities
 
 
 def _is_on_table(points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return whether points (..., 2), column and row, are in the part that shows the table."""
+    """Return whether points of a picture are in the part that shows the table.
+
+    Args:
+        points: (..., 2) column and row, pixels.
+    """
     low = np.array([0, ROWS[0]])
     high = np.array([COLUMNS, ROWS[1]])
     is_inside = (points >= low) & (points < high)
@@ -202,7 +231,13 @@ def _is_on_table(points: NDArray[np.float64]) -> NDArray[np.bool_]:
 def _places_of(
     points: NDArray[np.float64], kinds: NDArray[np.int64], sight: Sight
 ) -> NDArray[np.float32]:
-    """Return x and y, m, of the points of objects at all looks (looks, objects, 2)."""
+    """Return x and y on the table, m, of objects at all looks: (looks, objects, 2).
+
+    Args:
+        points: (looks, objects, 2) column and row in the picture, pixels.
+        kinds: (objects,) numbers of classes; the place of one with -1 means nothing.
+        sight: knows the heights.
+    """
     known_kinds = np.maximum(kinds, 0)  # the others are not found
     kind_of_each = np.broadcast_to(known_kinds, points.shape[:2]).ravel()
     return sight.places(kind_of_each, points.reshape(-1, 2)).reshape(points.shape)

@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 from roboirg.extension.policies import Demonstration, Observation
 from roboirg.extension.sight import LOOK_EVERY
 from roboirg_learn.policy.learned_policy import LearnedPolicy, tool_of
-from roboirg_learn.policy.moves import LEAVE
+from roboirg_learn.policy.moves import GRIPPER_UNCHANGED
 from roboirg_learn.policy.planner_history import (
     NO_LOOK,
     RECENT,
     PlannedNumbers,
     PlannerHistory,
-    asked_for,
     recent_looks,
+    requests_for_hands,
 )
-from roboirg_learn.policy.policy_plan import CHOOSES
-from roboirg_learn.policy.subgoals import asked_numbers
+from roboirg_learn.policy.policy_plan import KEYFRAME_PLANNER
+from roboirg_learn.policy.subgoals import encode_request
 
 if TYPE_CHECKING:
     from roboirg_learn.policy.policy_model import NetworkChoice, PolicyModel, SeenEpisode
@@ -37,14 +37,16 @@ class SubgoalNamer:
     def __init__(self, model: PolicyModel, seen: SeenEpisode) -> None:
         self._body = model.body
         self._seen = seen
-        chooses = self._body.plan["memory"] == CHOOSES
+        chooses = self._body.plan["memory"] == KEYFRAME_PLANNER
         self._history = PlannerHistory(len(self._body.forms), chooses=chooses)
         self._last_kind: int | None = None
         self._last_thing: int | None = None
         self._subgoal = ""
 
     def next(self, goal: NDArray[np.float32]) -> str:
-        """Return the subgoal; its point stays as long as the same thing is meant.
+        """Return the subgoal after the last look, in words with a point.
+
+        While kind and thing stay the same the words do, too: the point does not follow the thing.
 
         Args:
             goal: as `GoalLayout.numbers` returns it.
@@ -54,8 +56,9 @@ class SubgoalNamer:
         look = self._seen.looks - 1
         chosen = self._seen.choose(self._body.planner, goal, self._planned(look))
         self._history.name(chosen.kind, look)
-        recent = [recent_looks(look)[place] for place in chosen.keys]
-        self._history.choose(kept for kept in recent if kept >= 0)
+        # Chosen are places among the recent looks; before the first look there is none.
+        recent = [recent_looks(look)[place] for place in chosen.to_keep]
+        self._history.choose(number for number in recent if number >= 0)
 
         is_same = chosen.kind == self._last_kind and chosen.thing == self._last_thing
         if not is_same:
@@ -65,58 +68,66 @@ class SubgoalNamer:
         return self._subgoal
 
     def _planned(self, look: int) -> PlannedNumbers:
-        """Return what the planner is given at a look; which looks to keep it says itself."""
+        """Return the planner's input at a look: what it named, and the looks that it keeps.
+
+        `to_keep` is a label of training, so it is empty here.
+        """
         return PlannedNumbers(
             context=self._history.context(look)[None],
-            kept=self._history.kept(self._seen.video_looks, look)[None],
-            keys=np.full((1, RECENT), NO_LOOK),
+            kept_looks=self._history.kept(self._seen.video_looks, look)[None],
+            to_keep=np.full((1, RECENT), NO_LOOK),
         )
 
     def _words(self, chosen: NetworkChoice) -> str:
-        """Return a subgoal with the point where its thing was last seen."""
+        """Return a chosen subgoal in words, with the pixel at which its thing was last seen."""
         point = None if chosen.thing is None else self._seen.point(chosen.thing)
         return self._body.forms[chosen.kind].at(point)
 
 
 class LearnedHands(LearnedPolicy):
-    """Follows subgoals, those of any planner; without one, those of its own.
+    """Moves towards subgoals: those of any planner, or else those of its own planner.
 
     Attributes:
         subgoal: the one it follows.
     """
 
     subgoal: str | None = None
-    _asked: NDArray[np.float32] | None = None
+    _request: NDArray[np.float32] | None = None
     _namer: SubgoalNamer | None = None
 
     def reset(self, instruction: str, demonstration: Demonstration) -> None:
         super().reset(instruction, demonstration)
         self.subgoal = None
-        self._asked = None
+        self._request = None
         self._namer = SubgoalNamer(self.model, self.seen)
 
     def follow(self, subgoal: str) -> None:
-        """Set the subgoal; words of no known form change nothing."""
+        """Follow a subgoal of another planner from now on; unknown words change nothing."""
         self._namer = None
         self._take(subgoal)
 
     def act(self, observation: Observation) -> NDArray[np.float64]:
-        """Return the next waypoint (1, 7); without a subgoal the tool stays where it is."""
+        """Return the next waypoint towards the subgoal, as an array of one row (1, 7).
+
+        As long as no other planner has set a subgoal, its own planner names one. Without any
+        subgoal the tool stays where it is.
+        """
         seen = self.watch(observation)
         if self._namer is not None:
             self._take(self._namer.next(self.understand()))
-        if self._asked is None:
-            return np.append(observation["end_effector"], LEAVE)[None]
-        nothing = np.zeros(self.model.body.goals.size, np.float32)
-        chosen = seen.decide(nothing, tool_of(observation), asked_for([self._asked]))
+        if self._request is None:
+            return np.append(observation["end_effector"], GRIPPER_UNCHANGED)[None]
+        # Hands are trained without goal: the subgoal is all that they are given.
+        no_goal = np.zeros(self.model.body.goals.size, np.float32)
+        chosen = seen.decide(no_goal, tool_of(observation), requests_for_hands([self._request]))
         return chosen[None]
 
     def _take(self, subgoal: str) -> None:
-        """Set the subgoal if its words have a known form."""
-        found = asked_numbers(subgoal, self.model.body.sight)
+        """Set the subgoal if its words have a known form; else keep the one before."""
+        found = encode_request(subgoal, self.model.body.sight)
         if found is not None:
             self.subgoal = subgoal
-            self._asked = found
+            self._request = found
 
 
 class LearnedPlanner:

@@ -1,4 +1,4 @@
-"""Subgoals as numbers: what a body is asked for, from words with a point.
+"""Subgoals as numbers: what hands are to do, from words with a point.
 
 A subgoal is what is to be done next, as in "pick up the red cube at <110, 84>", with row and column
 of the place in the front picture. An episode has stages, and each has a subgoal.
@@ -17,7 +17,8 @@ from roboirg.extension.sight import ExpertRecording, points_of
 from roboirg_learn.policy.moves import LookDecision
 from roboirg_learn.policy.sight import COLUMNS, Sight
 
-AT = "{at}"
+POINT_SLOT = "{at}"
+"""In the words of a subgoal, where its point is to stand."""
 NO_THING = -1
 """In the place of an object's number where a subgoal points at none."""
 LAST_PIXEL = COLUMNS - 1
@@ -28,14 +29,15 @@ MOTIONS = (
     "press", "press_below", "hover", "hold", "hold_until", "retreat", "go_home",
 )  # fmt: skip
 COLORS = ("red", "green", "blue", "yellow", "gray", "purple")
-MARKS = (*MOTIONS, *THINGS, *COLORS, "left", "right")
-"""In the order in which trained files have them."""
+REQUEST_WORDS = (*MOTIONS, *THINGS, *COLORS, "left", "right")
+"""Words that a request may have, each a number that is 0 or 1, in the order of trained files."""
 POINT_NUMBERS = 3
 """Whether there is a point, and its x and y on the table, m."""
-ASKED_NUMBERS = len(MARKS) + POINT_NUMBERS
-SPREAD = 3.2
+REQUEST_SIZE = len(REQUEST_WORDS) + POINT_NUMBERS
+"""How many numbers a request to hands has."""
+POINT_NOISE = 3.2
 """Standard deviation of the noise of a point, pixels."""
-FARTHEST = 8.0
+MOST_POINT_NOISE = 8.0
 """Limit of that noise, pixels."""
 
 
@@ -47,20 +49,33 @@ class SubgoalForm(NamedTuple):
     @property
     def at_thing(self) -> bool:
         """Whether it has a point."""
-        return AT in self.words
+        return POINT_SLOT in self.words
 
     def at(self, point: NDArray[np.floating] | None) -> str:
-        """Return it with a point, column and row in the front picture; None leaves that out."""
+        """Return the subgoal's words with a point: "pick up the cube at <110, 84>".
+
+        Args:
+            point: column and row in the front picture, pixels, though the words have the row
+                first; None for words without a point.
+        """
         if point is None:
-            return self.words.replace(f" {AT}", "")
+            return self.words.replace(f" {POINT_SLOT}", "")
         column, row = np.clip(np.rint(point), 0, LAST_PIXEL).astype(int)
-        return self.words.replace(AT, f"at <{row}, {column}>")
+        return self.words.replace(POINT_SLOT, f"at <{row}, {column}>")
 
 
 def subgoals_due(
     recorded: ExpertRecording, episode: Episode, looks: Sequence[int]
 ) -> list[LookDecision]:
-    """Return the subgoal that is due at each of some looks."""
+    """Return the subgoal that is due at each of some looks, with the object that it points at.
+
+    An episode has stages, each with a subgoal; due is the stage after those that are completed.
+
+    Args:
+        recorded: knows at each look how many stages are completed.
+        episode: the episode.
+        looks: numbers of looks.
+    """
     found = []
     for look in looks:
         stage = episode.stages[_stage_after(int(recorded.done[look]), episode)]
@@ -84,29 +99,33 @@ def forms_of(episodes: Iterable[Episode]) -> tuple[SubgoalForm, ...]:
     return tuple(SubgoalForm(words) for words in sorted(found))
 
 
-def asked_numbers(subgoal: str, sight: Sight) -> NDArray[np.float32] | None:
-    """Return verb, kind, color and side as marks, and the point (`ASKED_NUMBERS`).
+def encode_request(subgoal: str, sight: Sight) -> NDArray[np.float32] | None:
+    """Return a subgoal in words as numbers for hands (REQUEST_SIZE,); None for unknown words.
 
-    None if the words are no subgoal that is known.
+    1 for each of `REQUEST_WORDS` that it has (verb, thing, color, side), else 0; then whether it
+    has a point, and the point's x and y on the table, m.
     """
     request = read_subgoal(subgoal)
     if request is None:
         return None
-    found = np.zeros(ASKED_NUMBERS, np.float32)
+    found = np.zeros(REQUEST_SIZE, np.float32)
     for name in (request.kind, request.thing, request.color, request.side):
         if name is not None:
-            found[MARKS.index(name)] = 1.0
-    meant = _class_meant(request.thing, request.color, sight)
-    if request.point is not None and meant is not None:
+            found[REQUEST_WORDS.index(name)] = 1.0
+    class_number = _class_number(request.thing, request.color, sight)
+    if request.point is not None and class_number is not None:
         row, column = request.point
-        # The point is at the height of what is meant.
-        places = sight.places(np.array([meant]), np.array([[column, row]], float))
+        # A pixel is a place on the table only at a known height: that of what is meant.
+        places = sight.places(np.array([class_number]), np.array([[column, row]], float))
         found[-POINT_NUMBERS:] = 1.0, *places[0]
     return found
 
 
-def _class_meant(thing: str | None, color: str | None, sight: Sight) -> int | None:
-    """Return the class of a thing and a color, else the first of the thing; None if unknown."""
+def _class_number(thing: str | None, color: str | None, sight: Sight) -> int | None:
+    """Return the number of the class of a thing with a color: "cube" and "red" → "cube red".
+
+    If there is none, as for a thing without color, the first class of the thing; else None.
+    """
     same_thing = None
     for number, name in enumerate(sight.classes):
         if name == f"{thing} {color}":
@@ -122,13 +141,15 @@ def recorded_subgoals(
     done: Sequence[int],
     rng: np.random.Generator | None,
 ) -> list[str]:
-    """Return the subgoal after each number of completed stages, with a point from its beginning.
+    """Return the subgoals, in words with points, that a planner would have named in an episode.
+
+    A subgoal points where its object was when its stage began, in all looks of the stage.
 
     Args:
-        recorded: what was to be seen.
+        recorded: places of objects at each look.
         episode: the episode.
-        done: numbers of completed stages.
-        rng: moves the points; None leaves them where they are.
+        done: for each subgoal that is wanted, how many stages are completed then.
+        rng: moves the points a little, as a planner would err; None leaves them where they are.
     """
     texts: dict[int, str] = {}
     numbers = [_stage_after(count, episode) for count in done]
@@ -144,7 +165,7 @@ def recorded_subgoals(
 
 
 def _point_at_begin(recorded: ExpertRecording, stage: int, name: str) -> NDArray[np.float64]:
-    """Return column and row of an object when a stage, given by its number, began."""
+    """Return column and row, pixels, of an object by name at the first look of a stage, from 0."""
     has_begun = ~recorded.is_video & (recorded.done >= stage)
     first_look = int(np.flatnonzero(has_begun)[0])
     position = recorded.things[first_look, recorded.names.index(name), :3]
@@ -152,9 +173,12 @@ def _point_at_begin(recorded: ExpertRecording, stage: int, name: str) -> NDArray
 
 
 def _noise(rng: np.random.Generator) -> NDArray[np.float64]:
-    """Draw by how much a point is moved, column and row; never by more than `FARTHEST`."""
+    """Draw by how many pixels a point is moved, column and row; each at most `MOST_POINT_NOISE`."""
     from scipy.stats import truncnorm  # takes a second, and looks for PyTorch
 
-    most = FARTHEST / SPREAD
-    drawn: NDArray[np.float64] = truncnorm.rvs(-most, most, scale=SPREAD, size=2, random_state=rng)
+    # The distribution takes its limits in standard deviations.
+    most = MOST_POINT_NOISE / POINT_NOISE
+    drawn: NDArray[np.float64] = truncnorm.rvs(
+        -most, most, scale=POINT_NOISE, size=2, random_state=rng
+    )
     return drawn

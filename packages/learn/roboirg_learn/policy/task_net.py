@@ -12,7 +12,7 @@ from roboirg_learn.listener.vocabulary import Vocabulary, split_words
 
 WIDTH = 32
 OBJECT_WEIGHT = 0.3
-"""What each object of a class adds to the number of the class."""
+"""What each object of a class adds to the input for that class."""
 
 
 class TaskNet(nn.Module):
@@ -32,7 +32,11 @@ class TaskNet(nn.Module):
         )
 
     def forward(self, texts: Sequence[str], seen: Sequence[ObjectsInView]) -> Tensor:
-        """Return logits (n, tasks); two looks mean that there is a video."""
+        """Return logits (n, tasks) for n instructions, each with what is seen in its scene.
+
+        The input of an instruction has 1 for each known word that it uses, how many objects of each
+        class the first picture shows, and whether there is a video, which has two pictures.
+        """
         rows = torch.zeros(len(texts), len(self._words) + self._classes + 1)
         for row, text, objects in zip(rows, texts, seen, strict=True):
             for word in split_words(text):

@@ -30,7 +30,7 @@ MOST_THINGS = 24
 LEAST_SCORE = 0.6
 MOST_SHIFT = 20
 """Pixels by which a picture is moved while a detector learns."""
-RARE = -4.0
+INITIAL_LOGIT = -4.0
 """Logit of a class in a cell before anything is learned."""
 PRESENT_WEIGHT = 30.0
 """Of a cell with a thing in the loss: most have none."""
@@ -68,10 +68,11 @@ class ThingDetector(nn.Module):
             *block(second, third),
             *block(third, fourth, dilation=2),
         )
+        # In each cell a score of each class; and column, row, cosine and sine of a thing.
         self.scores = nn.Conv2d(fourth, classes, 1)
         self.details = nn.Conv2d(fourth, 4, 1)
         bias: Any = self.scores.bias
-        nn.init.constant_(bias, RARE)
+        nn.init.constant_(bias, INITIAL_LOGIT)
 
     def forward(self, pictures: Tensor) -> tuple[Tensor, Tensor]:
         """Return logits (n, classes, *GRID), and offsets in cells and angles (n, 4, *GRID).
@@ -85,7 +86,11 @@ class ThingDetector(nn.Module):
 
     @torch.no_grad()
     def find(self, pictures: Sequence[NDArray[np.uint8]]) -> list[LabeledPicture]:
-        """Return the things of each picture: cells that are surer than all near them."""
+        """Return the things found in each picture: uint8 (256, 256, 3).
+
+        A thing is where a class's score in a cell is at least that of all eight neighbors, and
+        more than `LEAST_SCORE`.
+        """
         logits, details = self(torch.from_numpy(np.stack(pictures)))
         scores = logits.sigmoid()
         peaks = functional.max_pool2d(scores, 3, stride=1, padding=1)
@@ -106,23 +111,34 @@ class _Cells(NamedTuple):
 
 
 def _surest_cells(is_thing: Tensor, scores: Tensor) -> _Cells:
-    """Return the cells with things, (classes, *GRID), the surest first and not too many."""
+    """Return the cells that have a thing, the surest first, at most `MOST_THINGS`.
+
+    Args:
+        is_thing: (classes, *GRID) whether a thing of the class is in the cell.
+        scores: of the same shape.
+    """
     kinds, rows, columns = torch.nonzero(is_thing, as_tuple=True)
     surest = scores[kinds, rows, columns].argsort(descending=True)[:MOST_THINGS]
     return _Cells(kinds[surest], rows[surest], columns[surest])
 
 
 def _labels_at(cells: _Cells, details: Tensor, picture: NDArray[np.uint8]) -> LabeledPicture:
-    """Return what is in a picture, given the cells, and place and angle in each cell of it."""
-    shift = details[:, cells.rows, cells.columns].numpy().T
+    """Return the things in some cells of a picture.
+
+    Args:
+        cells: n of them, with classes.
+        details: (4, *GRID) column and row in the cell, in cells, and two numbers of the angle.
+        picture: that the cells are of.
+    """
+    cell_details = details[:, cells.rows, cells.columns].numpy().T  # (n, 4)
     corners = np.stack([cells.columns, cells.rows], 1)
-    points = (corners + shift[:, :2]) * CELL + TABLE_CORNER
-    turns = shift[:, 2:].astype(np.float32)
+    points = (corners + cell_details[:, :2]) * CELL + TABLE_CORNER
+    turns = cell_details[:, 2:].astype(np.float32)
     return LabeledPicture(picture, cells.kinds.numpy(), points, turns)
 
 
-def varied(view: LabeledPicture, rng: np.random.Generator) -> LabeledPicture:
-    """Return a picture moved by some pixels, and mirrored half the time, with its labels.
+def augmented(view: LabeledPicture, rng: np.random.Generator) -> LabeledPicture:
+    """Return a picture moved at random by some pixels, and mirrored half the time, with its labels.
 
     A few scenes show each thing in a few places only, and a detector learns those by heart.
     """
@@ -133,7 +149,7 @@ def varied(view: LabeledPicture, rng: np.random.Generator) -> LabeledPicture:
 
 
 def _moved(view: LabeledPicture, down: int, right: int) -> LabeledPicture:
-    """Return a picture moved by pixels; its border fills what comes in."""
+    """Return a picture moved down and right, in pixels; repeated border pixels fill the gap."""
     height, width = view.picture.shape[:2]
     rows = np.clip(np.arange(height) - down, 0, height - 1)
     columns = np.clip(np.arange(width) - right, 0, width - 1)
@@ -142,7 +158,7 @@ def _moved(view: LabeledPicture, down: int, right: int) -> LabeledPicture:
 
 
 def _mirrored(view: LabeledPicture) -> LabeledPicture:
-    """Return a picture with left and right exchanged."""
+    """Return a picture with left and right exchanged; the sines of its angles change sign."""
     width = view.picture.shape[1]
     points = np.array([width, 0.0]) + view.points * np.array([-1.0, 1.0])
     turns = view.turns * np.array([1.0, -1.0], np.float32)
@@ -150,23 +166,34 @@ def _mirrored(view: LabeledPicture) -> LabeledPicture:
 
 
 def detector_loss(net: ThingDetector, views: Sequence[LabeledPicture]) -> Tensor:
-    """Return the loss of a batch: where each class is, and place and angle there."""
+    """Return the loss of a batch: class scores in all cells, place and angle in cells with a thing.
+
+    Cells with a thing are rare, so they weigh `PRESENT_WEIGHT` times as much.
+    """
     logits, details = net(torch.from_numpy(np.stack([view.picture for view in views])))
     is_there = torch.zeros_like(logits)
     wanted = torch.zeros_like(details)
     for number, view in enumerate(views):
         _label_cells(view, is_there[number], wanted[number])
     weights = torch.where(is_there > 0, PRESENT_WEIGHT, 1.0)
-    scored = functional.binary_cross_entropy_with_logits(logits, is_there, weights, reduction="sum")
+    score_loss = functional.binary_cross_entropy_with_logits(
+        logits, is_there, weights, reduction="sum"
+    )
 
     has_thing = is_there.amax(1, keepdim=True)
     distances = functional.l1_loss(details, wanted, reduction="none")
-    refined = (distances * has_thing).sum()
-    return (scored / PRESENT_WEIGHT + refined) / is_there.sum().clamp(min=1.0)
+    detail_loss = (distances * has_thing).sum()
+    return (score_loss / PRESENT_WEIGHT + detail_loss) / is_there.sum().clamp(min=1.0)
 
 
 def _label_cells(view: LabeledPicture, is_there: Tensor, wanted: Tensor) -> None:
-    """Write what is in a picture into its grids: 1 at each class, and place and angle in cells."""
+    """Write the labels of one picture into its grids, in place.
+
+    Args:
+        view: the labeled picture.
+        is_there: (classes, *GRID) becomes 1 where a thing of the class is.
+        wanted: (4, *GRID) becomes the thing's column and row in its cell, in cells, and its turn.
+    """
     cells = (view.points - TABLE_CORNER) / CELL
     for kind, (x, y), turn in zip(view.classes, cells, view.turns, strict=True):
         if 0 <= y < GRID[0] and 0 <= x < GRID[1]:

@@ -23,7 +23,7 @@ from roboirg_learn.policy.moves import Move
 from roboirg_learn.policy.planner_history import context_size
 from roboirg_learn.policy.policy_plan import HANDS, PLANNERS
 from roboirg_learn.policy.sight import Sight
-from roboirg_learn.policy.subgoals import ASKED_NUMBERS, SubgoalForm
+from roboirg_learn.policy.subgoals import REQUEST_SIZE, SubgoalForm
 from roboirg_learn.policy.thing_detector import ThingDetector
 from roboirg_learn.policy.tracks import LookTokens
 from roboirg_learn.trained_file import TrainedFile, load_trained, save_trained
@@ -51,7 +51,12 @@ class GoalLayout:
         return len(self.tasks) + len(self.parts)
 
     def numbers(self, task: str, answer: str) -> NDArray[np.float32]:
-        """Return 1 for the task and for each part of an answer, else 0: (size,)."""
+        """Return a goal as network input (size,): 1 for its task and each of its parts, else 0.
+
+        Args:
+            task: name of the task.
+            answer: the goal's values as canonical JSON, such as ``{"color": "red"}``.
+        """
         found = np.zeros(self.size, np.float32)
         found[self.tasks.index(task)] = 1.0
         for part in parts_of(answer):
@@ -96,7 +101,7 @@ class TrainedBody:
         return nn.ModuleDict({"detector": self.detector, "body": self.net, "planner": self.planner})
 
     def see(self, pictures: Pictures) -> list[LookTokens]:
-        """Return what its detector finds in pictures of the front camera."""
+        """Return for each front picture the things found in it, with places on the table, m."""
         found = []
         for things in self.detector.find(pictures):
             places = self.sight.places(things.classes, things.points)
@@ -105,10 +110,17 @@ class TrainedBody:
 
 
 def make_body(sight: Sight, goals: GoalLayout, moves: Sequence[Kind], memory: str) -> BodyNet:
-    """Return an untrained net for these classes, goals and kinds, or an untrained planner."""
-    context = 0
+    """Return an untrained body or planner.
+
+    Args:
+        sight: classes of things.
+        goals: how many numbers a goal has.
+        moves: what it chooses among: kinds of waypoints, or for a planner forms of subgoals.
+        memory: a name of `MEMORIES`.
+    """
+    context = 0  # numbers about subgoals that it is given at each decision
     if memory == HANDS:
-        context = ASKED_NUMBERS
+        context = REQUEST_SIZE
     elif memory in PLANNERS:
         context = context_size(len(moves))
     at_things = [move.at_thing for move in moves]
@@ -142,6 +154,7 @@ def load_body(path: Path) -> TrainedBody:
 
 
 def _read(file: TrainedFile) -> TrainedBody:
+    """Return the body of a file: networks made by its description, then given its weights."""
     about = file.about
     plan = about["plan"]
     sight = Sight(tuple(about["classes"]), file.tensors["heights"].numpy())

@@ -14,7 +14,7 @@ from torch import nn
 
 from roboirg.extension.episodes import goal_schema
 from roboirg_learn.listener.listener_net import ListenerNet
-from roboirg_learn.listener.object_relations import ObjectsInView, rank
+from roboirg_learn.listener.object_relations import ObjectsInView, rank_objects
 from roboirg_learn.listener.reader_plan import WORDLESS
 from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary
 from roboirg_learn.policy.task_net import TaskNet
@@ -51,11 +51,13 @@ class TrainedReader:
     def understand(
         self, text: str, looks: Sequence[LookTokens], goals: GoalLayout
     ) -> NDArray[np.float32]:
-        """Return the goal that an instruction means.
+        """Return the goal that an instruction means, as `GoalLayout.numbers`: (size,).
+
+        First the task is named, then the best of that task's goals.
 
         Args:
             text: everything that was said.
-            looks: the first one, and a later one of the video if there is one.
+            looks: things found at the first look, and at a later one of the video if there is one.
             goals: which numbers stand for which goals.
         """
         heard = "" if self.plan["words"] == WORDLESS else text
@@ -71,9 +73,15 @@ class TrainedReader:
 def seen_things(
     looks: Sequence[LookTokens], corners: NDArray[np.float64], classes: Sequence[str]
 ) -> ObjectsInView:
-    """Return what is seen at one or two looks, for the reader."""
+    """Return the things of one or two looks with their ranks, as the reader of words needs them.
+
+    Args:
+        looks: what the detector found.
+        corners: (4, 2) of the area where things stand, m.
+        classes: names of classes.
+    """
     places = np.concatenate([look.places for look in looks]).astype(np.float64)
-    return rank([look.classes for look in looks], places, corners, classes)
+    return rank_objects([look.classes for look in looks], places, corners, classes)
 
 
 def save_reader(reader: TrainedReader, path: Path) -> None:
@@ -97,6 +105,7 @@ def load_reader(path: Path) -> TrainedReader:
 
 
 def _read(file: TrainedFile) -> TrainedReader:
+    """Return the reader of a file: networks made by its description, then given its weights."""
     plan = file.about["plan"]
     vocabulary = Vocabulary.of(file.about["vocabulary"])
     reader = TrainedReader(

@@ -15,15 +15,15 @@ from torch.nn import functional
 
 from roboirg.extension.commands import InvalidValueError, parallel_map
 from roboirg.extension.episodes import Episode, episodes_of
-from roboirg_learn.labeled_views import look
+from roboirg_learn.labeled_views import views_at_start
 from roboirg_learn.listener.encoders import ENCODERS
 from roboirg_learn.listener.object_relations import ObjectsInView, corners_of
 from roboirg_learn.listener.reader_plan import ReaderPlan
 from roboirg_learn.listener.reader_training import (
     Lesson,
     check_reader,
+    instructions_of,
     lesson_of,
-    said,
     train_reader,
 )
 from roboirg_learn.listener.vocabulary import ListenerInput, Vocabulary, words_of
@@ -69,14 +69,14 @@ def check_words(plan: ReaderPlan) -> None:
             raise InvalidValueError(f"Encoder {name!r} reads pixels; a policy's reader has none.")
 
 
-def teach_reader(
+def train_policy_reader(
     body: TrainedBody, plan: ReaderPlan, folder: Path, name: str, workers: int, progress: Progress
 ) -> TrainedReader:
-    """Return a reader that has learned what instructions mean in scenes that a body sees.
+    """Train a reader of words for a body: it names task and goal of an instruction in a scene.
 
     Args:
         body: of a file; its detector sees the scenes.
-        plan: how.
+        plan: its tasks, settings, passes and seed.
         folder: for what is learned on the way, from which an interrupted training goes on.
         name: of the reader, among those of the folder.
         workers: processes that draw; 0 uses this one.
@@ -84,7 +84,7 @@ def teach_reader(
     """
     train = episodes_of(plan.tasks, "train")
     episodes = (*train, *episodes_of(plan.tasks, "random", plan.scenes))
-    scenes = _see(body, episodes, workers, progress)
+    scenes = _view_scenes(body, episodes, workers, progress)
     lessons = _lessons(plan, episodes, scenes)
     vocabulary = _vocabulary(lessons, body)
     about = {**plan.about, "body": body.version}
@@ -99,16 +99,19 @@ def teach_reader(
 
 
 def _vocabulary(lessons: Sequence[Lesson], body: TrainedBody) -> Vocabulary:
-    """Return the words of lessons with the classes, tasks and parts of goals of a body."""
+    """Return the words of lessons, with classes, tasks and parts of goals as the body has them."""
     words = words_of(lesson.given.text for lesson in lessons)
     return Vocabulary(words, body.sight.classes, body.goals.tasks, body.goals.parts)
 
 
 def _lessons(plan: ReaderPlan, episodes: Sequence[Episode], scenes: SeenScenes) -> list[Lesson]:
-    """Return the instructions of episodes; without settings nothing is said."""
+    """Return what a reader learns: an instruction, what is seen at first, and the goal meant.
+
+    A plan without settings makes a reader without words: one empty instruction for each episode.
+    """
     instructions = [(episode, "") for episode in episodes]
     if plan.settings:
-        instructions = list(said(episodes, plan))
+        instructions = list(instructions_of(episodes, plan))
     lessons = []
     for episode, text in instructions:
         given = ListenerInput(episode.task, text, scenes.seen[episode.key])
@@ -116,13 +119,16 @@ def _lessons(plan: ReaderPlan, episodes: Sequence[Episode], scenes: SeenScenes) 
     return lessons
 
 
-def _see(
+def _view_scenes(
     body: TrainedBody, episodes: Sequence[Episode], workers: int, progress: Progress
 ) -> SeenScenes:
-    """Return what a body sees at first in episodes; no expert plays them."""
+    """Draw the first pictures of episodes, and return what the body's detector finds in them.
+
+    No expert plays the episodes.
+    """
     looks = {}
     positions = []
-    for episode, views in parallel_map(look, episodes, workers):
+    for episode, views in parallel_map(views_at_start, episodes, workers):
         looks[episode.key] = body.see([view.picture for view in views])
         positions.append(views[0].positions)
         progress("scenes", len(looks), len(episodes))
@@ -149,16 +155,18 @@ class TaskCourse(Course[Lesson]):
         self.steps = batch_count(lessons)
 
     def batches(self, epoch: int) -> Iterator[list[Lesson]]:
+        """Yield the lessons in random batches; the seed also decides which words are left out."""
         self._rng.seed(f"{self._seed}/{epoch}")
         return batches(self._lessons, self._rng)
 
     def loss(self, batch: Sequence[Lesson]) -> torch.Tensor:
-        texts = [_thinned(lesson.given.text, self._rng) for lesson in batch]
+        """Return the mean cross-entropy of the tasks, named from texts that lack some words."""
+        texts = [_without_some_words(lesson.given.text, self._rng) for lesson in batch]
         right = [self._tasks.index(lesson.given.task) for lesson in batch]
         scores = self.net(texts, [lesson.given.seen for lesson in batch])
         return functional.cross_entropy(scores, torch.tensor(right))
 
 
-def _thinned(text: str, rng: random.Random) -> str:
-    """Return a text without some of its words."""
+def _without_some_words(text: str, rng: random.Random) -> str:
+    """Return a text without a random tenth of its words (`FORGOTTEN_WORDS`)."""
     return " ".join(word for word in text.split() if rng.random() >= FORGOTTEN_WORDS)
