@@ -110,7 +110,7 @@ class Results:
 
         Runs of a policy under several conditions or in several versions have labels of their own.
         """
-        data = self._data.told
+        data = self._data.without_control_arms
         rates = {}
         for key, summary in data.summaries.items():
             if key.scope == ALL_TASKS and summary.rate is not None:

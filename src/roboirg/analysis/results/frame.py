@@ -247,7 +247,7 @@ class Frame(Mapping[str, Any]):
         """Return the frame with further columns."""
         return Frame({**self.columns, **columns})
 
-    def told(self) -> Frame:
+    def without_control_arms(self) -> Frame:
         """Return the frame without control arms, if there is anything else."""
         is_told = self["arm"] == TOLD
         has_both = is_told.any() and not is_told.all()

@@ -82,7 +82,7 @@ _NAME = 30
 
 
 def latex(table: Table) -> str:
-    """Return table environments with rules between groups of columns and of rows.
+    """Return a table as LaTeX: several floats, each of a page at most, if it is wide or long.
 
     The averages of suites, which the paper does not have, are left out.
     """
@@ -124,9 +124,12 @@ class _Part(NamedTuple):
 
 
 def _blocks(table: Table) -> Iterator[list[Row]]:
-    """Yield the rows of each table; a group is divided only if it is longer than a table."""
+    """Yield the rows of a table in blocks that fit on a page.
+
+    Rows of a group stay together unless the group alone is longer than a page.
+    """
     longest_name = max([len(row.name) for row in table.rows], default=0)
-    lines_of_row = 1 + longest_name // _NAME
+    lines_of_row = 1 + longest_name // _NAME  # names are folded at this many letters
     most = _LINES // lines_of_row  # rows in a table
     block: list[Row] = []
     for group in table.groups():
@@ -181,7 +184,11 @@ def _column_kinds(part: _Part) -> str:
 
 
 def _lines(part: _Part) -> Iterator[str]:
-    """Yield the lines of a table: headings, then each group below a rule and its name."""
+    """Yield the LaTeX lines of a table: headings, then each group below a rule and its name.
+
+    Args:
+        part: the table, and which of its columns are shown.
+    """
     table = part.table
     columns = part.columns
     heads = list(map(escaped, table.heads[1:]))  # groups stand in lines of their own
