@@ -106,9 +106,10 @@ class Results:
         return results(self.folder)
 
     def rates(self) -> dict[tuple[str, str], float]:
-        """Return the mean success over tasks, 0 to 1, by policy and setting (with options).
+        """Return the mean success over tasks, 0 to 1: ``{("pi0", "relational"): 0.42}``.
 
-        Runs of a policy under several conditions or in several versions have labels of their own.
+        The setting is followed by options that are not the default. If a policy was played under
+        several conditions or in several versions, each has a label of its own.
         """
         data = self._data.without_control_arms
         rates = {}

@@ -48,7 +48,11 @@ class Notice(NamedTuple):
 
 
 def run_warnings(episodes: PageEpisodes) -> list[Notice]:
-    """Return what is incomplete, failed, mixed, or cannot be compared."""
+    """Return the sentences at the head of the page: warnings, and then notes.
+
+    Warnings are about missing episodes, errors, mixed versions and cut prompts; notes about missing
+    references, private splits and the headline number.
+    """
     warnings = list(_incomplete(episodes))
     warnings += mixtures(episodes.records)
     warnings += heard_notes(episodes.data.frame, episodes.names)
@@ -92,9 +96,10 @@ def _minute(time: str) -> str:
 
 
 def comparisons(episodes: PageEpisodes) -> list[JsonObject]:
-    """Return the comparison of the first pairs of policies in words, if both had the same arm.
+    """Return comparisons of two policies in sentences, with the policies' numbers left and right.
 
-    ``left`` and ``right`` are the numbers of the two policies.
+    There are at most `MAX_COMPARISONS`. A policy with its own words is not compared with a control
+    arm, which has others.
     """
     found: list[JsonObject] = []
     for (left, first), (right, second) in combinations(enumerate(episodes.names), 2):
@@ -116,7 +121,7 @@ def _compared(episodes: PageEpisodes, first: PolicyRun, second: PolicyRun) -> li
 
 
 def _incomplete(episodes: PageEpisodes) -> Iterable[str]:
-    """Yield how many planned episodes were not played, and how many ended in an error."""
+    """Yield sentences on planned episodes that were not played, and on those with an error."""
     missing = list(episodes.data.frame["outcome"]).count(MISSING)
     total = len(episodes.all)
     if missing:
@@ -138,7 +143,7 @@ def _incomplete(episodes: PageEpisodes) -> Iterable[str]:
 
 
 def _without_reference(episodes: PageEpisodes) -> Iterable[str]:
-    """Yield what the results cannot be compared with: chance, or explicit."""
+    """Yield sentences on missing references: a policy that guesses, and explicit instructions."""
     if len(episodes.names) == 1:
         yield (
             "Only one policy: without the forgetful listener’s results next to it, a rate does not "
@@ -149,7 +154,7 @@ def _without_reference(episodes: PageEpisodes) -> Iterable[str]:
 
 
 def _private(episodes: PageEpisodes) -> Iterable[str]:
-    """Yield which splits are private, if their secret is not known here."""
+    """Yield a sentence for each private split of episodes whose secret salt is not known here."""
     for split in sorted({episode.record.split for episode in episodes.all}):
         try:
             check_salt(split)
