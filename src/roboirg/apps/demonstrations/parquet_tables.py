@@ -87,7 +87,14 @@ def write_frames(
 def _storage(
     features: Mapping[str, Mapping[str, Any]], *, repeats_pictures: bool
 ) -> dict[str, Any]:
-    """Return how columns are stored: PNGs are compressed already, and have no statistics."""
+    """Return pyarrow's options on how to store columns: compression, dictionaries, statistics.
+
+    Pictures are compressed already, as PNG. If they are repeated, a dictionary stores each once.
+
+    Args:
+        features: type and shape of each column.
+        repeats_pictures: whether several rows have the same picture.
+    """
     pictures = [name for name, feature in features.items() if feature["dtype"] == "image"]
     dictionaries = [name for name, feature in features.items() if feature["dtype"] == "string"]
     compression = dict.fromkeys(features, "snappy")
@@ -104,7 +111,11 @@ def _storage(
 
 
 def _hugging_face_type(feature: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a column's type as Hugging Face's `datasets` stores it in a file."""
+    """Return a column's type as Hugging Face's `datasets` stores it in a file.
+
+    A vector of eight numbers is ``{"feature": {"dtype": "float32", "_type": "Value"}, "length": 8,
+    "_type": "Sequence"}``.
+    """
     if feature["dtype"] == "image":
         return {"_type": "Image"}
     value = {"dtype": feature["dtype"], "_type": "Value"}
