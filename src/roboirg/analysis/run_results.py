@@ -144,7 +144,11 @@ class Results:
         return get_format(format).draw(table_with_notes)
 
     def plot(self, which: str = "gaps", *, published: bool = False) -> Plot:
-        """Return one of the figures: gaps, context or failures.
+        """Draw one of the figures: gaps, context or failures.
+
+        Args:
+            which: name of the figure.
+            published: whether to add the paper's values, in gray.
 
         Raises:
             UnknownNameError: there is no such figure.

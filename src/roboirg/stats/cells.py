@@ -66,7 +66,11 @@ class Cell:
     missing: int = 0
 
     def add(self, trial: Trial, outcome: str) -> None:
-        """Count a trial: ``success``, ``failure``, ``error``, or ``missing``.
+        """Count a trial by its outcome; success and failure are verdicts, of which rates are made.
+
+        Args:
+            trial: the episode and the policy seed.
+            outcome: ``success``, ``failure``, ``error``, or ``missing`` if it was not played.
 
         Raises:
             InvalidValueError: the outcome is none of these.

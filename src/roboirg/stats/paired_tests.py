@@ -95,10 +95,11 @@ class Pairs:
 
     @property
     def differences(self) -> NDArray[np.int64]:
-        """First less second in each episode, in whole numbers.
+        """By how much the first cell is better in each episode, as whole numbers, (episodes,).
 
-        In trials if both cells have equally many in every episode, else in success rates times
-        both numbers of trials.
+        They are in successes if both cells have equally many trials in every episode. Else they are
+        differences of success rates, times both numbers of trials to make them whole: one of two
+        against two of three gives 1 · 3 - 2 · 2 = -1.
         """
         first, first_trials, second, second_trials = self.rows.T
         if np.array_equal(first_trials, second_trials):
@@ -262,7 +263,7 @@ def _retention_interval(drawn: Draws, sizes: Sequence[int], rates: PairedRates) 
 
 
 def holm(p_values: Sequence[float]) -> tuple[float, ...]:
-    """Return p-values after Holm's correction, in the given order.
+    """Correct p-values for testing several hypotheses at once, by Holm's method; keep their order.
 
     For example 0.01 and 0.04 become 0.02 and 0.04: the smallest is multiplied by the number of
     tests, the next one by one less, and none is smaller than one before it.

@@ -62,7 +62,10 @@ def points(gap: float, decimals: int = 0) -> str:
 
 
 def interval_note(interval: Interval | None) -> str:
-    """Return the ends of a gap's interval in brackets, after a blank, or why it has none."""
+    """Return a gap's interval as it follows the gap: `` (95 % interval −8.1 to +2.0)``.
+
+    Its ends are in points. None is an interval of too few episodes.
+    """
     if interval is None:
         return f" ({TOO_FEW})"
     low = points(interval.low, 1)

@@ -204,7 +204,7 @@ class _Columns:
 
 
 def _signed_notes(differences: AllDifferences, names: RunNames) -> list[str]:
-    """Return what makes rates comparable or not, each sentence after its sign."""
+    """Return sentences on which rates can be compared with published ones: after ``=`` or ``≠``."""
     notes = []
     for note in comparison_notes(differences, names):
         has_sign = note.startswith((COMPARABLE_SIGN, DIFFERENT_SIGN))
@@ -229,7 +229,10 @@ def _compared_tasks(which: RateTable, cells: Cells) -> Tasks:
 
 
 def _played(which: RateTable, cells: Cells) -> Played:
-    """Return the cells with a verdict that the figure may show, by options, run and task."""
+    """Select the cells that the figure may show; return them by options, policy run and task.
+
+    A cell, the trials of a task, must have a verdict, and the table must have rows for its options.
+    """
     found: dict[InstructionOptions, dict[PolicyRun, dict[str, Cell]]] = {}
     for (policy_run, task, options), cell in cells.items():
         if cell.verdicts and PAPER_TABLES[which].shows(options):

@@ -160,9 +160,10 @@ class _Rows(NamedTuple):
         return ROW_LINE_INCHES * sum(self.units)
 
     def draw(self, axes: Axes) -> list[float]:
-        """Label the rows of a panel; return the vertical positions of their centers, in units.
+        """Label the rows of a panel at its left; return the vertical positions of their centers.
 
-        Two rows, of labels with one line and with two, are at 1 and 3.5 units below the top.
+        Positions are in units of the axis, from the top down: of two rows, of 2 and 3 units, at 1
+        and 3.5.
         """
         places = []
         top = 0

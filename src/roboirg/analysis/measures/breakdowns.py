@@ -120,7 +120,7 @@ def break_down(frame: Frame, breakdown: Breakdown) -> tuple[Measured[LabelKey], 
 
 
 def natural(text: str) -> list[tuple[bool, int, str]]:
-    """Return what a text is sorted by, so that ``frame 2`` is before ``frame 10``.
+    """Return a key that sorts texts by the numbers in them: ``frame 2`` before ``frame 10``.
 
     Of each part of it: whether it is no number, the number, and the words. For ``frame 2`` these
     are ``[(True, 0, "frame "), (False, 2, "")]``.

@@ -121,7 +121,10 @@ class _Result:
 
     @property
     def sentence(self) -> str:
-        """What was compared, who is better, and by how much."""
+        """Which of the two policies is better, and by how much, or that it is not clear.
+
+        For example ``PickXtimes, relational: pi0 is better, +8.0 points (95 % interval …), …``.
+        """
         key = self.result.key
         subject = options_label(key.options)
         if key.task is not None:

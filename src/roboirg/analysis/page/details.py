@@ -419,7 +419,10 @@ def _prompt(record: Record) -> str | None:
 
 
 def _conditions(record: Record) -> str:
-    """Return under which conditions an episode was played, and in which versions."""
+    """Return the conditions and versions of an episode as a phrase.
+
+    For example ``test split, at most 1300 steps, in own words; policy 2, language 5, …``.
+    """
     environment = record.environment
     parts = [
         f"{record.split} split",

@@ -60,7 +60,12 @@ class PageEpisodes:
 
     @classmethod
     def of(cls, runs: SourceByName, *, videos: bool) -> PageEpisodes:
-        """Gather and sort the episodes, with or without their videos."""
+        """Gather the episodes of the page's runs, sorted by policy, task and number.
+
+        Args:
+            runs: by name, one or two.
+            videos: whether to look for the episodes' videos.
+        """
         frames = []
         for name, source in _named(runs):
             frames.append(make_frame([(name, source.results)], source.planned, run_name=name))

@@ -143,7 +143,7 @@ def _cell(summary: ScopeSummary, subject: str) -> JsonObject:
 
 
 def notes(summary: ScopeSummary, subject: str) -> list[str]:
-    """Return a cell in words, a line for each fact: first its subject, then its results.
+    """Return the sentences that explain a cell of a heat map: success, gaps, incomplete trials.
 
     For example ``pi0, PickXtimes, ordinal``, ``62 % success: 31 of 50 trials, 50 episodes``, …
     """

@@ -68,7 +68,9 @@ def write_report(
     served: bool = False,
     progress: Progress | None = None,
 ) -> Path:
-    """Write the page of a run atomically and return its path.
+    """Write the report of a run as an HTML page and return its path.
+
+    The file appears whole or not at all.
 
     Args:
         source: the run.
@@ -121,7 +123,11 @@ def _by_name(sources: Sequence[Source]) -> dict[str, Source]:
 
 
 def _usual_path(source: Source) -> Path:
-    """Return where the page goes: into the run's folder, or next to its pack."""
+    """Return the file of a page whose place was not chosen.
+
+    It is ``report.html`` in the run's folder, ``report-POLICY.html`` if the page is of one policy,
+    or next to the file of a packed run.
+    """
     if source.unpacked:
         return source.path.with_name(f"{source.path.name.removesuffix(PACK_SUFFIX)}.html")
     name = "-".join(("report", *(source.policies or ())))

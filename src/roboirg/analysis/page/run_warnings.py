@@ -72,7 +72,10 @@ class LabeledFact(NamedTuple):
 
 
 def facts_of(episodes: PageEpisodes) -> list[LabeledFact]:
-    """Return the facts in the head of the page; those that no record has are left out."""
+    """Return the facts of the run at the head of the page, such as its versions.
+
+    A fact has the distinct values of all records; those that no record has are left out.
+    """
     records = episodes.records
     times = [record.started_at for record in records]
     facts = [
@@ -166,9 +169,12 @@ def _private(episodes: PageEpisodes) -> Iterable[str]:
 
 
 def _period(first: str, last: str) -> str:
-    """Return a period such as ``2026-01-02 03:04 to 03:09 UTC``; names the day once if equal."""
+    """Return the period between two times: ``2026-01-02 03:04 to 03:09 UTC``.
+
+    The day stands once if both are on the same one. Times are texts such as ``2026-01-02 03:04``.
+    """
     if first == last:
         return f"{first} UTC"
-    day, _, minute = last.partition(" ")
+    day, _, clock_time = last.partition(" ")
     is_same_day = first.startswith(day)
-    return f"{first} to {minute if is_same_day else last} UTC"
+    return f"{first} to {clock_time if is_same_day else last} UTC"

@@ -293,7 +293,7 @@ def as_column(values: Sequence[object]) -> Values:
 
 
 def join(frames: Iterable[Frame]) -> Frame:
-    """Return the rows of one frame after the other."""
+    """Join tables of results: the rows of one frame after those of the other, column by column."""
     parts = list(frames)
     columns = {}
     for name in parts[0].columns:

@@ -41,7 +41,7 @@ class EvalConditions(NamedTuple):
         return cls._make(_read_conditions(job))
 
     def text(self, name: str) -> str:
-        """Return the value of one of `CONDITIONS` in words."""
+        """Return the value of a condition as it is printed, such as ``900`` of ``max_steps``."""
         if name == "wordings":
             return words_label(self.wordings)
         if name in ENVIRONMENT_OPTIONS:

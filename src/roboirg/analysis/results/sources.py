@@ -60,7 +60,7 @@ class Source:
 
     @cached_property
     def results(self) -> tuple[Summary, ...]:
-        """The newest result of each episode, in the order of the file.
+        """The newest result of each episode, in the order of the file; only of wanted policies.
 
         Raises:
             StoreError: there are none, or a line is not a record of this schema version.

@@ -131,7 +131,11 @@ def _last_played(records: Iterable[Record], results: Iterable[Summary]) -> Itera
 
 
 def _of_calls(calls: Counter[str]) -> Facts:
-    """Yield how many steps a policy's calls are for."""
+    """Yield facts on how often a policy was called, and how many actions of a call were executed.
+
+    Args:
+        calls: numbers of control ``steps`` and ``calls``, and the most actions ``executed``.
+    """
     steps_per_call = None
     if calls["calls"]:
         steps_per_call = f"{calls['steps'] / calls['calls']:.1f}"
@@ -234,7 +238,7 @@ def _metadata(record: Record) -> dict[str, Any]:
 
 
 def _words(value: object) -> list[str]:
-    """Return the value of a fact in words, nothing if it is unknown.
+    """Return the value of a fact as texts to print; none if it is unknown.
 
     For example ``["yes"]`` for True, ``["front, wrist"]`` for a list of two cameras, and
     ``["numpy 2.1", "torch 2.6"]`` for a mapping.

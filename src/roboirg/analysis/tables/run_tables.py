@@ -129,7 +129,10 @@ def _explicit_differences(cells: Cells, policy_run: PolicyRun) -> AllDifferences
 
 
 def print_failures(frame: Frame, console: Console) -> None:
-    """Print the first episodes without success of each policy run, and how many more there are."""
+    """Print up to `MAX_FAILURES` episodes without success of each policy run, and how many more.
+
+    A policy run is a policy under one set of conditions and versions.
+    """
     for run, label in frame.names.items():
         failures = [result for result in frame.where(run=run).played if result.outcome != "success"]
         failures.sort(key=_scene_order)
@@ -190,11 +193,12 @@ def _make_run_table(
 ) -> Table:
     """Return the table of a policy run, with a row for each task and a column for each setting.
 
-    An entry is the success rate and, in brackets, the gap to explicit.
+    An entry is the success rate and, in brackets, the gap to explicit, the setting that names the
+    goal: ``62 (−12)``.
 
     Args:
         label: of the policy run, the title.
-        results: of the policy run.
+        results: by scope, a task or all tasks, and by instruction options.
         differences: from the conditions of the published rates.
         notes: below the table.
     """
@@ -220,9 +224,13 @@ def _has_several_tasks(results: _RunResults) -> bool:
 
 
 def _entry(result: _ScopeResult | None, differences: AllDifferences) -> Entry:
-    """Return an entry such as ``62 (−12)``, the success rate and the gap to explicit in brackets.
+    """Return an entry such as ``62 (−12)``: success in percent, in brackets the gap to explicit.
 
     It is a dash where nothing was played or planned, or no episode has a verdict.
+
+    Args:
+        result: of a policy run in a task, or all tasks, with some instruction options.
+        differences: for the cells that have a published rate, how their conditions differ.
     """
     if result is None:
         return Entry(applies=False)

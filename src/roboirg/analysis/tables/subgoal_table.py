@@ -90,7 +90,10 @@ def make_subgoal_table(data: RunData) -> Table:
 
 
 def _columns(failures: Iterable[str], costs: Iterable[str]) -> list[Column]:
-    """Return the columns: subgoals by verdict, then the failures and the costs that occur."""
+    """Return the columns of the table of planners: subgoals by verdict, failures, and costs.
+
+    Only failures and costs that occur are given, and have columns.
+    """
     columns = [Column("subgoals")]
     for verdict in SUBGOAL_VERDICTS:
         columns.append(Column(verdict.replace("_", " ")))

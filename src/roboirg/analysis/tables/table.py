@@ -57,7 +57,10 @@ class Entry:
 
     @property
     def text(self) -> str:
-        """The rate, a dash if the setting does not apply, or the word; empty without results."""
+        """What is printed: the word if there is one, else the rate in percent, else nothing.
+
+        It is a dash if the task does not have the setting.
+        """
         if self.word:
             return self.word
         if not self.applies:
@@ -168,7 +171,7 @@ class Table:
         return (*self.heads, *(column.name for column in self.columns))
 
     def lines(self) -> Iterator[PrintedRow]:
-        """Yield the rows as they are printed, group by group."""
+        """Yield the rows with their labels, group by group; the first row alone names the group."""
         for group in self.groups():
             for row in group:
                 begins_group = row is group[0]

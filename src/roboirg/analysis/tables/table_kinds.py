@@ -130,7 +130,7 @@ class PaperTable:
         return (*columns, overall)
 
     def shown(self, cells: Cells) -> Cells:
-        """Return the cells of the table's tasks with options that it shows."""
+        """Select the cells that the table shows: of its tasks, and of options with a row."""
         tasks = self.tasks(cells)
         shown = {}
         for key, cell in cells.items():

@@ -143,7 +143,7 @@ def _sign_notes(table: PaperTable, entries: Sequence[Entry]) -> Iterator[str]:
 
 
 def _sizes(judged: Sequence[Counts]) -> str:
-    """Return how many episodes and trials cells have.
+    """Return a sentence on how many episodes and trials the cells (a task in a setting) have.
 
     For example ``10 to 50 episodes per cell, each played once.``
     """

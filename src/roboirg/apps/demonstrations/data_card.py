@@ -35,9 +35,10 @@ def card_text(
     Args:
         plan: what is exported.
         parts: of the dataset.
-        facts: of all trajectories, those that are left out, too.
+        facts: on all trajectories, those that are left out, too.
         root: folder of the dataset.
     """
+    # The head, between two lines of dashes, is YAML.
     lines = ["---", "license: apache-2.0", "task_categories: [robotics]"]
     lines.append("tags: [LeRobot, RoboIRGBench]")
     if plan.file_format.has_frame_tables:

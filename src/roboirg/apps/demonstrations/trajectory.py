@@ -145,7 +145,7 @@ class Trajectory:
 
 
 def load_trajectory(path: Path) -> Trajectory:
-    """Read a trajectory without its pictures.
+    """Read a trajectory from its file: facts, states and actions, but no pictures.
 
     Raises:
         InvalidValueError: the file is missing or damaged, or of another version.
@@ -244,7 +244,7 @@ def read_depth(archive: zipfile.ZipFile, camera: str, row: int) -> NDArray[np.in
 
 
 def drop_pictures(path: Path) -> None:
-    """Replace a trajectory's file by one without pictures; does nothing if it has none."""
+    """Remove the pictures from a trajectory's file, to save space; keep its facts and arrays."""
     if not has_pictures(path):
         return
     with (

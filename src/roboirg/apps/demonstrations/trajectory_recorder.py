@@ -180,6 +180,7 @@ def record_trajectory(
                 recorder = _Recorder(env, policy, spec, archive)
                 facts = recorder.record(policy_name, variation)
             if only_successes and facts.status != "success":
+                # Begins the file anew with the facts alone.
                 with zipfile.ZipFile(part, "w") as archive:
                     write_arrays(archive, facts, {})
     finally:
@@ -329,7 +330,7 @@ class _Recorder(EpisodeLoop):
         return action.astype(np.float32).astype(np.float64)
 
     def _add_row(self, row: _Row) -> None:
-        """Keep a row without its pictures, which go into the file at once."""
+        """Add what one step gave: its pictures to the file at once, the rest to the rows kept."""
         self._tracks.add(row.observation)
         pictures = ("_rgb", "_depth")
         names = [name for name in row.observation if not name.endswith(pictures)]

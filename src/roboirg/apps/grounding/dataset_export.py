@@ -120,7 +120,7 @@ def _by_split(items: Sequence[GroundingItem]) -> dict[str, list[GroundingItem]]:
 
 
 def _pictures(items: Sequence[GroundingItem]) -> set[str]:
-    """Return the paths of all pictures, those of videos too."""
+    """Return the paths of all pictures of the items: first pictures, and frames of videos."""
     found: set[str] = set()
     for item in items:
         found.add(item.picture)

@@ -50,7 +50,7 @@ EPISODE = "episode"
 def roboirg_grounding(
     data: str = "grounding", question: str = "slots", settings: str = "all", tasks: str = "all"
 ) -> Task:
-    """Ask one kind of question about every item of an exported dataset.
+    """Ask one kind of question about every item of an exported dataset: a task of Inspect.
 
     Args:
         data: folder that `roboirg export grounding` wrote.

@@ -52,7 +52,7 @@ def csv_text(*tables: Table) -> str:
 
 
 def json_text(*tables: Table) -> str:
-    """Return a JSON list with an object for each row: its table, and what is printed, by heading.
+    """Return tables as JSON: a list with an object for each row, its texts by their headings.
 
     For example ``[{"table": "main", "setting": "explicit", "policy": "pi0", "mean": "62.5"}]``.
     """

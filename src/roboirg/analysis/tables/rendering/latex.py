@@ -143,9 +143,12 @@ def _blocks(table: Table) -> Iterator[list[Row]]:
 
 
 def _float(part: _Part, place: int, count: int) -> str:
-    """Return one of `count` tables as an environment that LaTeX places, a float.
+    """Return the LaTeX of one float; a wide or long table is divided among several.
 
-    Only the last one has the notes.
+    Args:
+        part: the rows and columns of this one.
+        place: its number, from 1, for its caption and label.
+        count: number of floats of the table; only the last one has the notes.
     """
     table = part.table
     caption = escaped(table.title)
@@ -167,7 +170,7 @@ def _float(part: _Part, place: int, count: int) -> str:
 
 
 def _column_kinds(part: _Part) -> str:
-    """Return how the columns are aligned, as LaTeX writes it.
+    """Return LaTeX's specification of a table's columns: how each is aligned.
 
     For example ``lrr``: names to the left, two columns of numbers to the right.
     """
@@ -208,7 +211,7 @@ def _lines(part: _Part) -> Iterator[str]:
 
 
 def _column_groups(columns: Sequence[Column], names: int) -> list[str]:
-    """Return the line with the groups of columns, and that of the rules below it.
+    """Return the two LaTeX lines above the headings: names of groups of columns, and rules below.
 
     A group's name is centered over its columns; no rule is below columns without a group.
 
@@ -232,7 +235,7 @@ def _column_groups(columns: Sequence[Column], names: int) -> list[str]:
 
 
 def _head(name: str) -> str:
-    """Return a heading with a line for each of its words; ``PickXtimes`` has Pick and Xtimes."""
+    """Return the LaTeX of a heading with its words stacked: Pick above Xtimes of ``PickXtimes``."""
     words = list(map(escaped, _HUMPS.split(name)))
     if len(words) == 1:
         return words[0]
@@ -246,7 +249,10 @@ def _line(cells: list[str]) -> str:
 
 
 def _cell(entry: Entry, column: Column) -> str:
-    """Return an entry: bold if it is the best, with a small colored arrow, and with its signs."""
+    """Return the LaTeX of an entry: its text, bold if the best, then its change, then its signs.
+
+    The change from the reference is a small colored arrow with a number, as ``↑1.33`` has.
+    """
     text = _foldable(entry.text) if column.is_text else escaped(entry.text)
     if entry.best:
         text = rf"\textbf{{{text}}}"

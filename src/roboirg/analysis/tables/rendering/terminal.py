@@ -103,7 +103,7 @@ def split_columns(table: Table, shown: Sequence[int], room: int) -> list[list[in
 
 
 def _column_widths(table: Table) -> list[int]:
-    """Return the characters of each column, with its line and blanks."""
+    """Return the width of each column in characters, with its line and blanks."""
     widths = [len(column.name) for column in table.columns]
     for row in table.rows:
         for number, entry in enumerate(row.entries):
@@ -158,7 +158,10 @@ def _grid(table: Table, numbers: Sequence[int]) -> Grid:
 
 
 def _cell(entry: Entry) -> Text:
-    """Return an entry: bold if it is the best, then its change, then its signs in yellow."""
+    """Return an entry as the terminal prints it: the rate, bold if the best, change, and signs.
+
+    The change is from a reference, such as explicit; signs, in yellow, mark incomplete rates.
+    """
     parts = []
     if entry.text:
         parts.append(Text(entry.text, "bold" if entry.best else entry.style))

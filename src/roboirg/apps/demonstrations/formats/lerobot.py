@@ -168,6 +168,8 @@ class StatsCollector:
 
     def __init__(self, columns: FrameColumns) -> None:
         self._columns = columns
+        # By column: the numbers of each episode, (frames, size), and of pictures (3, 256) how often
+        # each value of a color channel occurs.
         self._numbers: defaultdict[str, list[NDArray[Any]]] = defaultdict(list)
         self._counts: dict[str, NDArray[np.int64]] = {}
         # Instructions of a trajectory follow one another and share what is slow to compute.

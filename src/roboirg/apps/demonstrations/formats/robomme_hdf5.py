@@ -125,7 +125,7 @@ def write_part(part: DatasetPart) -> None:
 
 
 def _folders(part: DatasetPart) -> list[str]:
-    """Return the folder of each setting and form of the instructions."""
+    """Return the folders of a part: one for each setting and form of its instructions."""
     folders: dict[str, None] = {}
     for episode in part.episodes:
         for placed in episode.texts:
@@ -266,7 +266,11 @@ def training_text(_plan: ExportPlan, root: Path) -> str:
 
 
 def read(path: Path) -> Iterator[ReplayableTrajectory]:
-    """Yield the trajectories of RoboMME's files in a folder, or of one such file."""
+    """Read the trajectories of RoboMME's HDF5 files, to replay them.
+
+    Args:
+        path: a folder of files, each of one task, or one such file; anything else has none.
+    """
     for file_path in _hdf5_files(path):
         check_hdf5_support()
         import h5py

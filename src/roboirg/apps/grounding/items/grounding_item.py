@@ -173,7 +173,10 @@ def decode_lines(content: bytes, kind: type[T], origin: Path) -> Iterator[tuple[
 
 
 def read_items(folder: Path) -> list[GroundingItem]:
-    """Return all items of an exported dataset.
+    """Read the items of an exported dataset of grounding questions.
+
+    Args:
+        folder: of the dataset.
 
     Raises:
         InvalidValueError: the folder has no items, or a line is no item.

@@ -139,7 +139,7 @@ def _episode_fields(episode: Episode) -> dict[str, Any]:
 
 
 def _option_fields(options: InstructionOptions) -> dict[str, Any]:
-    """Return the options of an item; those that it does not have are left out."""
+    """Return the fields of an item on the options of its instruction: setting, form, and so on."""
     known = GroundingItem.__struct_fields__
     fields = {name: value for name, value in asdict(options).items() if name in known}
     fields["stages"] = list(options.stages)

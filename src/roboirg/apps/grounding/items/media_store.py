@@ -119,7 +119,17 @@ def _points(env: RoboIRGEnv, episode: Episode) -> tuple[PointTarget, ...]:
 
 
 def store_content(folder: Path, kind: str, content: bytes, suffix: str) -> str:
-    """Store a file under a name that follows from its content; return its path in the dataset."""
+    """Store a file under a hash of its content, so that equal files are stored once.
+
+    Args:
+        folder: of the dataset.
+        kind: folder in it, such as ``pictures``.
+        content: of the file.
+        suffix: of its name, such as ``.png``.
+
+    Returns:
+        The path in the dataset: ``pictures/3f9c….png``.
+    """
     name = hashlib.sha256(content).hexdigest()[:NAME_DIGITS]
     path = folder / kind / f"{name}{suffix}"
     if not path.exists():

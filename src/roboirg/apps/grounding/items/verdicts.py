@@ -75,7 +75,10 @@ def guess_chance(item: GroundingItem, kind: QuestionKind) -> float:
 
 
 def right_reply(item: GroundingItem, kind: QuestionKind) -> str:
-    """Return a reply that is right: slots as JSON, a letter, or a pixel for each thing."""
+    """Return a right reply to a question: the goal's values as JSON, a letter, or pixels as JSON.
+
+    There is a pixel for each thing to point at.
+    """
     if kind == "slots":
         return item.answer
     if kind == "choice":
