@@ -37,9 +37,14 @@ _COMPARABLE = Versions(environment_version=ENVIRONMENT_VERSION)  # of others not
 
 
 def differences_of(key: CellKey, cell: Cell) -> Differences | None:
-    """Return what differs between a cell and the published rate of that cell.
+    """Return how the conditions of a cell (a task in a setting) differ from the published rate's.
 
-    The number of policy seeds makes no difference, nor does it matter what the policy is.
+    For example ``("split train", "900 steps instead of 1300")``; empty if the two rates can be
+    compared. The number of policy seeds makes no difference, nor does it matter what the policy is.
+
+    Args:
+        key: policy run, task and instruction options.
+        cell: its trials.
 
     Returns:
         None if nothing is published for the task, or if the cell has no rate.
@@ -56,7 +61,10 @@ def differences_of(key: CellKey, cell: Cell) -> Differences | None:
 
 
 def merged(differences: Iterable[Differences | None]) -> Differences | None:
-    """Return what differs in an average of cells; None if one of them cannot be compared."""
+    """Return how an average of cells differs from the published one: all that a cell differs in.
+
+    None if one of them has no published rate to compare with.
+    """
     merged_differences: list[str] = []
     for differences_of_cell in differences:
         if differences_of_cell is None:
@@ -73,7 +81,12 @@ def comparison_sign(differences: Differences | None) -> str:
 
 
 def comparison_notes(found: AllDifferences, names: RunNames) -> list[str]:
-    """Return sentences that explain the signs and say what differs, by policy and task."""
+    """Return sentences on which rates can be compared with published ones, and why others cannot.
+
+    Args:
+        found: for each cell, in what it differs from the published rate; empty if in nothing.
+        names: labels of the policy runs.
+    """
     notes = []
     if () in found.values():  # nothing differs
         notes.append(
@@ -91,10 +104,11 @@ def comparison_notes(found: AllDifferences, names: RunNames) -> list[str]:
 
 
 def _different_notes(found: AllDifferences, names: RunNames) -> Iterator[str]:
-    """Yield a sentence for each text of what differs, with the policies of which it is true.
+    """Yield sentences on why rates of explicit instructions cannot be compared with published ones.
 
-    For example ``≠ not comparable with the published rate (pi0, max steps 900): 900 steps instead
-    of 1300.`` Policies are named only if there are others.
+    Policies for which the reasons are the same share a sentence, such as ``≠ not comparable with
+    the published rate (pi0, max steps 900): 900 steps instead of 1300.`` They are named only if
+    there are others.
     """
     runs: dict[PolicyRun, dict[str, Differences]] = {}
     for key, differences in found.items():
@@ -114,9 +128,10 @@ def _different_notes(found: AllDifferences, names: RunNames) -> Iterator[str]:
 
 
 def _text(tasks: Mapping[str, Differences]) -> str:
-    """Return what differs, with the tasks in which it does unless these are all.
+    """Return the differences from published rates in one text, given those of each task.
 
-    For example ``split train; 1 error (PickXtimes, StopCube)``.
+    For example ``split train; 1 error (PickXtimes, StopCube)``; a difference of all tasks names
+    none.
     """
     tasks_by_difference: dict[str, list[str]] = {}
     for task, differences in tasks.items():
@@ -132,7 +147,10 @@ def _text(tasks: Mapping[str, Differences]) -> str:
 
 
 def _explicit_differences(policy_run: PolicyRun, cell: Cell) -> Iterator[str]:
-    """Yield what differs from the conditions under which the paper's policies were played."""
+    """Yield how a task was played differently than by the paper's policies, a phrase each.
+
+    For example ``split train``, ``12 of 50 episodes`` and ``2 errors``.
+    """
     conditions = policy_run.conditions
     environment = conditions.environment
     # Behind the @ stands a hash of the file's words. Only a file with exactly RoboMME's sentences

@@ -94,7 +94,10 @@ class PublishedRow(NamedTuple):
         return options_label(self.options)
 
     def average_over(self, tasks: Collection[str]) -> Decimal | None:
-        """Return the mean over some tasks; None without any, or if one of them has no rate."""
+        """Return the mean of a published model's rates over some tasks, in percent.
+
+        None without tasks, or if one of them has no rate.
+        """
         rates = []
         for task in tasks:
             rate = self.rates.get(task)
@@ -111,9 +114,10 @@ class PublishedRow(NamedTuple):
 
 @functools.cache
 def published_rows(table: str) -> tuple[PublishedRow, ...]:
-    """Return the rows of a table, in the order of the paper.
+    """Return the rows of one of the paper's tables, each with a model's rates by task.
 
-    A line of its file is one rate of a row: that of a task, or the average.
+    They are read from a file with a line for each rate, that of a task or the average, and stay in
+    the order of the paper. A rate is in percent; None where a task does not have the setting.
     """
     rates_by_row: dict[tuple[str, InstructionOptions], dict[str, Decimal | None]] = {}
     for line in published_lines(_FILES[table]):

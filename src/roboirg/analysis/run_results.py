@@ -106,11 +106,12 @@ class Results:
         return results(self.folder)
 
     def rates(self) -> dict[tuple[str, str], float]:
-        """Return the mean success over tasks, 0 to 1, by policy and setting (with options).
+        """Return the mean success over tasks, 0 to 1: ``{("pi0", "relational"): 0.42}``.
 
-        Runs of a policy under several conditions or in several versions have labels of their own.
+        The setting is followed by options that are not the default. If a policy was played under
+        several conditions or in several versions, each has a label of its own.
         """
-        data = self._data.told
+        data = self._data.without_control_arms
         rates = {}
         for key, summary in data.summaries.items():
             if key.scope == ALL_TASKS and summary.rate is not None:
@@ -143,7 +144,11 @@ class Results:
         return get_format(format).draw(table_with_notes)
 
     def plot(self, which: str = "gaps", *, published: bool = False) -> Plot:
-        """Return one of the figures: gaps, context or failures.
+        """Draw one of the figures: gaps, context or failures.
+
+        Args:
+            which: name of the figure.
+            published: whether to add the paper's values, in gray.
 
         Raises:
             UnknownNameError: there is no such figure.

@@ -158,7 +158,7 @@ def warn_of_mixtures(*frames: Frame) -> None:
 
     played: list[Summary] = []
     for frame in frames:
-        played += frame.told().played
+        played += frame.without_control_arms().played
     for sentence in mixtures(played):
         typer.echo(sentence, err=True)
 

@@ -66,7 +66,11 @@ class Cell:
     missing: int = 0
 
     def add(self, trial: Trial, outcome: str) -> None:
-        """Count a trial: ``success``, ``failure``, ``error``, or ``missing``.
+        """Count a trial by its outcome; success and failure are verdicts, of which rates are made.
+
+        Args:
+            trial: the episode and the policy seed.
+            outcome: ``success``, ``failure``, ``error``, or ``missing`` if it was not played.
 
         Raises:
             InvalidValueError: the outcome is none of these.
@@ -109,7 +113,10 @@ class Cell:
         return episodes
 
     def rows(self) -> Rows:
-        """Return successes and trials of each episode, sorted by it, shape (episodes, 2)."""
+        """Return successes and trials of each episode, sorted by its number, shape (episodes, 2).
+
+        An episode that succeeded with one of three policy seeds has the row ``(1, 3)``.
+        """
         rows = []
         for _, verdicts in sorted(self.by_episode().items()):
             row = (sum(verdicts.values()), len(verdicts))
@@ -128,10 +135,11 @@ NOTHING: ByTask = {}
 
 
 def gather(frame: Columns, by: Sequence[str]) -> Mapping[Key, ByTask]:
-    """Group the rows of a frame by some columns, in the order in which their values occur.
+    """Collect trials in cells, one for each task, by the values of some columns of a frame.
 
-    Grouped by policy and setting, ``{("oracle", "direct"): {"StopCube": Cell(…)}}``. The frame has
-    the columns of `TRIAL`, too.
+    By policy and setting, for example, ``{("oracle", "direct"): {"StopCube": Cell(…)}}``, in the
+    order in which the values occur. A row of the frame is a trial and has the columns of `TRIAL`
+    (task, episode, policy seed, outcome), too.
     """
     groups: dict[Key, dict[str, Cell]] = {}
     for row in rows_of(frame, *by, *TRIAL):
@@ -152,21 +160,25 @@ def rows_of(frame: Columns, *names: str) -> Iterator[Key]:
 def clustered_interval(
     tasks: Sequence[Cell], rng: np.random.Generator, draws: int = DRAWS
 ) -> Interval | None:
-    """Return the bootstrap interval, over episodes, of a success rate or its mean over tasks.
+    """Return the 95 % bootstrap interval of a success rate, the mean over tasks.
 
-    Used with several policy seeds and for averages over tasks. None with fewer than two episodes
-    per task on average, or if a task has none.
+    It resamples whole episodes, because the trials of an episode with several policy seeds are not
+    independent. None with fewer than two episodes per task on average, or if a task has none.
     """
     rows = [cell.rows() for cell in tasks]
-    sizes = [len(task_rows) for task_rows in rows]
-    if not sizes or 0 in sizes:
+    episodes_of_tasks = [len(task_rows) for task_rows in rows]
+    if not episodes_of_tasks or 0 in episodes_of_tasks:
         return None
-    rates = resampled_rates(rows, rng, draws)[:, 0]
-    return resampled_interval(rates, sizes)
+    rates = resampled_rates(rows, rng, draws)[:, 0]  # the only column, shape (draws, 1)
+    return resampled_interval(rates, episodes_of_tasks)
 
 
 def cell_interval(cell: Cell, rng: np.random.Generator) -> Interval | None:
-    """Return the interval of a cell's rate: Wilson's, or clustered with several policy seeds."""
+    """Return the 95 % interval of the success rate of one task; None without a verdict.
+
+    It is Wilson's, or with several policy seeds, whose trials depend on each other, the bootstrap
+    over episodes.
+    """
     counts = cell.counts
     if not counts.trials:
         return None

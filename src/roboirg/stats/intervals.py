@@ -49,7 +49,10 @@ class Interval(NamedTuple):
 
 
 def wilson_interval(successes: int, trials: int) -> Interval:
-    """Return Wilson's score interval of a proportion, of one trial or more, all independent."""
+    """Return Wilson's 95 % score interval of a success rate, 0 to 1, of independent trials.
+
+    There is at least one trial.
+    """
     rate = successes / trials
     weight = Z_95 * Z_95 / trials
     center = (rate + weight / 2) / (1 + weight)
@@ -62,31 +65,32 @@ def wilson_interval(successes: int, trials: int) -> Interval:
 
 
 def resampled_rates(tasks: Sequence[Rows], rng: np.random.Generator, draws: int = DRAWS) -> Draws:
-    """Return success rates over resampled episodes, as unweighted means over tasks.
+    """Return bootstrapped success rates: in each draw, episodes are drawn with replacement.
 
-    Draws equal rows together, as multinomial counts. The distribution is that of drawing single
-    episodes, but the time does not depend on their number, nor the result on their order.
+    Episodes with equal rows are drawn together, as multinomial counts. The distribution is that of
+    drawing single episodes, but the time does not depend on their number, nor the result on their
+    order.
 
     Args:
-        tasks: for each task its episodes, shape (episodes, 2 k): k pairs of successes and trials.
-            Each task is resampled by itself.
+        tasks: for each task its episodes, shape (episodes, 2 k): k pairs of successes and trials,
+            one pair for each rate. Each task is resampled by itself.
         rng: source of the resamples.
         draws: number of resamples.
 
     Returns:
-        Shape (draws, k); nan where a resample has no trial.
+        Unweighted means over the tasks, shape (draws, k); nan where a resample has no trial.
     """
     rates = []
     for rows in tasks:
-        # The distinct rows, and how many episodes have each.
+        # Shapes (kinds, 2 k) and (kinds,): the distinct rows, and how many episodes have each.
         kinds, counts = np.unique(rows, axis=0, return_counts=True)
-        drawn_counts = rng.multinomial(len(rows), counts / len(rows), size=draws)
+        drawn_counts = rng.multinomial(len(rows), counts / len(rows), size=draws)  # (draws, kinds)
         rates.append(rates_of(drawn_counts @ kinds))
     return np.asarray(np.mean(rates, axis=0), dtype=np.float64)
 
 
 def rates_of(counts: Rows) -> Draws:
-    """Return success rates, given k pairs of successes and trials in each row.
+    """Divide successes by trials in each of k pairs of columns: ``(1, 2, 3, 3)`` → ``(0.5, 1)``.
 
     Returns:
         Shape (rows, k); nan without a trial.
@@ -98,10 +102,11 @@ def rates_of(counts: Rows) -> Draws:
 
 
 def percentile_interval(values: Draws, sizes: Sequence[int]) -> Interval | None:
-    """Return the middle 95 % of resampled values; None with too few episodes.
+    """Return the middle 95 % of resampled values; None unless there are more episodes than tasks.
 
     Args:
-        values: one for each resample; nan counts as the extreme value on either side.
+        values: one for each resample, shape (draws,); nan counts as the smallest value for the
+            lower end, and as the largest one for the upper end.
         sizes: number of episodes of each task.
     """
     if sum(sizes) <= len(sizes):
@@ -116,10 +121,16 @@ def percentile_interval(values: Draws, sizes: Sequence[int]) -> Interval | None:
 
 
 def resampled_interval(values: Draws, sizes: Sequence[int], least: float = 0.0) -> Interval | None:
-    """Return `percentile_interval`, or `without_spread` if all resamples have the same value.
+    """Return the 95 % bootstrap interval of a rate or a gap; None with too few episodes.
 
-    None with too few episodes: also if so many resamples have no trial that an end is not bounded,
-    or if the others all have the same value.
+    If all resamples have the same value, the bootstrap shows no spread, and the interval is that of
+    `without_spread`. Episodes are also too few if so many resamples have no trial that an end is
+    not bounded, or if the others all have the same value.
+
+    Args:
+        values: one for each resample, shape (draws,); nan if it has no trial.
+        sizes: number of episodes of each task.
+        least: the smallest value that is possible: 0 for a rate, -1 for a gap.
     """
     interval = percentile_interval(values, sizes)
     if interval is None or not np.isfinite(interval).all():
@@ -132,10 +143,11 @@ def resampled_interval(values: Draws, sizes: Sequence[int], least: float = 0.0) 
 
 
 def without_spread(value: float, episodes: int, least: float = 0.0) -> Interval:
-    """Return the interval if all episodes have the same value, so that resampling has no spread.
+    """Return a 95 % interval if all observed episodes have the same value, -1 to 1.
 
-    A share of all episodes up to Wilson's upper end for 0 of n may have other values, from `least`
-    to 1. For rates of 0 and 1 this is Wilson's interval on episodes.
+    Among all possible episodes, some may have other values, from `least` to 1: at most the share
+    that is the upper end of Wilson's interval for 0 successes in as many episodes. For rates of 0
+    and 1 this is Wilson's interval on episodes.
     """
     other_share = wilson_interval(0, episodes).high
     same_part = (1 - other_share) * value
@@ -143,7 +155,10 @@ def without_spread(value: float, episodes: int, least: float = 0.0) -> Interval:
 
 
 def _lower_level(sizes: Sequence[int]) -> float:
-    """Return the quantile level of lower ends that keeps intervals from being too short.
+    """Return the quantile, somewhat below 0.025, at which the bootstrap's lower ends are taken.
+
+    Args:
+        sizes: number of episodes of each task.
 
     Resampled means have a variance too small by (n - 1) / n, and normal quantiles instead of
     Student's; quantiles further out correct both (the expanded percentile interval of Hesterberg,
@@ -152,6 +167,7 @@ def _lower_level(sizes: Sequence[int]) -> float:
     with extra_needed("Intervals of several seeds or tasks need SciPy", "report"):
         from scipy import special  # SciPy's statistics take a second to import
 
-    freedom = sum(sizes) - len(sizes)
-    widening = math.sqrt(sum(sizes) / freedom)
-    return float(special.ndtr(widening * special.stdtrit(freedom, ALPHA / 2)))
+    episodes = sum(sizes)
+    degrees_of_freedom = episodes - len(sizes)  # one less for the mean of each task
+    widening = math.sqrt(episodes / degrees_of_freedom)
+    return float(special.ndtr(widening * special.stdtrit(degrees_of_freedom, ALPHA / 2)))

@@ -68,23 +68,24 @@ class Pairs:
 
     @classmethod
     def of(cls, first: Cell, second: Cell) -> Pairs:
-        """Pair two cells of the same task.
+        """Pair the trials of two policies, or of one in two settings, by episode of the same task.
 
         An episode in which the first succeeded with one of two seeds, and the second with both,
-        has the row ``(1, 2, 2, 2)``.
+        has the row ``(1, 2, 2, 2)``: successes and trials of the first, then of the second.
         """
         first_episodes = first.by_episode()
         second_episodes = second.by_episode()
         rows = []
         for episode in sorted(first_episodes.keys() & second_episodes.keys()):
-            ours = first_episodes[episode]
-            theirs = second_episodes[episode]
-            shared_seeds = ours.keys() & theirs.keys()
+            first_by_seed = first_episodes[episode]
+            second_by_seed = second_episodes[episode]
+            shared_seeds = first_by_seed.keys() & second_by_seed.keys()
             if shared_seeds:
-                ours = {seed: ours[seed] for seed in shared_seeds}
-                theirs = {seed: theirs[seed] for seed in shared_seeds}
-            row = (sum(ours.values()), len(ours), sum(theirs.values()), len(theirs))
-            rows.append(row)
+                first_by_seed = {seed: first_by_seed[seed] for seed in shared_seeds}
+                second_by_seed = {seed: second_by_seed[seed] for seed in shared_seeds}
+            first_wins = sum(first_by_seed.values())
+            second_wins = sum(second_by_seed.values())
+            rows.append((first_wins, len(first_by_seed), second_wins, len(second_by_seed)))
         return cls(np.array(rows, dtype=np.int64).reshape(-1, 4), _overlap(first, second))
 
     @property
@@ -94,10 +95,11 @@ class Pairs:
 
     @property
     def differences(self) -> NDArray[np.int64]:
-        """First less second in each episode, in whole numbers.
+        """By how much the first cell is better in each episode, as whole numbers, (episodes,).
 
-        In trials if both cells have equally many in every episode, else in success rates times
-        both numbers of trials.
+        They are in successes if both cells have equally many trials in every episode. Else they are
+        differences of success rates, times both numbers of trials to make them whole: one of two
+        against two of three gives 1 · 3 - 2 · 2 = -1.
         """
         first, first_trials, second, second_trials = self.rows.T
         if np.array_equal(first_trials, second_trials):
@@ -106,7 +108,10 @@ class Pairs:
 
 
 def _overlap(first: Cell, second: Cell) -> Overlap:
-    """Return how the trials ended that two cells share."""
+    """Count in how many shared trials both cells succeeded, one alone, or neither.
+
+    A trial, an episode with a policy seed, is shared if both cells have a verdict on it.
+    """
     counts: Counter[tuple[bool, bool]] = Counter()
     for trial, first_won in first.verdicts.items():
         if trial in second.verdicts:
@@ -162,10 +167,13 @@ def paired_rates(tasks: Sequence[Pairs]) -> PairedRates | None:
 
 
 def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = DRAWS) -> Gap | None:
-    """Measure the gap over the tasks that have pairs; None if no task has any.
+    """Measure by how much two success rates on the same episodes differ, as means over tasks.
+
+    Returns the difference with its interval and p-value, and the ratio of the rates. None if no
+    task has episodes with verdicts on both sides.
 
     Args:
-        tasks: the pairs of each task.
+        tasks: for each task, the results of both sides, paired by episode.
         rng: source of the resamples.
         draws: number of resamples.
     """
@@ -174,8 +182,8 @@ def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = D
     if rates is None:
         return None
     rows = [pairs.rows for pairs in paired]
-    sizes = list(map(len, rows))
-    drawn = resampled_rates(rows, rng, draws)
+    sizes = list(map(len, rows))  # episodes of each task
+    drawn = resampled_rates(rows, rng, draws)  # rates of both sides, shape (draws, 2)
     drawn_gaps = drawn[:, 0] - drawn[:, 1]
     differences = np.concatenate([pairs.differences for pairs in paired])
     overlaps = np.sum([pairs.overlap for pairs in paired], axis=0)
@@ -199,11 +207,15 @@ def measure_gap(tasks: Sequence[Pairs], rng: np.random.Generator, draws: int = D
 
 
 def sign_flip_test(differences: NDArray[np.int64]) -> float:
-    """Return the two-sided p-value of the exact sign-flip test.
+    """Return the two-sided p-value of no difference between two sides, by flipping signs.
 
-    Compares the sum of the differences with the sums of all ways to swap the two cells within
-    episodes. With one policy seed the differences are -1, 0 and 1, and this is McNemar's exact
-    test; with several seeds it stays valid although the seeds of an episode are correlated.
+    If the sides do not differ, each episode's difference could as well have the other sign. The
+    p-value is the share of all choices of signs whose sum is at least as far from 0 as that of the
+    differences: 0.25 for ``[1, 1, 1]``. With one policy seed this is McNemar's exact test; with
+    several it stays valid although the trials of an episode are correlated.
+
+    Args:
+        differences: first side less second in each episode, shape (episodes,).
     """
     nonzero = differences[differences != 0]
     if not len(nonzero):
@@ -212,14 +224,15 @@ def sign_flip_test(differences: NDArray[np.int64]) -> float:
     sizes //= np.gcd.reduce(sizes)  # smaller numbers with the same chances, so fewer sums
     total = int(sizes.sum())
 
-    # Probability of each sum of the sizes that get a positive sign, from 0 to all.
+    # By its place, the probability of each sum of the sizes with a positive sign, from 0 to all;
+    # each size in turn is in the sum with a probability of one half.
     chances = np.zeros(total + 1)
     chances[0] = 1.0
     for size in sizes.tolist():
         chances[size:] = (chances[size:] + chances[:-size]) / 2
         chances[:size] /= 2
 
-    # With that sum positive, the others are negative: the signed sum is twice it less all.
+    # If these sizes are positive, all others are negative: the signed sum is twice theirs less all.
     signed_sums = 2 * np.arange(total + 1) - total
     positive = int(sizes[nonzero > 0].sum())
     is_as_far = np.abs(signed_sums) >= abs(2 * positive - total)
@@ -227,7 +240,9 @@ def sign_flip_test(differences: NDArray[np.int64]) -> float:
 
 
 def _retention_interval(drawn: Draws, sizes: Sequence[int], rates: PairedRates) -> Interval | None:
-    """Return the interval of the first rate by the second, which is not 0.
+    """Return the 95 % interval of the retention, the first rate divided by the second.
+
+    The second rate is not 0, but may be 0 in a resample: then its retention is infinite or nan.
 
     Args:
         drawn: both rates in each resample, shape (draws, 2).
@@ -241,13 +256,14 @@ def _retention_interval(drawn: Draws, sizes: Sequence[int], rates: PairedRates) 
         return None
     if interval.has_width:
         return Interval(max(0.0, interval.low), interval.high)
+    # All resamples have the same ratio: the widest one that the intervals of both rates admit.
     first = without_spread(rates.first, sum(sizes))
     second = without_spread(rates.second, sum(sizes))
     return Interval(first.low / second.high, first.high / second.low)
 
 
 def holm(p_values: Sequence[float]) -> tuple[float, ...]:
-    """Return p-values after Holm's correction, in the given order.
+    """Correct p-values for testing several hypotheses at once, by Holm's method; keep their order.
 
     For example 0.01 and 0.04 become 0.02 and 0.04: the smallest is multiplied by the number of
     tests, the next one by one less, and none is smaller than one before it.

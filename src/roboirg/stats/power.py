@@ -26,10 +26,10 @@ _TOLERANCE = 1e-4
 
 
 def mcnemar_power(episodes: int, gap: float, discordance: float) -> float:
-    """Return the probability that the exact test finds a difference.
+    """Return the probability that McNemar's exact test at the 5 % level finds a difference.
 
     Args:
-        episodes: played by both, at least one.
+        episodes: played by both policies, at least one.
         gap: difference of the two success rates, -1 to 1.
         discordance: share of the episodes that exactly one of the two solves; at least the gap.
     """
@@ -41,6 +41,7 @@ def mcnemar_power(episodes: int, gap: float, discordance: float) -> float:
     counts = rejections.discordant
     # Share of the discordant episodes that the better one solves.
     share = (1 + abs(gap) / discordance) / 2
+    # For each number of discordant episodes: the better one, or the other one, wins few enough.
     rejected = stats.binom.cdf(rejections.most_wins, counts, share)
     rejected += stats.binom.cdf(rejections.most_wins, counts, 1 - share)
     chances = stats.binom.pmf(counts, episodes, discordance)
@@ -48,10 +49,14 @@ def mcnemar_power(episodes: int, gap: float, discordance: float) -> float:
 
 
 def episodes_needed(gap: float, discordance: float) -> int | None:
-    """Return the episodes that detect a gap with the wanted power; None above `MAX_EPISODES`.
+    """Return how many episodes detect a gap with 80 % power; None above `MAX_EPISODES`.
 
-    The power of an exact test rises in a sawtooth; the number has the wanted power and is at most
-    one tooth above the smallest such number.
+    The power of an exact test does not rise steadily with the episodes, but in a sawtooth, so the
+    search by halves may end one tooth above the smallest number that would do.
+
+    Args:
+        gap: difference of the two success rates, -1 to 1.
+        discordance: share of the episodes that exactly one of the two solves; at least the gap.
     """
     if gap == 0:
         return None
@@ -73,7 +78,11 @@ def episodes_needed(gap: float, discordance: float) -> int | None:
 
 
 def smallest_gap(episodes: int, discordance: float) -> float | None:
-    """Return the smallest gap that episodes detect with the wanted power, 0 to 1.
+    """Return the smallest gap between two success rates that is detected with 80 % power, 0 to 1.
+
+    Args:
+        episodes: played by both policies, at least one.
+        discordance: share of the episodes that exactly one of the two solves.
 
     Returns:
         None if even the largest gap, with all discordant episodes on one side, is not detected.
@@ -106,7 +115,11 @@ class _Rejections(NamedTuple):
 
 @functools.lru_cache(maxsize=64)
 def _rejections(episodes: int, discordance: float) -> _Rejections:
-    """Return when the test rejects; numbers with a probability below 1e-20 are left out."""
+    """Return with how few wins of the rarer side McNemar's exact test rejects, at the 5 % level.
+
+    Numbers of discordant episodes (solved by exactly one of the two) that are too improbable to
+    matter, below 1e-20, are left out.
+    """
     from scipy import stats
 
     center = episodes * discordance

@@ -55,14 +55,17 @@ def percent_range(low: Fraction, high: Fraction) -> str:
 
 
 def points(gap: float, decimals: int = 0) -> str:
-    """Return a gap in signed percentage points, with a proper minus: ``−12``, ``+3``, ``±0``."""
-    text = f"{100 * gap:+.{decimals}f}".replace("-", "−")
+    """Return a gap, -1 to 1, in signed percentage points: ``−12``, ``+3``, ``±0``."""
+    text = f"{100 * gap:+.{decimals}f}".replace("-", "−")  # the typographic minus
     is_zero = not text.strip("+−0.")
     return f"±{text[1:]}" if is_zero else text
 
 
 def interval_note(interval: Interval | None) -> str:
-    """Return the ends of a gap's interval in brackets, after a blank, or why it has none."""
+    """Return a gap's interval as it follows the gap: `` (95 % interval −8.1 to +2.0)``.
+
+    Its ends are in points. None is an interval of too few episodes.
+    """
     if interval is None:
         return f" ({TOO_FEW})"
     low = points(interval.low, 1)
@@ -84,7 +87,11 @@ class GapWords(NamedTuple):
 
 
 def gap_words(gap: Gap | None, p_value: float | None) -> GapWords:
-    """Return a gap with its corrected p-value for a table; dashes without one."""
+    """Return the cells of a table for a gap between two success rates; dashes without a gap.
+
+    For example ``("−12.0", "−20.1 to −3.9", "0.004")``. The p-value is given apart because it was
+    corrected for the number of tests; its cell is a dash if it is None.
+    """
     if gap is None:
         return GapWords(NOT_APPLICABLE, NOT_APPLICABLE, NOT_APPLICABLE)
     interval = TOO_FEW
@@ -98,6 +105,6 @@ def gap_words(gap: Gap | None, p_value: float | None) -> GapWords:
 
 def _rounded(value: Fraction) -> Decimal:
     """Round half up to two decimals: 1/8 becomes 0.13."""
-    # In integers: rounding a decimal quotient would round twice.
+    # In integers, floor(100 * value + 1/2): rounding a decimal quotient would round twice.
     hundredths = (200 * value.numerator + value.denominator) // (2 * value.denominator)
     return (Decimal(hundredths) * DIGITS).quantize(DIGITS, ROUND_HALF_UP)

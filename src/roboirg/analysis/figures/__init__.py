@@ -61,8 +61,9 @@ def write_figures(
         The files.
     """
     paths: list[Path] = []
+    shown = content.without_control_arms
     for name in which:
-        paths += save(partial(figure_kinds()[name].draw, content.told, published), folder, name)
+        paths += save(partial(figure_kinds()[name].draw, shown, published), folder, name)
     if not paths:
         whose = "The runs have" if content.cells else "The paper's tables have"
         raise InvalidValueError(
@@ -82,6 +83,6 @@ def draw_figure(name: str, content: RunData, *, published: bool = False) -> Figu
     check_figure_support()
     import matplotlib as mpl
 
-    # The keys of its own type are those of one version.
+    # A cast, because matplotlib's type for styles knows only the keys of one version.
     with mpl.rc_context(cast("Any", STYLE)):
-        return figure_kinds()[name].draw(content.told, published)
+        return figure_kinds()[name].draw(content.without_control_arms, published)

@@ -43,7 +43,11 @@ COLORS = dict(zip(FAILURE_KINDS, (*_ORANGE, *_BLUE, *_GRAY, "#eeeeee"), strict=T
 
 
 def draw_failures(content: RunData) -> Figure | None:
-    """Draw the shares of episodes by cause of failure; return None without failures."""
+    """Draw bars of how episodes failed: a panel for each policy, a bar for each setting.
+
+    A bar has a part for each cause, as long as its share of the episodes with a verdict. None
+    without failures.
+    """
     counts_by_bar = count_failures(content.frame, ("run", "options"))
     causes = occurring_failures(counts_by_bar.values())
     if not causes:
@@ -67,9 +71,9 @@ def draw_failures(content: RunData) -> Figure | None:
 
 
 def _keys(causes: Iterable[str]) -> dict[str, Artist]:
-    """Return what the legend explains: the color of each cause.
+    """Return the entries of the legend: for each cause of failure its label and its color.
 
-    It is called by its kind and name, such as ``grounding: wrong object``.
+    A label is kind and name, such as ``grounding: wrong object``.
     """
     from matplotlib.patches import Patch
 
@@ -83,7 +87,7 @@ def _keys(causes: Iterable[str]) -> dict[str, Artist]:
 
 
 def _draw_bar(axes: Axes, place: float, counts: Counter[str], causes: Sequence[str]) -> None:
-    """Draw the parts of a bar side by side, and the number of trials behind it.
+    """Draw a bar with a part for each cause of failure, and the number of trials to its right.
 
     Args:
         axes: of the panel.

@@ -70,11 +70,15 @@ def save(
     name: str,
     formats: Sequence[str] = ("png", "svg", "pdf"),
 ) -> tuple[Path, ...]:
-    """Draw a figure in the common style and write it in some formats, and for dark pages.
+    """Draw a figure, and write it in several formats for light pages and for dark ones.
 
-    Equal figures give equal files. Those for dark pages end in ``-dark`` and have no PDF; `name`
-    has no extension, and the folder is created if it is missing. Without a figure no file is
-    written.
+    Returns the files. Equal figures give equal files.
+
+    Args:
+        draw: makes the figure, anew for each style; None if there is nothing to draw.
+        folder: created if missing.
+        name: of the files, without an extension; those for dark pages have ``-dark`` behind it.
+        formats: extensions; no PDF is written for dark pages.
     """
     check_figure_support()
     paths = _save_in_style(draw, folder, name, STYLE, formats)
@@ -91,7 +95,15 @@ def _save_in_style(
     style: Mapping[str, object],
     formats: Sequence[str],
 ) -> list[Path]:
-    """Draw a figure in a style, write it in some formats, and return the files."""
+    """Draw a figure with some settings of matplotlib, write it, and return the files.
+
+    Args:
+        draw: makes the figure; None if there is nothing to draw.
+        folder: of the files.
+        stem: of their names.
+        style: settings such as colors.
+        formats: extensions, one file for each.
+    """
     import matplotlib as mpl
 
     with mpl.rc_context(cast("Any", {**_SAME_FILES, **style})):
@@ -110,9 +122,9 @@ def _save_in_style(
 
 
 def _fix_layout(figure: Figure) -> None:
-    """Place the axes as laid out, but rounded to four digits.
+    """Lay out a figure, and round the places of its axes so that equal figures give equal files.
 
-    The last digits of a layout differ each time, and so would the files.
+    The last digits of matplotlib's layout differ each time.
     """
     figure.set_dpi(DOTS_PER_INCH)
     figure.draw_without_rendering()

@@ -52,10 +52,11 @@ Played = Mapping[InstructionOptions, Mapping[PolicyRun, ByTask]]
 
 
 def draw_next_to_reference(which: RateTable, content: RunData, published: bool) -> Figure | None:
-    """Draw the rates of a table, each next to the reference's on the same tasks.
+    """Draw success in each setting next to success in a reference setting, on the same tasks.
 
     Args:
-        which: ``main``, whose reference is explicit, or ``context``, whose is the shortest one.
+        which: ``main`` compares settings with explicit instructions, which name the goal;
+            ``context`` compares long contexts with the shortest one.
         content: of the runs.
         published: whether to add the paper's rates, in gray.
 
@@ -123,9 +124,10 @@ class _Columns:
         return titles
 
     def cells_behind(self, cells: Cells) -> dict[CellKey, Cell]:
-        """Return the cells with a verdict behind the columns, and behind the reference.
+        """Return the cells whose trials are drawn in some column, as a rate or as its reference.
 
-        The reference has the tasks of all columns.
+        The reference is drawn in each column, over the column's tasks. Cells without a verdict are
+        left out.
         """
         drawn: set[tuple[InstructionOptions, str]] = set()
         for options, names in self.tasks.items():
@@ -139,27 +141,32 @@ class _Columns:
         return behind
 
     def own_rates(self, content: RunData) -> dict[PolicyRun, dict[str, Rate]]:
-        """Return the rates of each policy run by title, over exactly the column's tasks.
+        """Return for each policy run its rates by the title of the column, over the column's tasks.
 
         Columns, and policy runs, without results are left out.
         """
         played = _played(self.which, content.cells)
         rates_of_runs = {}
         for policy_run in content.frame.names:
-            groups = {}
+            groups = {}  # by options alone, as a key of one value
             for options, names in self.tasks.items():
                 by_task = played.get(options, {}).get(policy_run)
                 if by_task is not None:
                     groups[(options,)] = {task: by_task[task] for task in names}
             if groups:
-                explicit = played.get(self.reference, {}).get(policy_run, NOTHING)
-                rates_of_runs[policy_run] = self._measured(groups, explicit)
+                at_reference = played.get(self.reference, {}).get(policy_run, NOTHING)
+                rates_of_runs[policy_run] = self._measured(groups, at_reference)
         return rates_of_runs
 
     def _measured(
         self, groups: Mapping[tuple[InstructionOptions], ByTask], others: ByTask
     ) -> dict[str, Rate]:
-        """Return the rates of a policy run by title, given its cells at the reference."""
+        """Measure the rates of a policy run, each next to its reference; return them by title.
+
+        Args:
+            groups: the cells of each column, by options.
+            others: the policy run's cells at the reference, such as explicit, by task.
+        """
 
         def reference(key: tuple[InstructionOptions]) -> ByTask:
             if key == (self.reference,):
@@ -173,10 +180,10 @@ class _Columns:
         return rates
 
     def rows_of_paper(self) -> list[RateRow]:
-        """Return a heading and a row for each published policy, that with the best reference first.
+        """Return the rows of published models below a heading, that with the best reference first.
 
-        Its rates and references are over the tasks of the columns, if the paper has a rate for
-        each. Without any there is no heading.
+        A model's rates are over the tasks of the columns, where the paper has a rate for each of
+        these. Without any rate there is no heading.
         """
         published = {(row.model, row.options): row for row in published_rows(self.which)}
         references = [row for row in published.values() if row.options == self.reference]
@@ -197,7 +204,7 @@ class _Columns:
 
 
 def _signed_notes(differences: AllDifferences, names: RunNames) -> list[str]:
-    """Return what makes rates comparable or not, each sentence after its sign."""
+    """Return sentences on which rates can be compared with published ones: after ``=`` or ``≠``."""
     notes = []
     for note in comparison_notes(differences, names):
         has_sign = note.startswith((COMPARABLE_SIGN, DIFFERENT_SIGN))
@@ -206,9 +213,10 @@ def _signed_notes(differences: AllDifferences, names: RunNames) -> list[str]:
 
 
 def _compared_tasks(which: RateTable, cells: Cells) -> Tasks:
-    """Return the tasks of the columns other than the reference's, or of that if it is alone.
+    """Return the columns of the figure, one for each set of options, with the tasks of each.
 
-    Without results these are the columns of the paper. Contexts need several.
+    The reference, such as explicit, is drawn in every column and has none of its own unless it is
+    alone. Without results the columns are the paper's. Contexts need several, else there are none.
     """
     tasks: dict[InstructionOptions, list[str]] = _published_tasks(which)
     if cells:
@@ -221,7 +229,10 @@ def _compared_tasks(which: RateTable, cells: Cells) -> Tasks:
 
 
 def _played(which: RateTable, cells: Cells) -> Played:
-    """Return the cells with a verdict that the figure may show, by options, run and task."""
+    """Select the cells that the figure may show; return them by options, policy run and task.
+
+    A cell, the trials of a task, must have a verdict, and the table must have rows for its options.
+    """
     found: dict[InstructionOptions, dict[PolicyRun, dict[str, Cell]]] = {}
     for (policy_run, task, options), cell in cells.items():
         if cell.verdicts and PAPER_TABLES[which].shows(options):
@@ -230,10 +241,14 @@ def _played(which: RateTable, cells: Cells) -> Played:
 
 
 def _shared_tasks(which: RateTable, played: Played) -> dict[InstructionOptions, list[str]]:
-    """Return by column the tasks that all policy runs with results in it played.
+    """Return for each set of options the tasks that all policy runs with results for it played.
 
-    Those that played the reference as well must have played these tasks with it, so all rates of a
-    column, and all references, are over the same tasks.
+    Policy runs that played the reference, such as explicit, must have played the tasks there, too.
+    So all rates of a column, and their references, are over the same tasks.
+
+    Args:
+        which: the table that the figure draws.
+        played: cells by options, policy run and task.
     """
     at_reference = played.get(PAPER_TABLES[which].reference(), {})
     shared = {}
@@ -260,18 +275,25 @@ def _published_tasks(which: RateTable) -> dict[InstructionOptions, list[str]]:
 
 
 def _rate(measured: Measured[tuple[InstructionOptions]]) -> Rate:
-    """Return a rate, next to that of the reference if there is one."""
+    """Return a success rate to draw, 0 to 1, and its reference's on the same episodes if known."""
     rate = float(measured.rate or 0)
     gap = measured.gap
     if gap is None:
         return Rate(rate, interval=measured.interval)
+    # The reference follows from the gap; the interval is then that of the gap.
     return Rate(rate, rate - gap.value, gap.interval)
 
 
 def _size_and_sign(policy_run: PolicyRun, cells: Cells, differences: AllDifferences) -> str:
-    """Return how many episodes a policy has per cell, and whether its rates are comparable.
+    """Return the end of a policy's label: how many episodes it played, and if it is comparable.
 
-    For example ``, n = 10 to 50 × 3 =``: up to 50 episodes with 3 seeds, comparable.
+    For example ``, n = 10 to 50 × 3 =``: 10 to 50 episodes of a task in a setting, with 3 policy
+    seeds, and rates that can be compared with published ones.
+
+    Args:
+        policy_run: whose label it is.
+        cells: the trials behind the figure.
+        differences: of cells from published rates; empty if these are not drawn.
     """
     sizes = set()
     seeds = 0
@@ -301,9 +323,15 @@ def _size_and_sign(policy_run: PolicyRun, cells: Cells, differences: AllDifferen
 def _published_rate(
     row: PublishedRow, reference: PublishedRow, tasks: Sequence[str]
 ) -> Rate | None:
-    """Return a published rate over some tasks, next to the reference's unless it is that itself.
+    """Return a published success rate over some tasks, 0 to 1, next to that of its reference.
 
     None if either lacks the rate of a task.
+
+    Args:
+        row: a model's rates in one setting, in percent.
+        reference: the model's rates in the reference setting; if it is the same row, the rate
+            stands alone.
+        tasks: over which rates are averaged.
     """
     percent = row.average_over(tasks)
     reference_percent = reference.average_over(tasks)

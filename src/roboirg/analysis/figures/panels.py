@@ -80,10 +80,12 @@ def panels(
     keys: Mapping[str, Artist],
     notes: Sequence[str],
 ) -> tuple[Figure, list[Panel]]:
-    """Return a new figure and its panels; below them are its legend and then its notes.
+    """Lay out a figure: a grid of empty panels with the same rows; legend and notes below them.
+
+    The height of the figure follows from its content.
 
     Args:
-        titles: of the panels.
+        titles: of the panels, one for each.
         labels: of the rows that each panel has, from the top down.
         most_across: most panels side by side; one alone has the width of a column, several of a
             page.
@@ -108,7 +110,10 @@ def panels(
 
 
 def _titled_axes(figure: Figure, down: int, across: int, titles: _Titles) -> list[Axes]:
-    """Return the axes of each panel, with its title, in a grid of `down` times `across` places."""
+    """Add a grid of axes to a figure, `down` times `across`; return those with a title.
+
+    Places of the grid that are left over stay empty.
+    """
     grid = figure.subplots(down, across, sharey=True, squeeze=False).ravel()
     shown = list(grid[: len(titles.texts)])
     for axes, title in zip(shown, titles.texts, strict=True):
@@ -155,9 +160,10 @@ class _Rows(NamedTuple):
         return ROW_LINE_INCHES * sum(self.units)
 
     def draw(self, axes: Axes) -> list[float]:
-        """Label the rows of a panel; return the vertical positions of their centers, in units.
+        """Label the rows of a panel at its left; return the vertical positions of their centers.
 
-        Two rows, of labels with one line and with two, are at 1 and 3.5 units below the top.
+        Positions are in units of the axis, from the top down: of two rows, of 2 and 3 units, at 1
+        and 3.5.
         """
         places = []
         top = 0
@@ -180,10 +186,10 @@ class _Titles(NamedTuple):
 
     @classmethod
     def fitted(cls, titles: Sequence[str], inches: float) -> _Titles:
-        """Return titles in lines that fit into the width of a panel, in inches.
+        """Fold titles into lines that fit into the width of a panel, in inches.
 
-        A long word, such as a setting's name, is drawn smaller rather than broken, and the other
-        words of all titles with it.
+        If a word is too long for a line, all titles are drawn smaller, down to a limit at which the
+        word is broken.
         """
         fitting = TITLE_LETTERS * inches  # letters of the usual size in a line
         longest_word = 0

@@ -65,7 +65,9 @@ def draw_rates(
     words: RateWords,
     notes: Sequence[str],
 ) -> Figure:
-    """Draw rates, those below a heading in gray.
+    """Draw success rates as dots: a panel for each column, a row for each policy.
+
+    A row without rates is a heading; the rows below it are gray.
 
     Args:
         columns: title of each panel and what is below its axis.
@@ -95,7 +97,7 @@ def draw_rates(
 
 
 def _end_of_scale(rates: Iterable[Rate]) -> int:
-    """Return the first multiple of `TICK` that no rate exceeds, in percent."""
+    """Return the end of the axis in percent: the first multiple of `TICK` that no rate exceeds."""
     most = 0.0
     for rate in rates:
         most = max(most, rate.value, rate.reference or 0)
@@ -104,7 +106,10 @@ def _end_of_scale(rates: Iterable[Rate]) -> int:
 
 
 def _draw_column(panel: Panel, column: str, rows: Sequence[RateRow]) -> None:
-    """Draw the rates of a column; those below a heading are gray, and a line is above them."""
+    """Draw one panel: the rate of each row in a column.
+
+    Rows below a heading, a row without rates, are gray, with a line above the heading.
+    """
     color = first_color()
     for place, row in zip(panel.places, rows, strict=True):
         if not row.rates:
@@ -115,8 +120,9 @@ def _draw_column(panel: Panel, column: str, rows: Sequence[RateRow]) -> None:
 
 
 def _draw_rate(axes: Axes, place: float, rate: Rate, color: str) -> None:
-    """Draw a dot for a rate, an empty one for its reference, and a band for the interval.
+    """Draw a success rate as a dot, with an empty dot for its reference and a band as its interval.
 
+    The difference in points is printed to the right of the panel.
     Band and line are drawn first, because dots lie on them.
     """
     value = 100 * rate.value
@@ -136,7 +142,10 @@ def _draw_rate(axes: Axes, place: float, rate: Rate, color: str) -> None:
 
 
 def _keys(rates: Sequence[Rate], words: RateWords) -> dict[str, Artist]:
-    """Return what the legend explains, by label: only what some rate has."""
+    """Return the entries of the legend, of those that some rate needs: dots, and the interval.
+
+    The meaning of a dot and of the interval depends on whether rates have references.
+    """
     from matplotlib.lines import Line2D
 
     is_compared = False

@@ -89,9 +89,11 @@ of the policy run."""
 
 
 def arm_figures(frame: Frame) -> tuple[ArmFigure, ...]:
-    """Return the figures for which the arms were played, by policy run and setting.
+    """Measure how much a policy heeds its words: each figure is a gap between two control arms.
 
-    Each is measured by setting first, and sorted by policy run afterwards.
+    A control arm plays a scene again, for example without words. A policy run has the figures of
+    `CONTRASTS` for which it played the arms, in each setting. They are measured by setting first,
+    and sorted by policy run afterwards.
     """
     rng = np.random.default_rng(SEED)
     groups = _trials_by_group(frame)
@@ -116,23 +118,32 @@ class _Group(NamedTuple):
 
 
 def _trials_by_group(frame: Frame) -> dict[_Group, Trials]:
-    """Return the results with a verdict by policy run and options, by trial, and by arm.
+    """Return the results with a verdict by policy run and options, then by trial and control arm.
 
-    The arms of a policy run are policy runs of their own in the frame, but one here.
+    In the frame, the arms of a policy run are policy runs of their own; here they come together
+    under the one that has the scenes' own words (the arm ``told``).
     """
     groups: dict[_Group, Trials] = {}
     for run, options, result in rows_of(frame, "run", "options", "result"):
         if not isinstance(result, Summary) or result.outcome == "error":
             continue
-        told_run = run._replace(conditions=run.conditions._replace(arm=TOLD))
-        trials = groups.setdefault(_Group(told_run, options), {})
+        run_with_own_words = run._replace(conditions=run.conditions._replace(arm=TOLD))
+        trials = groups.setdefault(_Group(run_with_own_words, options), {})
         trial = (result.task, result.episode, result.policy_seed)
         trials.setdefault(trial, {})[result.arm] = result
     return groups
 
 
 def _figure(key: ArmKey, trials: Iterable[Arms], rng: np.random.Generator) -> ArmFigure | None:
-    """Return a figure over some trials; None if none of them has the arms that it needs."""
+    """Measure one figure, the gap between two rates over the same trials.
+
+    None if no trial was played in all control arms that the figure needs.
+
+    Args:
+        key: policy run, options and the figure.
+        trials: for each trial, its results by control arm.
+        rng: source of the resamples.
+    """
     first: dict[str, Cell] = {}
     second: dict[str, Cell] = {}
     for arms in trials:
@@ -149,12 +160,14 @@ def _figure(key: ArmKey, trials: Iterable[Arms], rng: np.random.Generator) -> Ar
 
 
 def _count(results: Iterable[Summary], cells: dict[str, Cell]) -> None:
-    """Add results to the cells of their tasks; paraphrases stand as policy seeds of their own.
+    """Add results to the cells of their tasks.
 
-    So a trial with the seed 0 and its paraphrases have different seeds in the same episode.
+    A cell has one verdict for each episode and policy seed, so each paraphrase of an instruction
+    counts as a policy seed of its own.
     """
     for result in results:
-        paraphrase = paraphrase_number(result.arm) or 0
+        paraphrase = paraphrase_number(result.arm) or 0  # numbered from 1
+        # Different for every pair of a policy seed and a paraphrase.
         seed = result.policy_seed * (MOST_PARAPHRASES + 1) + paraphrase
         cell = cells.setdefault(result.task, Cell())
         cell.add(Trial(result.episode, seed), result.outcome)
@@ -169,39 +182,45 @@ def _with_outcome(result: Summary, *, is_success: bool) -> Summary:
     return msgspec.structs.replace(result, outcome="success" if is_success else "failure")
 
 
-def _told_against(other: str, arms: Arms) -> Sides | None:
-    """Compare the arm ``told`` with another one."""
+def _own_words_against(other: str, arms: Arms) -> Sides | None:
+    """Count a trial with the scene's own words against the same trial in another control arm.
+
+    None if either was not played.
+    """
     if TOLD not in arms or other not in arms:
         return None
     return Sides([arms[TOLD]], [arms[other]])
 
 
 def _language_use(arms: Arms) -> Sides | None:
-    """Compare reaching each of two goals when stated with reaching one of them in both rollouts.
+    """Count whether a policy follows words to two goals of a scene, or pursues the same one twice.
 
-    In the arm ``told`` the scene's own goal was stated, in the other one another goal of the same
-    scene. Who follows words reaches each of them; who does not, the same one twice.
+    The scene was played twice: its own words state its own goal, those of the control arm
+    ``other-goal`` another one. The first side is a success if each goal was reached when it was
+    stated, the second one if the same goal was pursued both times. None if either was not played.
     """
-    told = arms.get(TOLD)
+    own_words = arms.get(TOLD)
     other = arms.get(OTHER_GOAL)
-    if told is None or other is None or told.goals is None or other.goals is None:
+    if own_words is None or other is None or own_words.goals is None or other.goals is None:
         return None
-    is_each_reached = _is_success(told) and _is_success(other)
-    is_own_goal_reached_twice = _is_success(told) and other.goals.original == "success"
-    # The world ends with the told verdict, so there the other goal can only be begun.
-    is_other_goal_begun = other.goals.stated in told.goals.agrees
+    reached_each_when_named = _is_success(own_words) and _is_success(other)
+    is_own_goal_reached_twice = _is_success(own_words) and other.goals.original == "success"
+    # With its own words the world ends at the verdict on its own goal, before the other goal can be
+    # reached: a first wrong act that agrees with the other goal counts as pursuing it.
+    is_other_goal_begun = other.goals.stated in own_words.goals.agrees
     is_other_goal_pursued_twice = _is_success(other) and is_other_goal_begun
     is_same_pursued = is_own_goal_reached_twice or is_other_goal_pursued_twice
     return Sides(
-        [_with_outcome(told, is_success=is_each_reached)],
-        [_with_outcome(told, is_success=is_same_pursued)],
+        [_with_outcome(own_words, is_success=reached_each_when_named)],
+        [_with_outcome(own_words, is_success=is_same_pursued)],
     )
 
 
 def _paraphrases(arms: Arms) -> Sides | None:
-    """Compare success in all paraphrases with their mean; None with fewer than two of them.
+    """Count whether all paraphrases of an instruction were solved, against each for itself.
 
-    The first rate counts each paraphrase as solved only if all of them were.
+    The first side has for each paraphrase a success only if all were solved, so its mean is a rate
+    over as many results as the second side's. None with fewer than two paraphrases.
     """
     results = [result for arm, result in sorted(arms.items()) if paraphrase_number(arm)]
     if len(results) <= 1:
@@ -213,11 +232,11 @@ def _paraphrases(arms: Arms) -> Sides | None:
 
 CONTRASTS = (
     ArmContrast(LANGUAGE_USE, "each reached when stated", "same pursued", _language_use),
-    ArmContrast(WORDS_WORTH, TOLD, SILENT, partial(_told_against, SILENT)),
-    ArmContrast(WORDS_WORTH, TOLD, SILENT_EMPTY, partial(_told_against, SILENT_EMPTY)),
-    ArmContrast(ORDERS_WORTH, TOLD, SCRAMBLED, partial(_told_against, SCRAMBLED)),
+    ArmContrast(WORDS_WORTH, TOLD, SILENT, partial(_own_words_against, SILENT)),
+    ArmContrast(WORDS_WORTH, TOLD, SILENT_EMPTY, partial(_own_words_against, SILENT_EMPTY)),
+    ArmContrast(ORDERS_WORTH, TOLD, SCRAMBLED, partial(_own_words_against, SCRAMBLED)),
     ArmContrast("paraphrases", "all", "mean", _paraphrases),
-    ArmContrast("repeat", TOLD, AGAIN, partial(_told_against, AGAIN)),
+    ArmContrast("repeat", TOLD, AGAIN, partial(_own_words_against, AGAIN)),
 )
 MEANING = (
     "Language use: first, the share of scenes in which each of two goals was reached when stated; "

@@ -73,10 +73,11 @@ class LabelKey(NamedTuple):
 
 
 def labeled(frame: Frame, breakdown: Breakdown) -> Frame:
-    """Return the episodes with a verdict, each once for each of its labels (column ``label``).
+    """Return the episodes with a verdict, once for each kind of instruction that each belongs to.
 
-    A value that is several texts, such as the classes of expressions in a command, is several
-    labels. Explicit instructions have none unless the breakdown is of them, too.
+    The kind is in the column ``label``. It is the value of the breakdown's column, such as a
+    difficulty; of several values, such as the pronoun and the ordinal in a command, each is a
+    label. Explicit instructions have none unless the breakdown is of them, too.
     """
     judged = frame.take([outcome in ("success", "failure") for outcome in frame["outcome"]])
     labels_of_rows: list[list[str]] = []
@@ -92,11 +93,11 @@ def labeled(frame: Frame, breakdown: Breakdown) -> Frame:
 
 
 def break_down(frame: Frame, breakdown: Breakdown) -> tuple[Measured[LabelKey], ...]:
-    """Return a row for each policy run, set of options and label, in the order of the frame.
+    """Measure success by kinds of instructions, for example by difficulty, with gaps to explicit.
 
-    Gaps are paired by episode: those of a label are compared with explicit on the very same
-    episodes, whose instruction has the same label or none. P-values are corrected over the policy
-    run. Errors and missing trials are not counted.
+    There is a row for each policy run, set of options and label (the kind), in the order of the
+    frame. Each is compared with explicit instructions, which name the goal, on the very same
+    episodes. P-values are corrected over the policy run. Errors and missing trials do not count.
     """
     by_options = gather(frame, ("run", "options"))
     by_label = gather(labeled(frame, breakdown), LabelKey._fields)
@@ -109,7 +110,7 @@ def break_down(frame: Frame, breakdown: Breakdown) -> tuple[Measured[LabelKey], 
     def explicit(key: LabelKey) -> ByTask:
         if key.options == REFERENCE_OPTIONS:
             return NOTHING
-        if breakdown.in_explicit:
+        if breakdown.in_explicit:  # explicit instructions have labels, too: the same one counts
             return groups.get(key._replace(options=REFERENCE_OPTIONS), NOTHING)
         return by_options.get((key.run, REFERENCE_OPTIONS), NOTHING)
 
@@ -119,7 +120,7 @@ def break_down(frame: Frame, breakdown: Breakdown) -> tuple[Measured[LabelKey], 
 
 
 def natural(text: str) -> list[tuple[bool, int, str]]:
-    """Return what a text is sorted by, so that ``frame 2`` is before ``frame 10``.
+    """Return a key that sorts texts by the numbers in them: ``frame 2`` before ``frame 10``.
 
     Of each part of it: whether it is no number, the number, and the words. For ``frame 2`` these
     are ``[(True, 0, "frame "), (False, 2, "")]``.

@@ -39,13 +39,14 @@ FLOORS = (CHANCE, COMMAND, *SURFACE_RULES, *LEARNED)
 
 
 def floor_level(floor: str, jobs: Iterable[Job], language: str = "") -> Fraction | None:
-    """Return the mean level of one of `FLOORS` over the distinct instructions of some jobs.
+    """Return the expected success, 0 to 1, of a listener that does not understand instructions.
 
-    Policies and their seeds do not matter. None without jobs, or if no level is known.
+    It is the mean over the distinct instructions of some jobs; policies and their seeds do not
+    matter. None without jobs, or if no level is known.
 
     Args:
-        floor: its name.
-        jobs: the jobs.
+        floor: which listener, one of `FLOORS`: ``chance`` guesses among the possible goals.
+        jobs: episodes to play.
         language: version of the language in which they were played, of which learned floors are.
     """
     instructions = dict.fromkeys(map(_without_policy, jobs))  # each once, in their order
@@ -65,14 +66,17 @@ def _without_policy(job: Job) -> Job:
 
 
 def unmeasured_note(floors: Iterable[str], languages: Iterable[str]) -> str:
-    """Return which learned floors are missing, because a version's were not measured; or nothing.
+    """Return a sentence on learned floors that were not measured; empty if there are none.
+
+    A learned floor is the success of a learner that sees the words or the scene alone. It is
+    measured apart for each version of the benchmark's language.
 
     Args:
         floors: the names of those that are asked for.
         languages: the versions of the language that were played.
     """
     learned = [floor for floor in floors if floor in LEARNED]
-    played = filter(None, languages)  # what was not played has none
+    played = filter(None, languages)  # the version is empty for episodes that were not played
     missing = {language for language in played if measured_floors(language) is None}
     if not learned or not missing:
         return ""
@@ -84,9 +88,10 @@ def unmeasured_note(floors: Iterable[str], languages: Iterable[str]) -> str:
 
 @functools.lru_cache(maxsize=65_536)
 def silent_chance(task: str, split: str, number: int) -> float:
-    """Return the expected success of who executes a random goal of the scene without any words.
+    """Return the success, 0 to 1, to expect of executing a random goal of the scene without words.
 
-    Goals that begin with all stages of the right one succeed, too.
+    It is the share of the scene's possible goals that are right. Goals that begin with all stages
+    of the right one succeed, too.
     """
     episode = get_episode(task, split, number)
     scene = episode.scene
@@ -101,7 +106,17 @@ def silent_chance(task: str, split: str, number: int) -> float:
 
 @functools.lru_cache(maxsize=65_536)
 def _level(floor: str, language: str, job: Job) -> Fraction | None:
-    """Return the level of a floor for one instruction; None if it is not known."""
+    """Return the expected success, 0 to 1, of a listener that does not understand one instruction.
+
+    Args:
+        floor: which listener: a learner whose success was measured, a guess among all goals
+            (``chance``) or among those that fit the command (``command``), or a rule for words.
+        language: version of the language, of which learned floors were measured.
+        job: the episode and the options of its instruction.
+
+    Returns:
+        None if it is not known.
+    """
     if floor in LEARNED:
         return _learned_level(floor, language, job)
     episode = get_episode(job.task, job.split, job.episode)
@@ -114,9 +129,10 @@ def _level(floor: str, language: str, job: Job) -> Fraction | None:
 
 
 def _learned_level(floor: str, language: str, job: Job) -> Fraction | None:
-    """Return what was measured for the task and setting, on the test split or random scenes.
+    """Return the success, 0 to 1, that was measured of a learner that sees words or scenes alone.
 
-    None for a version that was not measured, and for options other than the usual ones.
+    It is that of the job's task and setting, on the test split or else on random scenes. None for a
+    language version that was not measured, and for options other than the usual ones.
     """
     floors = measured_floors(language)
     if floors is None or not is_usual(job.options):

@@ -65,7 +65,9 @@ class Comparison(NamedTuple):
 
 
 def compare(first: Frame, second: Frame, breakdowns: Sequence[Breakdown] = ()) -> Comparison:
-    """Compare two policies on the episodes that both played, in the arm ``told`` if both have it.
+    """Compare two policies on the episodes that both played.
+
+    Control arms, which play a scene with other words than its own, are left out.
 
     Args:
         first: the results of one policy.
@@ -76,16 +78,16 @@ def compare(first: Frame, second: Frame, breakdowns: Sequence[Breakdown] = ()) -
         InvalidValueError: one side has several policies or versions, the two have different
             conditions, or they have no episode in common.
     """
-    first = first.told()
-    second = second.told()
-    ours = _only_policy_run(first)
-    theirs = _only_policy_run(second)
+    first = first.without_control_arms()
+    second = second.without_control_arms()
+    first_run = _only_policy_run(first)
+    second_run = _only_policy_run(second)
     _check_fair(first, second)
     found = _measure(dict(_groups(first, breakdowns)), dict(_groups(second, breakdowns)))
     averages = [result for result in found if result.key.is_average]
     if not averages:
         raise InvalidValueError(
-            f"{ours.policy} and {theirs.policy} have no episode in common with the same "
+            f"{first_run.policy} and {second_run.policy} have no episode in common with the same "
             "instruction; play both on the same tasks, settings and episodes."
         )
     cells = [result for result in found if result.key.task is not None]
@@ -95,22 +97,26 @@ def compare(first: Frame, second: Frame, breakdowns: Sequence[Breakdown] = ()) -
         # Labels stay in their order within each set of options.
         part.sort(key=lambda result: options_sort_key(result.key.options))
         parts[breakdown.title] = part
-    return Comparison(ours, theirs, averages, cells, parts)
+    return Comparison(first_run, second_run, averages, cells, parts)
 
 
 def _measure(
-    ours: Mapping[ComparisonKey, ByTask], theirs: Mapping[ComparisonKey, ByTask]
+    first: Mapping[ComparisonKey, ByTask], second: Mapping[ComparisonKey, ByTask]
 ) -> list[Compared]:
-    """Return the gaps of the first policy to the second, on the tasks that both played."""
-    shared_ours = {}
-    shared_theirs = {}
-    for key in ours:
-        if key in theirs:
-            shared_ours[key] = _shared(ours[key], theirs[key])
-            shared_theirs[key] = _shared(theirs[key], ours[key])
+    """Return by how much the success of two policies differs, in each group that both played.
+
+    A group is a task or an average over tasks, in one setting; an average is over the tasks that
+    both played. P-values are corrected among averages, among tasks, and in each breakdown.
+    """
+    shared_first = {}
+    shared_second = {}
+    for key in first:
+        if key in second:
+            shared_first[key] = _shared(first[key], second[key])
+            shared_second[key] = _shared(second[key], first[key])
     measured = measure_groups(
-        shared_ours,
-        lambda key: shared_theirs[key],
+        shared_first,
+        lambda key: shared_second[key],
         family=lambda key: (key.part, key.task is None),
         with_intervals=False,
     )
@@ -120,11 +126,13 @@ def _measure(
 def _groups(
     frame: Frame, breakdowns: Sequence[Breakdown]
 ) -> Iterator[tuple[ComparisonKey, ByTask]]:
-    """Yield what is compared of one policy: each cell, each average, each label of a breakdown.
+    """Yield the groups of one policy's results that are compared, each with its cells by task.
 
-    Explicit instructions are not broken down.
+    They are each task, the average over tasks, and each label of a breakdown (a kind of
+    instructions), all by instruction options. Explicit instructions are not broken down.
     """
     by_options = gather(frame, ("options",))
+    # Groups by one column have keys of one value.
     for (options,) in sorted(by_options, key=lambda key: options_sort_key(*key)):
         by_task = by_options[options,]
         for task, cell in by_task.items():
@@ -151,7 +159,11 @@ def _shared(cells: ByTask, others: ByTask) -> ByTask:
 
 
 def _only_policy_run(frame: Frame) -> PolicyRun:
-    """Return the policy run of all results; they must be of a single one."""
+    """Return the policy run that all results are of: a policy, its conditions and versions.
+
+    Raises:
+        InvalidValueError: there are no results, or they are of several policies or policy runs.
+    """
     policy_runs = list(frame.names)
     names = list(dict.fromkeys(policy_run.policy for policy_run in policy_runs))
     if not names:
@@ -169,7 +181,11 @@ def _only_policy_run(frame: Frame) -> PolicyRun:
 
 
 def _check_fair(first: Frame, second: Frame) -> None:
-    """Check that both policies have results, under the same conditions."""
+    """Check that two policies can be compared fairly.
+
+    Raises:
+        InvalidValueError: one has no results, or they were played under different conditions.
+    """
     for frame in (first, second):
         if set(frame["outcome"]) <= {MISSING}:
             raise InvalidValueError("One of the two policies has no results yet.")

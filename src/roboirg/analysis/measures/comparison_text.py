@@ -22,21 +22,21 @@ from roboirg.stats.rates import interval_note, p_text, points
 
 
 def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
-    """Yield the results, a sentence each; empty ones separate paragraphs.
+    """Yield the comparison of two policies in lines of text; empty lines separate paragraphs.
 
-    First the averages, then the single cells, then each breakdown; at the end what p-values mean
-    and what was left out.
+    First the averages over tasks, then the single cells (one task in one setting) that differ, then
+    each breakdown by kinds of instructions; at the end what p-values mean and what was left out.
 
     Args:
-        comparison: of two policies.
+        comparison: of two policies, as measured.
         first: label of the first policy.
         second: label of the second policy.
     """
     averages = [_Result(average, first, second) for average in comparison.averages]
     cells = [_Result(cell, first, second) for cell in comparison.cells]
-    parts = {}
+    breakdowns = {}
     for title, part in comparison.parts.items():
-        parts[title] = [_Result(row, first, second) for row in part]
+        breakdowns[title] = [_Result(row, first, second) for row in part]
     has_several_tasks = any(average.gap.tasks > 1 for average in averages)
 
     yield f"{first} against {second}, on the same episodes."
@@ -46,7 +46,7 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
     if has_several_tasks:
         yield ""
         yield from _decided_cells(cells)
-    for title, rows in parts.items():
+    for title, rows in breakdowns.items():
         yield ""
         yield f"By {title}:" if rows else f"By {title}: no instruction has one."
         for row in rows:
@@ -60,18 +60,21 @@ def sentences(comparison: Comparison, first: str, second: str) -> Iterator[str]:
         )
     else:
         yield "p-values are from the exact paired test, after Holm's correction over the settings."
-    if any(result.is_surprising for result in itertools.chain(averages, *parts.values())):
+    if any(result.is_surprising for result in itertools.chain(averages, *breakdowns.values())):
         yield (
             "An interval belongs to one gap alone, so it may exclude 0 although p is above 0.05; "
             "p is corrected for all gaps that are tested together, and p decides."
         )
-    if parts:
+    if breakdowns:
         yield "Each breakdown is corrected separately, over all its rows."
     yield from _left_out(comparison.averages)
 
 
 def _decided_cells(cells: Sequence[_Result]) -> Iterator[str]:
-    """Yield how many single cells show a difference, and these from the largest gap down."""
+    """Yield how many single cells differ significantly, and a line for each, largest gap first.
+
+    A single cell is the comparison of two policies in one task and one setting.
+    """
     decided = [cell for cell in cells if cell.is_decided]
     total = f"{counted(len(cells), 'single cell')} (one task in one setting)"
     if not decided:
@@ -118,7 +121,10 @@ class _Result:
 
     @property
     def sentence(self) -> str:
-        """What was compared, who is better, and by how much."""
+        """Which of the two policies is better, and by how much, or that it is not clear.
+
+        For example ``PickXtimes, relational: pi0 is better, +8.0 points (95 % interval …), …``.
+        """
         key = self.result.key
         subject = options_label(key.options)
         if key.task is not None:
@@ -132,7 +138,12 @@ class _Result:
 
     @property
     def _figures(self) -> str:
-        """The gap with its interval, the p-value, and the number of episodes."""
+        """The gap with its interval, the p-value, and the number of episodes.
+
+        For example ``+8.0 points (95 % interval +1.2 to +14.6), p = 0.021, 150 episodes of 3
+        tasks``. If correcting the p-value for several tests made the gap insignificant, the
+        uncorrected one follows.
+        """
         gap = self.gap
         p_value = p_text(self.p_holm)
         uncorrected = p_text(gap.p_value)
@@ -145,7 +156,7 @@ class _Result:
 
     @property
     def _outlook(self) -> str:
-        """Which gaps these episodes show, and how many episodes would show this gap.
+        """How large a gap these episodes can show, and how many episodes this gap would need.
 
         For example ``These episodes can show gaps of 9.5 points or more with 80 % power; showing a
         gap of this size needs about 1,200.``
@@ -168,7 +179,10 @@ class _Result:
 
 
 def _left_out(averages: Iterable[Compared]) -> Iterator[str]:
-    """Yield how many trials are in no result: without a counterpart, or without a verdict."""
+    """Yield a sentence for trials that the averages leave out, if there are any.
+
+    These have no counterpart of the other policy, or no verdict (an error, or not yet played).
+    """
     unpaired = 0
     unjudged = 0
     for average in averages:
@@ -176,7 +190,7 @@ def _left_out(averages: Iterable[Compared]) -> Iterator[str]:
             unpaired += len(cell.verdicts)
             unjudged += cell.errors + cell.missing
         if average.gap is not None:
-            unpaired -= average.gap.trials  # those of both policies that were paired
+            unpaired -= average.gap.trials  # paired trials, counted for both policies
     if unpaired:
         verb = verb_for(unpaired, "are")
         yield f"{counted(unpaired, 'trial')} without a counterpart {verb} left out."

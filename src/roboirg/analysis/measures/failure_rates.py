@@ -41,23 +41,28 @@ class ShareBounds(NamedTuple):
 
 
 def measure_ends(data: RunData, scopes: Collection[str]) -> Mapping[ScopeKey, EndRates]:
-    """Measure success and each kind of failure in some scopes.
+    """Measure the rates of success and of each kind of failure: grounding, execution, undecided.
 
     All are rates of the episodes with a verdict, so they add up to 1, and their gaps to explicit
-    to 0. A failure that was not attributed is undecided.
+    instructions (which name the goal) to 0. A failure without a known cause is undecided.
+
+    Args:
+        data: of the runs.
+        scopes: what is measured: names of tasks or suites, or `ALL_TASKS`.
     """
-    kinds = [_measure_failures(data, kind, scopes) for kind in FAILURE_KINDS]
+    rates_of_kinds = [_measure_failures(data, kind, scopes) for kind in FAILURE_KINDS]
     ends = {}
     for key, success in data.summaries.items():
         if key.scope in scopes and success.tasks:
-            ends[key] = EndRates(success, *(rates[key] for rates in kinds))
+            ends[key] = EndRates(success, *(rates[key] for rates in rates_of_kinds))
     return ends
 
 
 def _measure_failures(data: RunData, kind: FailureKind, scopes: Collection[str]) -> Summaries:
-    """Measure a kind of failure as if it were the success, and everything else a failure.
+    """Measure how often episodes ended in a kind of failure, such as grounding.
 
-    Errors and missing episodes stay what they are.
+    To measure this as success is measured, episodes with this failure count as successes and all
+    others with a verdict as failures. Errors and missing episodes stay what they are.
     """
     frame = data.frame
     outcomes = []
@@ -68,14 +73,15 @@ def _measure_failures(data: RunData, kind: FailureKind, scopes: Collection[str])
         elif outcome == "failure" and (failure_kind or "undecided") == kind:
             counted_as = "success"
         outcomes.append(counted_as)
-    inverted = frame.extended({"outcome": as_column(outcomes)})
-    return summarize(cells_of(inverted), scopes)
+    recounted = frame.extended({"outcome": as_column(outcomes)})
+    return summarize(cells_of(recounted), scopes)
 
 
 def grounding_share(grounding: ByTask, execution: ByTask, undecided: ByTask) -> ShareBounds | None:
-    """Return the share of grounding among failures; None without failures.
+    """Return which share of the failures was due to grounding, not to execution, within bounds.
 
-    At least, all that is undecided was execution; at most, it was grounding.
+    The least share takes all undecided failures for execution, the most takes them for grounding.
+    None without failures.
 
     Args:
         grounding: the episodes by task, in which a failure of grounding counts as success.

@@ -69,8 +69,10 @@ class Headline:
 def headline_notes(cells: Cells, names: RunNames) -> Iterator[str]:
     """Yield a sentence with the headline number of each policy run that played what it needs.
 
-    A run that played it and has no number gets the reason instead: no floors were measured in its
-    version of the language, its words are others, or its episodes are too few.
+    The headline number is the mean gap to explicit instructions over the settings in which learners
+    that see only the words were measured to be at chance; these measurements are the floors. A run
+    without a number gets the reason instead: no floors were measured in its version of the
+    language, its words are others, or its episodes are too few.
     """
     for policy_run, name in names.items():
         floors = measured_floors(policy_run.language)
@@ -105,7 +107,9 @@ def headline_notes(cells: Cells, names: RunNames) -> Iterator[str]:
 def measure_headline(
     cells: Cells, policy_run: PolicyRun, settings: Sequence[str]
 ) -> Headline | None:
-    """Return the headline number; None unless all settings were played next to explicit.
+    """Return the mean gap of success in some settings to success in explicit, which names the goal.
+
+    Rates are compared on the same episodes. None unless all settings were played next to explicit.
 
     Args:
         cells: of all policy runs.
@@ -116,6 +120,7 @@ def measure_headline(
     rows_of_tasks = [rows for rows in map(_paired_rows, tasks) if len(rows)]
     if not rows_of_tasks:
         return None
+    # As measured: a single "draw" of all episodes, shape (1,).
     gap = _mean_gap([rates_of(rows.sum(axis=0, keepdims=True)) for rows in rows_of_tasks])
     if np.isnan(gap):
         return None  # a setting has no trials in any task
@@ -153,7 +158,10 @@ class _TaskCells(NamedTuple):
 def _tasks_in_settings(
     cells: Cells, policy_run: PolicyRun, settings: Sequence[str]
 ) -> Iterator[_TaskCells]:
-    """Yield the cells of each task that a policy run played in explicit."""
+    """Yield, for each task that a policy run played in explicit, its cells there and in settings.
+
+    Explicit is the setting that names the goal, to which the others are compared.
+    """
     for key, explicit in cells.items():
         if key.policy_run != policy_run or key.options != REFERENCE_OPTIONS:
             continue
@@ -165,10 +173,10 @@ def _tasks_in_settings(
 
 
 def _paired_rows(task: _TaskCells) -> Rows:
-    """Return a row for each episode of a task: the columns of `Pairs.rows` for each setting.
+    """Return the results of a task in k settings next to explicit, shape (episodes, 4 k).
 
-    They are 0 where the setting has no verdict; an episode without any is left out. Two settings,
-    for example, have eight columns.
+    Each setting has four columns: its successes and trials in the episode, then those in explicit.
+    All four are 0 where the setting has no verdict; an episode without any is left out.
     """
     episodes = np.array(sorted(task.explicit.by_episode()))
     rows = np.zeros((len(episodes), _PAIR * len(task.in_settings)), dtype=np.int64)
@@ -181,12 +189,16 @@ def _paired_rows(task: _TaskCells) -> Rows:
 
 
 def _mean_gap(rates: Sequence[Draws]) -> Draws:
-    """Return the mean gap of each resample, over settings, and before that over their tasks.
+    """Return the gap to explicit in each draw, the mean over tasks and then over k settings.
 
     Args:
-        rates: for each task the rates of each setting and of explicit, shape (draws, 2 k); nan
-            where a task has no episode in a setting.
+        rates: for each task the rates in each setting and in explicit, one next to the other, shape
+            (draws, 2 k); nan where a task has no episode in a setting.
+
+    Returns:
+        Shape (draws,); nan if a setting has no episode in any task.
     """
+    # Shape (tasks, draws, k).
     gaps = np.stack([task_rates[:, 0::2] - task_rates[:, 1::2] for task_rates in rates])
     tasks_with_gap = (~np.isnan(gaps)).sum(axis=0)
     with np.errstate(invalid="ignore"):

@@ -18,16 +18,18 @@ became of the prompt: ``heard`` whole, ``cut``, or perhaps cut (``unknown``)."""
 
 
 def count_heard(frame: Frame, by: Sequence[str]) -> Mapping[Key, HeardCounts]:
-    """Count episodes by policy run and some columns.
+    """Count episodes by whether the policy's model read the whole prompt or only its beginning.
 
-    By ``("task",)``, for example, ``{(run, "StopCube"): {"episodes": 50, "heard": 44, "cut": 6}}``.
-    A policy run is left out if it declares no limit, so that nothing is known of any prompt.
+    They are counted by policy run and some columns: by ``("task",)``, for example,
+    ``{(run, "StopCube"): {"episodes": 50, "heard": 44, "cut": 6}}``. A policy run that declares no
+    limit of its prompt is left out, as nothing is known of any prompt.
     """
     counts_by_key: defaultdict[Key, HeardCounts] = defaultdict(Counter)
     runs_with_limit = set()
     for run, *values, prompt, outcome in rows_of(frame, "run", *by, "prompt", "outcome"):
         if outcome == MISSING:
             continue
+        # Adds 1 to both: all episodes, and those with this prompt (heard, cut or unknown).
         counts_by_key[run, *values].update(("episodes", prompt))
         if prompt != "unknown":
             runs_with_limit.add(run)
@@ -35,7 +37,10 @@ def count_heard(frame: Frame, by: Sequence[str]) -> Mapping[Key, HeardCounts]:
 
 
 def heard_notes(frame: Frame, names: RunNames) -> list[str]:
-    """Return a sentence for each policy whose prompts were or may be cut, or that guessed."""
+    """Return sentences on policies that did not read all words, or guessed a goal without them.
+
+    Prompts count that were cut at the limit of the policy's model, and those that may have been.
+    """
     counts = count_heard(frame, ())
     episodes = Counter(frame["run"])
     guesses = Counter(itertools.compress(frame["run"], frame["guessed"]))
@@ -57,10 +62,12 @@ def heard_notes(frame: Frame, names: RunNames) -> list[str]:
 
 
 def cut_text(tasks: Sequence[HeardCounts]) -> str:
-    """Return the share of episodes with a cut prompt in percent, such as ``12`` or ``12–20``.
+    """Return the share of prompts that were cut in percent, the mean over tasks: ``12``.
 
-    It stands between bounds if some were perhaps cut. Of several tasks it is the mean of their
-    shares.
+    If it is unknown whether some were cut, the least and the largest possible share: ``12–20``.
+
+    Args:
+        tasks: numbers of prompts of each task: all ``episodes``, ``cut`` and ``unknown``.
     """
     cut = Fraction(0)
     perhaps_cut = Fraction(0)

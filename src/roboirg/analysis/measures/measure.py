@@ -145,16 +145,22 @@ def measure(
 def _trials_of_groups(
     frame: Columns, by: Sequence[str], pool: Sequence[str]
 ) -> Mapping[Key, ByTask]:
-    """Return the trials of each group, each of which has one value in the columns kept apart.
+    """Group trials by the values of some columns, after checking that each group can be one rate.
+
+    A rate must not mix, for example, two policies or two versions, unless the caller allows it.
 
     Args:
         frame: with the columns.
         by: columns whose values make a group.
         pool: columns over whose values a rate may be taken.
+
+    Raises:
+        InvalidValueError: a group has several values in a column of `KEPT_APART` that is not
+            pooled, or several rows of the same trial.
     """
-    apart = [name for name in KEPT_APART if name in frame and name not in (*by, *pool)]
-    rows = _known_rows(frame, (*by, *apart, *pool, *TRIAL))
-    _check_apart(rows, by, apart)
+    unmixed = [name for name in KEPT_APART if name in frame and name not in (*by, *pool)]
+    rows = _known_rows(frame, (*by, *unmixed, *pool, *TRIAL))
+    _check_unmixed(rows, by, unmixed)
     # What is pooled distinguishes trials of an episode, as the policy seed does, so it becomes part
     # of the seed: a trial of the resolved form has the seed (0, "resolved").
     rows["policy_seed"] = list(rows_of(rows, "policy_seed", *pool))
@@ -173,7 +179,7 @@ def _measure_against(
     changed: Mapping[str, object],
     family: Sequence[str],
 ) -> tuple[Measured[Key], ...]:
-    """Measure groups against those of the same key in which some columns have other values.
+    """Measure success in groups, and its gap to the group that differs only in some columns.
 
     Args:
         groups: by the values of the columns of `by`.
@@ -198,7 +204,12 @@ def _measure_against(
 
 
 def _known_rows(frame: Columns, names: Iterable[str]) -> dict[str, list[object]]:
-    """Return some columns with None for missing values; those of `TRIAL` have no missing ones."""
+    """Return some columns of a frame as lists, with None for values that pandas marks as missing.
+
+    Raises:
+        InvalidValueError: a value is missing in a column of `TRIAL`: task, episode, policy seed,
+            outcome.
+    """
     rows = {}
     for name in names:
         rows[name] = list(map(_known, frame[name]))
@@ -208,9 +219,10 @@ def _known_rows(frame: Columns, names: Iterable[str]) -> dict[str, list[object]]
 
 
 def _trials_in(groups: Mapping[Key, ByTask]) -> int:
-    """Return the number of trials, with or without a verdict.
+    """Return the number of trials in some groups: with a verdict, ended in an error, or missing.
 
-    The same trial counts once if it has several verdicts, as a cell keeps the last one.
+    If several rows are about the same trial (episode and policy seed), it counts once, because a
+    cell keeps only the last verdict.
     """
     trials = 0
     for by_task in groups.values():
@@ -225,17 +237,21 @@ def _known(value: object) -> object:
     return None if is_missing else value
 
 
-def _check_apart(
-    rows: Mapping[str, Sequence[object]], by: Sequence[str], apart: Iterable[str]
+def _check_unmixed(
+    rows: Mapping[str, Sequence[object]], by: Sequence[str], unmixed: Iterable[str]
 ) -> None:
     """Check that in some columns all rows of a group have the same value.
 
     Args:
         rows: columns of equal length.
         by: columns whose values make a group.
-        apart: the columns that are checked.
+        unmixed: the columns that are checked.
+
+    Raises:
+        InvalidValueError: a group has several values in one of them.
     """
-    for name in apart:
+    for name in unmixed:
+        # If each group has one value, there are as many pairs of group and value as groups.
         groups_with_value = set(rows_of(rows, *by, name))
         groups = {values[:-1] for values in groups_with_value}
         if len(groups_with_value) > len(groups):
@@ -253,9 +269,11 @@ def _check(
     family: Sequence[str],
     pool: Sequence[str],
 ) -> None:
-    """Check the arguments of `measure`: the frame has the columns, each once, and the values.
+    """Check the arguments of `measure`.
 
-    The columns of family and against are among those of by.
+    Raises:
+        UnknownNameError: the frame lacks a column that is named, or a value of `against`.
+        InvalidValueError: a column stands twice, or one of `family` or `against` is not in `by`.
     """
     columns = list(map(str, frame))
     check_names("column", (*by, *family, *against, *pool, *TRIAL), columns)
@@ -284,13 +302,14 @@ def measure_groups(
     is_mean: Callable[[K], bool] = lambda _key: False,
     with_intervals: bool = True,
 ) -> tuple[Measured[K], ...]:
-    """Measure groups against up to two references.
+    """Measure success in groups of trials, and its gaps to others on the same episodes.
 
     Args:
-        groups: to measure.
-        reference: returns the trials with which those of a group are compared.
+        groups: for each key its trials by task; the rate of a group is the mean over tasks.
+        reference: returns the trials with which those of the key are compared; none by default.
         second_reference: returns others with which they are compared, too.
-        family: what is read together: p-values of gaps are corrected over all of the same family.
+        family: returns the same value for groups that are read together: p-values of their gaps
+            are corrected over all of them.
         is_mean: whether a group is a mean over tasks even if it has only one.
         with_intervals: whether rates have intervals.
     """
@@ -311,9 +330,10 @@ def measure_groups(
 def with_holm(
     rows: Sequence[Measured[K]], family: Callable[[K], object]
 ) -> tuple[Measured[K], ...]:
-    """Return rows with the p-values of their gaps corrected over all rows of the same family.
+    """Correct p-values for testing several gaps at once, by Holm's method.
 
-    Rows without a gap stay as they are.
+    The gaps that are read together, such as those of a policy run, are a family, and are corrected
+    over its rows. Rows without a gap stay as they are.
 
     Args:
         rows: in any order, which is kept.
@@ -333,7 +353,13 @@ def with_holm(
 
 
 def _interval(cells: ByTask, rng: np.random.Generator, *, is_mean: bool) -> Interval | None:
-    """Return the interval of a rate: that of a single cell, or that of a mean over tasks."""
+    """Return the 95 % interval of a success rate; None with too few episodes.
+
+    Args:
+        cells: the trials by task.
+        rng: source of the resamples.
+        is_mean: whether the rate is a mean over tasks, even if only one has a verdict.
+    """
     judged = [cell for cell in cells.values() if cell.verdicts]
     if len(judged) == 1 and not is_mean:
         return cell_interval(judged[0], rng)
@@ -341,7 +367,7 @@ def _interval(cells: ByTask, rng: np.random.Generator, *, is_mean: bool) -> Inte
 
 
 def pair(cells: ByTask, others: ByTask) -> list[Pairs]:
-    """Pair the trials of each task that both have."""
+    """Pair trials by episode, in each task in which both sides have some."""
     pairs = []
     for task, cell in cells.items():
         if cell.verdicts and task in others:
@@ -363,9 +389,10 @@ Summaries = Mapping[ScopeKey, ScopeSummary]
 
 
 def by_scope(cells: Cells) -> Mapping[ScopeKey, ByTask]:
-    """Group cells by scope, in their order: tasks, then suites, then all tasks.
+    """Group the cells of tasks by what is averaged: a task, a suite of tasks, or all tasks.
 
-    A cell is in up to three groups: ``StopCube``, its suite ``permanence``, and ``all tasks``.
+    These are the scopes. The cell of the task ``StopCube`` is in three groups: ``StopCube``, its
+    suite ``permanence``, and ``all tasks``. Groups of tasks come first, those of all tasks last.
     """
     scopes: dict[ScopeKey, dict[str, Cell]] = {}
 
@@ -385,14 +412,15 @@ def by_scope(cells: Cells) -> Mapping[ScopeKey, ByTask]:
 
 
 def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
-    """Measure each policy run and set of options in each scope, or in those that are wanted.
+    """Measure the success of each policy run by instruction options, in tasks, suites and overall.
 
-    The gap is to explicit, the second gap is the implicit form less the resolved one. P-values are
+    The first gap is to explicit instructions, which name the goal; the second one to the resolved
+    form of the same instructions, whose references are replaced by what they mean. P-values are
     corrected over a policy run's tasks, its suites, or its averages over all tasks.
 
     Args:
         cells: of all policy runs.
-        wanted: names of scopes; None for all.
+        wanted: names of tasks or suites, or `ALL_TASKS`; None for all of them.
     """
     scopes = by_scope(cells)
     groups = scopes
@@ -400,7 +428,7 @@ def summarize(cells: Cells, wanted: Collection[str] | None = None) -> Summaries:
         groups = {key: by_task for key, by_task in scopes.items() if key.scope in wanted}
 
     def is_task(key: ScopeKey) -> bool:
-        return key.scope in scopes[key]
+        return key.scope in scopes[key]  # the cells of a scope are by the names of its tasks
 
     def with_options(key: ScopeKey, options: InstructionOptions) -> ByTask:
         if options == key.options:

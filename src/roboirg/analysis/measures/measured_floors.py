@@ -49,7 +49,13 @@ def measured_floors(version: str) -> Floors | None:
 
 
 def read_floors(text: str) -> Floors:
-    """Return the floors of a file's text."""
+    """Return the floors of a file: for each setting, task or slot how often guessing is right.
+
+    Args:
+        text: comma-separated, with the shares of a goal's single values (in ``chance``,
+            ``text-only``, …) and of whole goals (in ``chance goals``, …) that each learner or rule
+            gets right, 0 to 1.
+    """
     floors = {}
     for line in csv.DictReader(text.splitlines()):
         key = FloorKey(line["split"], line["setting"], line["task"], line["slot"])
@@ -62,10 +68,14 @@ def read_floors(text: str) -> Floors:
 
 
 def settings_at_chance(floors: Floors) -> tuple[str, ...]:
-    """Return the settings in which the words alone give away at most the margin above chance."""
+    """Return the settings whose words alone do not give away the goal.
+
+    In these a learner that sees only the words was at most `MARGIN` better than guessing, on random
+    scenes.
+    """
     settings = []
     for key, row in floors.items():
-        is_whole_setting = key == FloorKey(RANDOM, key.setting)
+        is_whole_setting = key == FloorKey(RANDOM, key.setting)  # not of one task or slot
         if is_whole_setting and row.excess and row.excess.value <= MARGIN:
             settings.append(key.setting)
     return tuple(settings)

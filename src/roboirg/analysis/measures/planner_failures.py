@@ -44,10 +44,11 @@ PLANNER_FAILURES: Mapping[str, str] = {
 
 
 def planner_failure(record: Record) -> str | None:
-    """Return how a planner's episode went wrong; None if it did not, or if no planner is known.
+    """Return why an episode of a planner failed, such as ``wrong thing``.
 
-    The act that broke a rule of the task decides, as the failure analysis attributes it. Where time
-    ran out instead, the last subgoals do.
+    A planner names subgoals to a policy. The failure is one of `PLANNER_FAILURES`; None for a
+    success, and without a planner. The act that broke a rule of the task decides, as the failure
+    analysis attributes it. Where time ran out instead, the last subgoals do.
     """
     if record.outcome == "success" or "planner" not in record.policy_metadata:
         return None
@@ -62,7 +63,10 @@ def planner_failure(record: Record) -> str | None:
 
 
 def _failure_at_time_limit(record: Record) -> str:
-    """Return how an episode went wrong that was played until its time was up."""
+    """Return why an episode failed that was played until its time was up: ``stopped early``.
+
+    It is one of `PLANNER_FAILURES`, and follows from what the planner last asked for.
+    """
     acts = [subgoal for subgoal in record.subgoals if not _is_waiting(subgoal)]
     usage = record.usage
     if usage.get("finished"):
@@ -75,7 +79,12 @@ def _failure_at_time_limit(record: Record) -> str:
 
 
 def _failure_in_last_act(act: SubgoalRecord, steps: int) -> str:
-    """Return how an episode of some steps went wrong, from the last act that was asked for."""
+    """Return why an episode failed when time was up, from the last act that the planner asked for.
+
+    Args:
+        act: the last subgoal that asks for an act.
+        steps: length of the episode, in control steps.
+    """
     if act.ended == "refused":
         return "unreadable" if act.why == UNKNOWN_WORDS else "refused"
     if steps - act.step > IDLE_STEPS:

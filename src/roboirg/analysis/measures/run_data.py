@@ -36,13 +36,16 @@ class RunData:
         return summarize(self.cells)
 
     @cached_property
-    def told(self) -> RunData:
+    def without_control_arms(self) -> RunData:
         """The data without control arms, if there is any."""
-        frame = self.frame.told()
+        frame = self.frame.without_control_arms()
         return self if frame is self.frame else RunData(frame, self.records)
 
     def name(self, policy_run: PolicyRun) -> str:
-        """Return the label of a policy run, marked if some planned trial has no verdict."""
+        """Return a policy run's label, or ``pi0 (incomplete)`` if planned trials have no verdict.
+
+        These ended in an error or were not played.
+        """
         label = self.frame.names[policy_run]
         for key, cell in self.cells.items():
             if key.policy_run == policy_run and not cell.counts.is_complete:

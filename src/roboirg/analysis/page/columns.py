@@ -46,9 +46,10 @@ class Filter(NamedTuple):
 
 
 def make_filters(episodes: PageEpisodes) -> dict[str, Filter]:
-    """Return the filters by name, in the order of the page.
+    """Return the page's filters of episodes by name, such as by task, setting and outcome.
 
-    Values are in the order of the benchmark; those that no episode has cannot be chosen.
+    Each has the values that can be chosen, in the order of the benchmark and only if some episode
+    has them, and the value of each episode.
     """
     records = episodes.records
     tasks = task_order({record.task for record in records})
@@ -89,7 +90,7 @@ def _filter(
     order: Iterable[str],
     groups: Mapping[str, str] | None = None,
 ) -> Filter:
-    """Return a filter by what is read of the records of episodes.
+    """Return a filter of episodes: the values that can be chosen, and the place of each episode's.
 
     Episodes with the outcomes success, error and success have, in the order success, failure,
     error, the values ``["success", "error"]`` and the column ``[0, 1, 0]``.
@@ -117,11 +118,11 @@ def _filter(
 
 
 def make_numbers(episodes: PageEpisodes) -> dict[str, Sequence[int | str]]:
-    """Return the columns that are no filters.
+    """Return the columns of the page's list of episodes that are no filters, such as its steps.
 
-    Episodes of the same scene have the same number in the column ``scene``. Those of them that can
-    be compared, because seed, options and conditions are the same too, have the same number in the
-    column ``pair``.
+    Episodes of the same scene have the same number in the column ``scene``. Those that can be
+    compared between policies, because seed, options and conditions are the same too, have the same
+    number in the column ``pair``.
     """
     fairness = operator.attrgetter(*(trait.path for trait in FAIRNESS))
     scenes = []
@@ -150,9 +151,9 @@ def setting_label(options: InstructionOptions) -> str:
 
 
 def _failure(record: Summary) -> str | None:
-    """Return the name of an episode's failure or error; None for a success.
+    """Return why an episode failed, such as ``wrong_object`` or ``timeout``; None for a success.
 
-    A name that this version does not have is not attributed.
+    Without a known cause, or if this version does not have its name, it is ``not attributed``.
     """
     if record.outcome == "success":
         return None

@@ -57,7 +57,7 @@ class EpisodeDetails:
     Attributes:
         folder: of the page; links lead from there.
         embeds: whether videos are part of the page.
-        gone: folders that will not be there when the page is read, so that nothing links to them.
+        temporary: folders that are deleted before the page is read, so that nothing links to them.
         links_videos: whether some are next to the page.
         strings: every text with its index, in order.
         words: for each episode, the texts that a search looks through.
@@ -66,14 +66,21 @@ class EpisodeDetails:
 
     folder: Path
     embeds: bool
-    gone: Sequence[Path] = ()
+    temporary: Sequence[Path] = ()
     links_videos: bool = False
     strings: dict[str, int] = field(default_factory=dict)
     words: list[list[int]] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
 
     def add(self, episode: PageEpisode, record: Record) -> None:
-        """Add an episode, given its whole record: what is searched, and its line of details."""
+        """Add an episode: the texts in which a search looks, and its details as a line of JSON.
+
+        Details include links to its video and log file, or a mark that the page holds the video.
+
+        Args:
+            episode: with the paths of its files.
+            record: its whole record.
+        """
         self.words.append(list(map(self._index, _searched_texts(record))))
         details = self.details_of(record)
         paths = {"film": episode.film, "poster": episode.poster, "log": episode.log}
@@ -84,8 +91,8 @@ class EpisodeDetails:
             if is_media and self.embeds:
                 details[name] = EMBEDDED
                 continue
-            is_gone = any(path.is_relative_to(folder) for folder in self.gone)
-            if not is_gone:
+            is_temporary = any(path.is_relative_to(folder) for folder in self.temporary)
+            if not is_temporary:
                 details[name] = quote(Path(os.path.relpath(path, self.folder)).as_posix())
                 self.links_videos |= is_media
         self.lines.append(msgspec.json.encode(details).decode())
@@ -104,7 +111,10 @@ class EpisodeDetails:
         return {name: value for name, value in details.items() if value not in (None, [])}
 
     def _of_instruction(self, record: Record) -> JsonObject:
-        """Return what was said, and what its words mean."""
+        """Return what a policy was asked to do: the turns, what their words mean, what was cut.
+
+        Texts are given by their index among those of the page.
+        """
         audit = record.prompt
         reached = None
         if audit is not None and record.prompt_verdict == "cut":
@@ -139,7 +149,7 @@ class EpisodeDetails:
         return {
             "goal": self._index(describe_goal(record.goal)),
             "slots": list(map(self._index, record.goal)),
-            "named": self._optional(_named(record)) if has_failed else None,
+            "named": self._optional(_goal_as_understood(record)) if has_failed else None,
             "cause": self._optional(record.cause),
             "attribution": self._attribution(record.attribution),
         }
@@ -156,7 +166,10 @@ class EpisodeDetails:
         ]
 
     def _of_course(self, record: Record) -> JsonObject:
-        """Return what happened: events, subgoals of a planner, and stages of the task."""
+        """Return what happened, by control steps: events, a planner's subgoals, stages of the task.
+
+        Texts are given by their index among those of the page.
+        """
         # The installed package knows the stages of its own environment version only.
         scene = _UNKNOWN_SCENE
         if record.environment_version == ENVIRONMENT_VERSION:
@@ -187,7 +200,7 @@ class EpisodeDetails:
 
 
 def _searched_texts(record: Record) -> list[str]:
-    """Return what a search looks through: the instruction, and why it failed."""
+    """Return the texts of an episode in which the page searches: instruction, cause of failure."""
     texts = [turn.text for turn in record.instruction]
     if record.cause:
         texts.append(record.cause)
@@ -197,13 +210,14 @@ def _searched_texts(record: Record) -> list[str]:
 
 
 def _resolved_words(record: Record) -> str | None:
-    """Return the instruction of a record with every reference resolved; see `_resolved_form`.
+    """Return the instruction of an episode with every reference replaced by what it means.
 
-    None for a record of other versions, whose words the installed package does not have.
+    None if it has no reference, or if it is of another version, whose words the installed package
+    does not have.
     """
     if other_versions(record):
         return None
-    # Of the job only what decides the words, which all policies and seeds share.
+    # Without policy and seed, so that all policies share a job, whose words are made only once.
     job = Job(
         policy="",
         task=record.task,
@@ -218,9 +232,9 @@ def _resolved_words(record: Record) -> str | None:
 
 @functools.lru_cache(maxsize=65_536)
 def _resolved_form(job: Job) -> str | None:
-    """Return the same instruction with every reference resolved.
+    """Return the instruction of a job with every reference replaced by what it means.
 
-    None if it has this form already, or if its task or wording file is no longer there.
+    None if the instruction has no reference, or if its task or wording file is no longer installed.
     """
     if job.setting == EXPLICIT or job.form == "resolved":
         return None
@@ -259,10 +273,10 @@ class _PlayedScene:
         return None
 
     def stages(self, record: Record) -> list[_PlayedStage]:
-        """Return the stages of the policy's turn.
+        """Return the stages of the task, each with the control step at which it was completed.
 
-        Steps before its turn, while a video was shown, are negative in records, but stages are
-        completed at steps that count from 0. So these are moved back and forth.
+        Steps count from the policy's turn; while a video is shown before it, they are negative.
+        `completed_stages` counts from 0, so the length of the video is added, and subtracted again.
         """
         if not record.events or self.episode is None:
             return []
@@ -292,7 +306,11 @@ _UNKNOWN_SCENE = _PlayedScene(None, {}, {})
 
 @functools.lru_cache(maxsize=4096)
 def _played_scene(task: str, split: str, number: int, arm: str) -> _PlayedScene:
-    """Return the scene of an episode; the unknown one if its task is no longer installed."""
+    """Return the scene in which an episode was played, with words for its objects.
+
+    Its facts are those that matter to the task: what its stages expect or forbid. An unknown scene
+    without facts if the task is no longer installed.
+    """
     try:
         episode = arm_episode(get_episode(task, split, number), arm)
     except RoboIRGError:
@@ -308,7 +326,7 @@ def event_text(event: EventRecord, names: Mapping[str, str]) -> str:
     """Return an event as what was done, in the past tense: ``picked up the red cube``.
 
     Args:
-        event: that a fact begins to hold, or ceases.
+        event: the beginning or the end of a fact, such as *the robot holds the cube*.
         names: words for the objects; others are called by their names.
     """
     traits = fact_traits(event.kind)
@@ -340,7 +358,7 @@ def _object_names(scene: Scene) -> Mapping[str, str]:
 
 
 def _subgoal_text(subgoal: SubgoalRecord) -> str:
-    """Return a subgoal and, in brackets, what was wrong with it and how it ended.
+    """Return a planner's subgoal and, in brackets, what was wrong with it and how it ended.
 
     For example ``pick up the red cube (wrong thing; due: pick up the blue cube)``.
     """
@@ -358,7 +376,7 @@ def _subgoal_text(subgoal: SubgoalRecord) -> str:
     return f"{subgoal.text} ({'; '.join(parts)})"
 
 
-def _named(record: Record) -> str | None:
+def _goal_as_understood(record: Record) -> str | None:
     """Return what a policy that failed took for the goal.
 
     That is the goal that a listener reports, or else a planner's last subgoal before the failure:
@@ -378,7 +396,7 @@ def _named(record: Record) -> str | None:
 
 
 def _prompt(record: Record) -> str | None:
-    """Return how many tokens the model reads, and what it missed; None if it read everything.
+    """Return how much of the prompt the policy's model did not read; None if it read everything.
 
     For example ``cut: needs 80 tokens, the model reads 48 (counted with gemma); 2 mentions lost, 1
     of them referring back``.
@@ -393,6 +411,7 @@ def _prompt(record: Record) -> str | None:
     needed = audit.needed_text
     text = f"{verdict}: needs {needed} tokens, the model reads {audit.limit} ({counted_by})"
     if audit.lost:
+        # Expressions that refer back, such as *it*; `lost` has numbers of the mentions not read.
         anaphors = sum(record.mentions[place].role == "anaphor" for place in audit.lost)
         mentions = counted(len(audit.lost), "mention")
         text += f"; {mentions} lost, {anaphors} of them referring back"
@@ -400,7 +419,10 @@ def _prompt(record: Record) -> str | None:
 
 
 def _conditions(record: Record) -> str:
-    """Return under which conditions an episode was played, and in which versions."""
+    """Return the conditions and versions of an episode as a phrase.
+
+    For example ``test split, at most 1300 steps, in own words; policy 2, language 5, …``.
+    """
     environment = record.environment
     parts = [
         f"{record.split} split",

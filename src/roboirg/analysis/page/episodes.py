@@ -60,7 +60,12 @@ class PageEpisodes:
 
     @classmethod
     def of(cls, runs: SourceByName, *, videos: bool) -> PageEpisodes:
-        """Gather and sort the episodes, with or without their videos."""
+        """Gather the episodes of the page's runs, sorted by policy, task and number.
+
+        Args:
+            runs: by name, one or two.
+            videos: whether to look for the episodes' videos.
+        """
         frames = []
         for name, source in _named(runs):
             frames.append(make_frame([(name, source.results)], source.planned, run_name=name))
@@ -92,7 +97,13 @@ def _named(runs: SourceByName) -> Iterator[tuple[str, Source]]:
 
 
 def _episodes(runs: SourceByName, frame: Frame, *, videos: bool) -> Iterator[PageEpisode]:
-    """Yield the episodes of a frame that were played, those of a scene one after the other."""
+    """Yield the episodes that were played, each with its video and log file if these exist.
+
+    Args:
+        runs: the runs by name.
+        frame: their results.
+        videos: whether to look for videos.
+    """
     sources = dict(_named(runs))
     names = list(sources)
     logs = {name: logged_slugs(source.folder) for name, source in sources.items()}
@@ -116,10 +127,10 @@ def _episodes(runs: SourceByName, frame: Frame, *, videos: bool) -> Iterator[Pag
 
 
 def _played_by_scene(frame: Frame) -> Iterator[tuple[PolicyRun, Summary]]:
-    """Yield policy run and result of each episode that was played, sorted.
+    """Yield policy run and result of each episode that was played, sorted by its number in a task.
 
-    Policy runs, and the tasks of each, stay in the order of the frame; episodes of a task are
-    sorted by number.
+    So the episodes of the same scene, in several settings, follow one another. Policy runs, and the
+    tasks of each, stay in the order of the frame.
     """
     groups: dict[tuple[PolicyRun, str], list[Summary]] = {}
     for policy_run, result in zip(frame["run"], frame["result"], strict=True):

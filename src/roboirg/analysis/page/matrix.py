@@ -23,10 +23,11 @@ from roboirg.stats.rates import interval_note, p_text, points, whole_percent
 
 
 def make_matrix(episodes: PageEpisodes) -> JsonObject:
-    """Return the heat maps as JSON values: columns, rows, and cells by policy, row and column.
+    """Return the page's heat maps of success by task and setting, one for each policy.
 
-    There is one set of cells for all episodes and, if there are several difficulties, one for
-    each. Missing episodes have no difficulty yet; they count among all episodes only.
+    They are JSON values, and have common rows and columns. There is one set of cells for all
+    episodes and, if there are several difficulties of scenes, one for each. Missing episodes have
+    no difficulty yet; they count among all episodes only.
     """
     data = episodes.data
     columns = sorted({key.options for key in data.cells}, key=options_sort_key)
@@ -44,7 +45,10 @@ def make_matrix(episodes: PageEpisodes) -> JsonObject:
 
 
 def _summaries_by_level(episodes: PageEpisodes) -> dict[str, Summaries]:
-    """Return what was measured of all episodes, by an empty text, and of each difficulty."""
+    """Return success by the difficulty of scenes; under an empty text, that of all episodes.
+
+    If all episodes have the same difficulty, there is only the latter.
+    """
     data = episodes.data
     summaries = {"": data.summaries}
     occurring = {record.difficulty for record in episodes.records}
@@ -68,7 +72,14 @@ def _cells(
     columns: Sequence[InstructionOptions],
     rows: Sequence[str],
 ) -> list[JsonObject]:
-    """Return the cells of the heat maps, each with the numbers of its policy, row and column."""
+    """Return the cells of all heat maps; ``at`` has the numbers of policy, row and column.
+
+    Args:
+        episodes: of the page, with the labels of the policies.
+        summaries: success by policy run, scope (a task, a suite or all tasks) and options.
+        columns: the options of each column.
+        rows: the scope of each row.
+    """
     policies = list(episodes.names)
     cells = []
     for key, summary in summaries.items():
@@ -82,10 +93,11 @@ def _cells(
 
 
 def _rows(cells: Cells) -> dict[str, JsonObject]:
-    """Return the rows of every heat map by scope, each with its task or suite.
+    """Return the rows of every heat map by what they average: all tasks, a suite, or one task.
 
-    They are all tasks, then each suite with its tasks below it. What would only repeat one task,
-    or all tasks, is left out.
+    They are all tasks, then each suite with its tasks below it, such as
+    ``{"StopCube": {"task": "StopCube", "suite": None}}``. An average of a single task is left out,
+    and that of a suite if it has all tasks.
     """
     tasks = task_order({key.task for key in cells})
     suites: dict[str | None, list[str]] = {}
@@ -103,7 +115,14 @@ def _rows(cells: Cells) -> dict[str, JsonObject]:
 
 
 def _cell(summary: ScopeSummary, subject: str) -> JsonObject:
-    """Return what a cell shows; what is not known is left out."""
+    """Return what a cell of a heat map shows: success, gap to explicit, incomplete trials, a note.
+
+    Explicit is the setting that names the goal. What is not known is left out.
+
+    Args:
+        summary: success, 0 to 1, in a task, suite or all tasks with some options.
+        subject: policy and scope in words, for the note.
+    """
     cell: JsonObject = {"note": notes(summary, subject)}
     if summary.rate is not None:
         cell["rate"] = round(float(summary.rate), 4)
@@ -124,7 +143,7 @@ def _cell(summary: ScopeSummary, subject: str) -> JsonObject:
 
 
 def notes(summary: ScopeSummary, subject: str) -> list[str]:
-    """Return a cell in words, a line for each fact: first its subject, then its results.
+    """Return the sentences that explain a cell of a heat map: success, gaps, incomplete trials.
 
     For example ``pi0, PickXtimes, ordinal``, ``62 % success: 31 of 50 trials, 50 episodes``, …
     """
@@ -156,9 +175,11 @@ def _interval_note(interval: Interval | None) -> str:
 
 
 def _gap_notes(summary: ScopeSummary) -> list[str]:
-    """Return the gaps to explicit and to the resolved form in words.
+    """Return how success differs from that in explicit words, and in resolved ones, as sentences.
 
-    The one to explicit is tested only if there is a success to lose, that is a retention.
+    Explicit instructions name the goal; resolved ones say the same with each reference replaced by
+    what it means. The gap to explicit is tested only if explicit has a success to lose, that is, if
+    there is a retention, the share of it that is kept.
     """
     lines: list[str] = []
     gap = summary.gap

@@ -27,7 +27,7 @@ def run_server(folder: Path, port: int = 0) -> AppServer:
 
 
 def _refuse(request: Request) -> Response | None:
-    """Return the response to a request that comes from a page of another site."""
+    """Return an error response to a request from another site's page; None for our own pages."""
     hosts = request.headers.getlist("host")
     origins = request.headers.getlist("origin")
     if is_own_request(hosts, origins, LOOPBACK_NAMES):

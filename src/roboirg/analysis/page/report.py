@@ -68,7 +68,9 @@ def write_report(
     served: bool = False,
     progress: Progress | None = None,
 ) -> Path:
-    """Write the page of a run atomically and return its path.
+    """Write the report of a run as an HTML page and return its path.
+
+    The file appears whole or not at all.
 
     Args:
         source: the run.
@@ -103,11 +105,15 @@ def _details(folder: Path, episodes: PageEpisodes, sources: Iterable[Source]) ->
     """Return the details for a page in a folder; videos are in the page unless they are large."""
     size = sum(media.stat().st_size for media in _media(episodes).values())
     unpacked = [run.unpacked for run in sources if run.unpacked is not None]
-    return EpisodeDetails(folder, embeds=size <= MAX_EMBEDDED_BYTES, gone=unpacked)
+    return EpisodeDetails(folder, embeds=size <= MAX_EMBEDDED_BYTES, temporary=unpacked)
 
 
 def _by_name(sources: Sequence[Source]) -> dict[str, Source]:
-    """Return runs by their names, or by their paths if names are equal."""
+    """Return the runs of a page by their names, or by their paths if their names are equal.
+
+    Raises:
+        InvalidValueError: the same run is given twice.
+    """
     runs = {source.name: source for source in sources}
     if len(runs) < len(sources):
         runs = {str(source.path): source for source in sources}
@@ -117,7 +123,11 @@ def _by_name(sources: Sequence[Source]) -> dict[str, Source]:
 
 
 def _usual_path(source: Source) -> Path:
-    """Return where the page goes: into the run's folder, or next to its pack."""
+    """Return the file of a page whose place was not chosen.
+
+    It is ``report.html`` in the run's folder, ``report-POLICY.html`` if the page is of one policy,
+    or next to the file of a packed run.
+    """
     if source.unpacked:
         return source.path.with_name(f"{source.path.name.removesuffix(PACK_SUFFIX)}.html")
     name = "-".join(("report", *(source.policies or ())))
@@ -128,11 +138,11 @@ def _usual_path(source: Source) -> Path:
 def _render(
     episodes: PageEpisodes, details: EpisodeDetails, progress: Progress | None
 ) -> Iterator[str]:
-    """Return the page in pieces, because a large one takes much memory.
+    """Return the HTML of the page in pieces, because a large one takes much memory.
 
     Args:
         episodes: of the page.
-        details: empty ones, to which the episodes' are added.
+        details: collects what the page shows of single episodes; empty at first.
         progress: called after each episode.
     """
     template = template_environment("roboirg.analysis.page").get_template(f"{REPORT_FILE}.j2")
@@ -165,7 +175,10 @@ def _embedded(episodes: PageEpisodes) -> Iterator[tuple[str, str]]:
 
 
 def _media(episodes: PageEpisodes) -> dict[str, Path]:
-    """Return the files of all videos by the names that the page's script knows them by."""
+    """Return the files of all videos, and of the pictures shown before they are played.
+
+    By the names that the page's script has for them: ``film-KEY`` and ``poster-KEY``.
+    """
     media = {}
     for episode in episodes.all:
         if episode.film is not None:
@@ -178,7 +191,10 @@ def _media(episodes: PageEpisodes) -> dict[str, Path]:
 def _add_all(
     details: EpisodeDetails, episodes: PageEpisodes, progress: Progress | None
 ) -> Iterator[Record]:
-    """Add the details of all episodes, and yield their whole records, each read once."""
+    """Yield the whole records of all episodes, and add each one's details in passing.
+
+    So each record is read from the disk only once.
+    """
     pairs = zip(episodes.all, episodes.whole(), strict=True)
     for done, (episode, record) in enumerate(pairs, 1):
         details.add(episode, record)
@@ -188,7 +204,10 @@ def _add_all(
 
 
 def _data(episodes: PageEpisodes, details: EpisodeDetails) -> JsonObject:
-    """Return what the page's script reads before an episode is opened."""
+    """Return what the page's script needs for its tables, filters and search, as a JSON object.
+
+    Details of an episode, which are read when it is opened, are not part of it.
+    """
     choices = []
     columns = dict(make_numbers(episodes))
     for name, page_filter in make_filters(episodes).items():
@@ -212,9 +231,9 @@ def _data(episodes: PageEpisodes, details: EpisodeDetails) -> JsonObject:
 
 
 def _first_sides(policies: Sequence[str]) -> list[int]:
-    """Return the places of the two policies that are compared at first.
+    """Return the numbers of the two policies that the page compares when it is opened.
 
-    A policy is compared with itself in the other run, or else with the next one.
+    They are the first policy and the same one in the other run, or else the next policy.
     """
     for place, policy in enumerate(policies):
         if place > 0 and policy == policies[0]:

@@ -48,7 +48,11 @@ class Notice(NamedTuple):
 
 
 def run_warnings(episodes: PageEpisodes) -> list[Notice]:
-    """Return what is incomplete, failed, mixed, or cannot be compared."""
+    """Return the sentences at the head of the page: warnings, and then notes.
+
+    Warnings are about missing episodes, errors, mixed versions and cut prompts; notes about missing
+    references, private splits and the headline number.
+    """
     warnings = list(_incomplete(episodes))
     warnings += mixtures(episodes.records)
     warnings += heard_notes(episodes.data.frame, episodes.names)
@@ -68,7 +72,10 @@ class LabeledFact(NamedTuple):
 
 
 def facts_of(episodes: PageEpisodes) -> list[LabeledFact]:
-    """Return the facts in the head of the page; those that no record has are left out."""
+    """Return the facts of the run at the head of the page, such as its versions.
+
+    A fact has the distinct values of all records; those that no record has are left out.
+    """
     records = episodes.records
     times = [record.started_at for record in records]
     facts = [
@@ -92,9 +99,10 @@ def _minute(time: str) -> str:
 
 
 def comparisons(episodes: PageEpisodes) -> list[JsonObject]:
-    """Return the comparison of the first pairs of policies in words, if both had the same arm.
+    """Return comparisons of two policies in sentences, with the policies' numbers left and right.
 
-    ``left`` and ``right`` are the numbers of the two policies.
+    There are at most `MAX_COMPARISONS`. A policy with its own words is not compared with a control
+    arm, which has others.
     """
     found: list[JsonObject] = []
     for (left, first), (right, second) in combinations(enumerate(episodes.names), 2):
@@ -116,7 +124,7 @@ def _compared(episodes: PageEpisodes, first: PolicyRun, second: PolicyRun) -> li
 
 
 def _incomplete(episodes: PageEpisodes) -> Iterable[str]:
-    """Yield how many planned episodes were not played, and how many ended in an error."""
+    """Yield sentences on planned episodes that were not played, and on those with an error."""
     missing = list(episodes.data.frame["outcome"]).count(MISSING)
     total = len(episodes.all)
     if missing:
@@ -138,7 +146,7 @@ def _incomplete(episodes: PageEpisodes) -> Iterable[str]:
 
 
 def _without_reference(episodes: PageEpisodes) -> Iterable[str]:
-    """Yield what the results cannot be compared with: chance, or explicit."""
+    """Yield sentences on missing references: a policy that guesses, and explicit instructions."""
     if len(episodes.names) == 1:
         yield (
             "Only one policy: without the forgetful listener’s results next to it, a rate does not "
@@ -149,7 +157,7 @@ def _without_reference(episodes: PageEpisodes) -> Iterable[str]:
 
 
 def _private(episodes: PageEpisodes) -> Iterable[str]:
-    """Yield which splits are private, if their secret is not known here."""
+    """Yield a sentence for each private split of episodes whose secret salt is not known here."""
     for split in sorted({episode.record.split for episode in episodes.all}):
         try:
             check_salt(split)
@@ -161,9 +169,12 @@ def _private(episodes: PageEpisodes) -> Iterable[str]:
 
 
 def _period(first: str, last: str) -> str:
-    """Return a period such as ``2026-01-02 03:04 to 03:09 UTC``; names the day once if equal."""
+    """Return the period between two times: ``2026-01-02 03:04 to 03:09 UTC``.
+
+    The day stands once if both are on the same one. Times are texts such as ``2026-01-02 03:04``.
+    """
     if first == last:
         return f"{first} UTC"
-    day, _, minute = last.partition(" ")
+    day, _, clock_time = last.partition(" ")
     is_same_day = first.startswith(day)
-    return f"{first} to {minute if is_same_day else last} UTC"
+    return f"{first} to {clock_time if is_same_day else last} UTC"

@@ -77,7 +77,7 @@ def _field(name: str, kind: str, meaning: str, missing: str = "", path: str = ""
 
 
 def _attributed(name: str) -> Callable[[Summary], str | None]:
-    """Return what reads a field of the attribution of a failure."""
+    """Return a function that reads one field of why an episode failed; None if it did not fail."""
 
     def read(result: Summary) -> str | None:
         if result.attribution is None:
@@ -198,7 +198,10 @@ class Frame(Mapping[str, Any]):
         return self.columns[name]
 
     def _read(self, name: str) -> Values:
-        """Return the values of one of `COLUMNS`; an episode that was not played has none."""
+        """Return the column of one of `COLUMNS`, read from each episode's result.
+
+        An episode that was not played has None.
+        """
         if name == "policy_label":
             return as_column([self.names[policy_run] for policy_run in self["run"]])
         read = COLUMNS[name].read
@@ -229,7 +232,10 @@ class Frame(Mapping[str, Any]):
         return self.take(chosen)
 
     def spread(self, name: str, values: Iterable[Sequence[object]]) -> Frame:
-        """Return the frame with a new column and each row once for each of its values.
+        """Repeat each row once for each of its values, which go into a new column.
+
+        The values ``[["a", "b"], [], ["c"]]`` of three rows make three rows: the first one twice,
+        with ``a`` and ``b``, and the last one with ``c``.
 
         Args:
             name: of the new column.
@@ -247,11 +253,14 @@ class Frame(Mapping[str, Any]):
         """Return the frame with further columns."""
         return Frame({**self.columns, **columns})
 
-    def told(self) -> Frame:
-        """Return the frame without control arms, if there is anything else."""
-        is_told = self["arm"] == TOLD
-        has_both = is_told.any() and not is_told.all()
-        return self.take(is_told) if has_both else self
+    def without_control_arms(self) -> Frame:
+        """Return only the episodes with their own words; if there are none, the frame as it is.
+
+        The others are control arms: the same scenes with other words, or with none.
+        """
+        has_own_words = self["arm"] == TOLD
+        has_both = has_own_words.any() and not has_own_words.all()
+        return self.take(has_own_words) if has_both else self
 
     @property
     def played(self) -> list[Summary]:
@@ -284,7 +293,7 @@ def as_column(values: Sequence[object]) -> Values:
 
 
 def join(frames: Iterable[Frame]) -> Frame:
-    """Return the rows of one frame after the other."""
+    """Join tables of results: the rows of one frame after those of the other, column by column."""
     parts = list(frames)
     columns = {}
     for name in parts[0].columns:
@@ -293,9 +302,11 @@ def join(frames: Iterable[Frame]) -> Frame:
 
 
 def make_frame(runs: Runs, planned: Sequence[Job] = (), *, run_name: str = "") -> Frame:
-    """Return the results of one or several runs, sorted by policy run, task, options and episode.
+    """Return the results of one or several runs as a table, a row for each episode.
 
-    Policies are in the order of the planned jobs; others follow by name.
+    Rows are sorted by policy run, task, options and episode. A policy run is a policy under one set
+    of conditions and versions. Policies stay in the order of the planned jobs; others follow by
+    name.
 
     Args:
         runs: the results of a run have different identities. Runs that hold the same episodes of a
@@ -326,7 +337,13 @@ def _missing_rows(
 ) -> list[_FrameRow]:
     """Return a row for each planned job without a result.
 
-    It belongs to the first policy run that has played with its policy and conditions, if any has.
+    Its versions are unknown, so it counts to the first policy run that has played with its policy
+    and conditions, or to a policy run without versions if none has.
+
+    Args:
+        jobs: without a result.
+        played: the rows with one.
+        run_name: the name of the run, for policy runs that have not played anything.
     """
     first_runs: dict[tuple[str, EvalConditions], PolicyRun] = {}
     for row in played:
@@ -365,9 +382,10 @@ class _Groups(NamedTuple):
 
 
 def _sorted(rows: Sequence[_FrameRow], policies: Sequence[str]) -> Frame:
-    """Return rows as a frame, by policy run, task, options, episode and policy seed.
+    """Sort rows by policy run, task, options, episode and policy seed; return them as a frame.
 
-    Episodes end in any order, but the bootstrap draws for one group after the other.
+    The order must not depend on which episode ended first: random numbers of the bootstrap are
+    drawn for one group of rows after the other.
 
     Args:
         rows: in any order.
@@ -378,7 +396,7 @@ def _sorted(rows: Sequence[_FrameRow], policies: Sequence[str]) -> Frame:
     tasks = _Groups.of([job.task for job in jobs], _task_key)
     options = _Groups.of([job.column for job in jobs], options_sort_key)
     groups = zip(runs.numbers, tasks.numbers, options.numbers, strict=True)
-    order = _order(groups, jobs)
+    order = _order(groups, jobs)  # numbers of the given rows
 
     columns = _columns_of([rows[row] for row in order])
     columns["place"] = np.array(order, dtype=np.int64)
@@ -396,9 +414,10 @@ def _order(groups: Iterable[tuple[int, ...]], jobs: Sequence[Job]) -> list[int]:
 
 
 def _columns_of(rows: Sequence[_FrameRow]) -> dict[str, Values]:
-    """Return the columns that an episode has also if it was not played: those of its job.
+    """Return the columns that every row has, whether its episode was played or not.
 
-    Next to them, each has its result (or job) and its outcome.
+    They are what the episode's job says, such as task and setting, the outcome, and the result; in
+    the column ``result`` the planned job stands for one that is missing.
     """
     jobs = [row.job for row in rows]
     columns = {
@@ -426,7 +445,10 @@ def _task_key(name: str) -> tuple[int, str]:
 
 
 def _played_twice(runs: Runs) -> set[str]:
-    """Return the policies of which several runs hold the same episode."""
+    """Return the names of policies that played the same episode in several of the runs.
+
+    The same means equal in all that identifies an episode: task, words, policy seed, conditions.
+    """
     twice: set[str] = set()
     if len(runs) == 1:
         return twice

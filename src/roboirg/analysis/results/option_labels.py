@@ -29,9 +29,9 @@ REFERENCE_OPTIONS = InstructionOptions(EXPLICIT)
 
 
 def options_label(options: InstructionOptions) -> str:
-    """Return the setting and, in brackets, the options that differ from the defaults.
+    """Return how instruction options are printed: ``relational (resolved, 2 distractors)``.
 
-    For example ``relational`` or ``relational (resolved, 2 distractors)``.
+    In brackets behind the setting are the options that differ from their defaults.
     """
     phrases = []
     for name, value in asdict(options).items():

@@ -41,7 +41,7 @@ class EvalConditions(NamedTuple):
         return cls._make(_read_conditions(job))
 
     def text(self, name: str) -> str:
-        """Return the value of one of `CONDITIONS` in words."""
+        """Return the value of a condition as it is printed, such as ``900`` of ``max_steps``."""
         if name == "wordings":
             return words_label(self.wordings)
         if name in ENVIRONMENT_OPTIONS:
@@ -119,9 +119,13 @@ def labels(policy_runs: Iterable[PolicyRun]) -> dict[PolicyRun, str]:
 
 
 def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:
-    """Return the policy's name and, after commas, each condition and version that varies.
+    """Return a label that sets a policy run apart from others: ``listener, max steps 900``.
 
-    For example ``listener, max steps 900``.
+    After the policy's name come the conditions and versions in which it differs from others.
+
+    Args:
+        policy_run: a policy under some conditions, in some versions.
+        policy_runs: all that are labeled together.
     """
     parts = [policy_run.policy]
     for name in CONDITIONS:
@@ -137,7 +141,7 @@ def _label(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> str:
 
 
 def _version_labels(policy_run: PolicyRun, policy_runs: Sequence[PolicyRun]) -> list[str]:
-    """Return what a policy is and its versions, as far as it differs from others in them.
+    """Return phrases for the versions in which a policy run differs from others.
 
     For example ``["language 5"]`` if another policy run heard the language's version 4.
     """

@@ -95,7 +95,13 @@ def record_columns() -> Mapping[str, FrameColumn]:
 
 @paused_collection()
 def read_frame(sources: Sequence[Source], *, words: bool = False) -> Frame:
-    """Return the results of runs and what is missing in them, with `record_columns` if wanted."""
+    """Return the results of runs as a table, with a row for each missing episode, too.
+
+    Args:
+        sources: the runs.
+        words: whether to add columns on the words of instructions, for which the whole records are
+            read.
+    """
     runs = [(str(source.path), source.results) for source in sources]
     planned: list[Job] = []
     for source in sources:
@@ -124,6 +130,7 @@ def with_columns(
         reads: returns the value of a record, by the name of the column.
     """
     results = frame["result"]
+    # A result and its record have the same key; several rows may have the same result.
     rows_by_play: dict[object, list[int]] = {}
     for row, result in enumerate(results):
         rows_by_play.setdefault(_play_key(result), []).append(row)

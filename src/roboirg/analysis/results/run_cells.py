@@ -23,7 +23,7 @@ Cells = Mapping[CellKey, Cell]
 
 
 def cells_of(frame: Columns) -> Cells:
-    """Return the cells of a frame, in its order."""
+    """Gather the trials of each policy run in each task with each set of options, as one cell."""
     cells = {}
     for values, by_task in gather(frame, ("run", "task", "options")).items():
         key = CellKey(*values)

@@ -60,7 +60,7 @@ class Source:
 
     @cached_property
     def results(self) -> tuple[Summary, ...]:
-        """The newest result of each episode, in the order of the file.
+        """The newest result of each episode, in the order of the file; only of wanted policies.
 
         Raises:
             StoreError: there are none, or a line is not a record of this schema version.
@@ -96,7 +96,9 @@ class Source:
 def opened_sources(
     paths: Iterable[str | Path], folders: Collection[str] = ()
 ) -> Iterator[list[Source]]:
-    """Open folders and packs, each once, even if several of its policies are named.
+    """Open the folders and packed files of runs, each once even if it is named several times.
+
+    A pack is unpacked into a temporary folder until the block ends.
 
     Args:
         paths: of folders and packs; ``PATH:policy`` for one policy, whose name may contain colons.
@@ -122,7 +124,7 @@ def opened_sources(
 
 
 def _parsed(text: str) -> Source:
-    """Return the run of a text such as ``runs/first``, or its policy of ``runs/first:listener``."""
+    """Return the run that a text names: ``runs/first``, or one policy of it: ``runs/first:pi0``."""
     run_folder(text)  # refuses what can be no path
     path = text
     # A path may contain colons, too: the longest one that exists is meant.

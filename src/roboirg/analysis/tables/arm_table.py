@@ -42,7 +42,9 @@ _NOTE = (
 
 
 def make_arm_table(data: RunData) -> Table:
-    """Make the table, one row for each figure of a policy in a setting.
+    """Make the table of what control arms show, a row for each figure of a policy in a setting.
+
+    A control arm plays the same scenes with other words; a figure is the gap between two arms.
 
     Raises:
         InvalidValueError: the runs have no control arms.
@@ -52,8 +54,10 @@ def make_arm_table(data: RunData) -> Table:
         raise InvalidValueError(
             "The runs have no control arms; play them with --arms told,other-goal,silent,scrambled."
         )
-    # As in other tables where these name a policy run, which they do if it was given its commands.
-    names = {**labels(figure.key.run for figure in figures), **data.told.frame.names}
+    # Labels as in other tables, which leave out control arms; a policy that played arms alone is in
+    # none of these.
+    own_names = data.without_control_arms.frame.names
+    names = {**labels(figure.key.run for figure in figures), **own_names}
     rows = []
     for figure in figures:
         key = figure.key
@@ -74,8 +78,9 @@ def make_arm_table(data: RunData) -> Table:
 
 
 def language_use_sentences(first: Frame, second: Frame, names: tuple[str, str]) -> Iterator[str]:
-    """Yield how the language use of two policies differs, a sentence for each setting.
+    """Yield a sentence for each setting on which of two policies follows words to the goal more.
 
+    Language use is the share of scenes in which a policy reached each of two goals when stated.
     P-values are corrected over the settings.
 
     Args:
@@ -101,7 +106,10 @@ def language_use_sentences(first: Frame, second: Frame, names: tuple[str, str]) 
 
 
 def _language_use(frame: Frame) -> dict[tuple[InstructionOptions], ByTask]:
-    """Return the results of the figure of language use by instruction options."""
+    """Return, by instruction options, in which scenes a policy reached each of two goals.
+
+    As cells by task: a success is a scene in which it reached each goal when stated.
+    """
     results = {}
     for figure in arm_figures(frame):
         if figure.key.contrast.name == LANGUAGE_USE:
@@ -110,7 +118,10 @@ def _language_use(frame: Frame) -> dict[tuple[InstructionOptions], ByTask]:
 
 
 def _words(figure: ArmFigure) -> Sequence[str]:
-    """Return the cells of a row; only the figure of what words are worth has a chance level."""
+    """Return the cells of a row: episodes, the two rates, the chance level, and their difference.
+
+    Only the figure of what words are worth, success with them and without, has a chance level.
+    """
     chance = NOT_APPLICABLE
     if figure.key.contrast.name == WORDS_WORTH:
         chance = _chance_text(figure)
@@ -127,9 +138,10 @@ def _words(figure: ArmFigure) -> Sequence[str]:
 
 
 def _chance_text(figure: ArmFigure) -> str:
-    """Return the chance level without words on the scenes of a figure, such as ``33.3``.
+    """Return the success, in percent, to expect of pursuing a random goal without words: ``33.3``.
 
-    It is the mean over tasks, in percent.
+    It is over the scenes that were played in silence, the figure's second rate, and the mean over
+    tasks.
     """
     split = figure.key.run.conditions.split
     chances = []

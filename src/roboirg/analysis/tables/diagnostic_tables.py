@@ -116,9 +116,10 @@ _HEARD_NOTE = (
 
 
 def make_forms_table(data: RunData) -> Table:
-    """Make the table of implicit against resolved forms, by policy run, suite and setting.
+    """Make the table that compares implicit instructions with the same in resolved words.
 
-    Of a policy run, the rows over all tasks come last, if there are several suites.
+    The resolved form names what the implicit one only refers to. There is a row for each policy
+    run, suite of tasks and setting; those over all tasks come last, if there are several suites.
 
     Raises:
         InvalidValueError: no episode was played in both forms.
@@ -159,9 +160,10 @@ def make_forms_table(data: RunData) -> Table:
 
 
 def _implicit_averages(data: RunData) -> Sequence[ScopeSummary]:
-    """Return the averages over suites, and over all tasks, in each setting's implicit form.
+    """Return success in implicit instructions, with its gap to their resolved form.
 
-    Their gap is the one to the resolved form. They are sorted by policy run, suite and setting.
+    The resolved form names what the implicit one only refers to. All are averages over a suite or
+    over all tasks, sorted by policy run, suite and setting.
     """
     suites = {suite(key.task) for key in data.cells}
     suites.discard(None)  # of tasks that are in no suite
@@ -172,6 +174,7 @@ def _implicit_averages(data: RunData) -> Sequence[ScopeSummary]:
             continue
         if key.scope == ALL_TASKS and len(suites) <= 1:
             continue  # it would only repeat the suite
+        # The first gap is to explicit, the second one to the resolved form.
         averages.append(replace(summary, gap=summary.second_gap))
 
     runs = list(data.frame.names)
@@ -213,7 +216,9 @@ def occurring_failures(counts: Iterable[Counter[str]]) -> list[str]:
 
 
 def make_failure_table(data: RunData, *, means: bool = False) -> Table:
-    """Make the table of how all episodes ended, and of what the gap to explicit consists.
+    """Make the table of the rates of success and of each kind of failure, by task and setting.
+
+    Next to these are their changes from explicit instructions, which name the goal.
 
     Args:
         data: of the runs.
@@ -251,12 +256,15 @@ def make_failure_table(data: RunData, *, means: bool = False) -> Table:
 def _end_cells(rates: EndRates) -> RowCells:
     """Return the cells of a row of the table of failures.
 
-    They are the counts, the rates of success and of each kind of failure, by how much explicit
-    words change these, and the share of grounding failures, here and in explicit words.
+    They are the numbers of trials and failures, the rates of success and of each kind of failure,
+    their gaps to explicit, and the share of grounding among the failures, here and in explicit.
+
+    Args:
+        rates: success, and the failures of grounding, of execution, and undecided ones.
     """
     success, *kinds = rates
     own_results = []
-    explicit_results = []
+    explicit_results = []  # of the same tasks
     for kind in kinds:
         own_results.append(kind.cells)
         explicit = kind.others
@@ -290,7 +298,9 @@ def _share_text(share: ShareBounds | None) -> str:
 
 
 def make_failure_name_table(data: RunData) -> Table:
-    """Make the table of the numbers of failures by name, task and setting.
+    """Make the table of how often episodes failed in which way, such as by the wrong object.
+
+    It has a row for each task in each setting of a policy, and a column for each failure.
 
     Raises:
         InvalidValueError: no episode failed.
@@ -302,7 +312,7 @@ def make_failure_name_table(data: RunData) -> Table:
 
     cells = {}
     for key, counts in counts_by_scope.items():
-        failed = [counts[name] for name in names]
+        failed = [counts[name] for name in names]  # in the order of the columns
         cells[key] = list(map(str, (counts["trials"], sum(failed), *failed)))
     failure_columns = [Column(name.replace("_", " "), FAILURE_KINDS[name]) for name in names]
     return Table(
@@ -316,7 +326,7 @@ def make_failure_name_table(data: RunData) -> Table:
 
 
 def _failures_by_scope(data: RunData) -> dict[ScopeKey, Counter[str]]:
-    """Count failures by name in each task and in all tasks."""
+    """Count failures by name, for each policy run and options: in each task and in all tasks."""
     # Each episode counts twice: for its task, and for all tasks.
     frame = data.frame.spread("scope", [(task, ALL_TASKS) for task in data.frame["task"]])
     counts = count_failures(frame, ("run", "scope", "options"))
@@ -324,7 +334,10 @@ def _failures_by_scope(data: RunData) -> dict[ScopeKey, Counter[str]]:
 
 
 def make_heard_table(data: RunData) -> Table:
-    """Make the table of cut prompts and of success over the episodes that were heard whole.
+    """Make the table of prompts that were longer than the policy's model reads.
+
+    Its end, with the command, is then cut off. Success is given over all episodes and over those
+    that were heard, that is, whose prompt was read whole.
 
     Raises:
         InvalidValueError: no policy declares how many tokens it reads.
@@ -359,7 +372,16 @@ def make_heard_table(data: RunData) -> Table:
 def _heard_cells(
     counts_of_tasks: Sequence[HeardCounts], of_all: ScopeSummary, of_heard: ScopeSummary
 ) -> RowCells:
-    """Return the cells of a row: its prompts by task, and its rates over all and over the heard."""
+    """Return the cells of a row of the table of cut prompts.
+
+    They are the number of episodes, the share of cut prompts, success over all episodes, the number
+    of trials whose prompt was read whole (heard), and success over these.
+
+    Args:
+        counts_of_tasks: numbers of episodes and of cut prompts of each task.
+        of_all: success over all episodes.
+        of_heard: success over those with a whole prompt.
+    """
     episodes = sum(counts["episodes"] for counts in counts_of_tasks)
     return (
         str(episodes),
@@ -371,9 +393,9 @@ def _heard_cells(
 
 
 def _rows(cells: Mapping[ScopeKey, RowCells], frame: Frame) -> list[Row]:
-    """Return the rows of a table, with a group for each policy run and its options.
+    """Return the rows of a table: for each policy run and options, its tasks and then all tasks.
 
-    The row of all tasks is the last of its group; it is left out if there is only one task.
+    The row of all tasks is left out if there is only one task, which it would repeat.
 
     Args:
         cells: of each row.
@@ -395,7 +417,14 @@ def _rows(cells: Mapping[ScopeKey, RowCells], frame: Frame) -> list[Row]:
 
 
 def make_breakdown_table(breakdown: Breakdown, frame: Frame) -> Table:
-    """Make the table of gaps to explicit, broken down by a column that the frame has."""
+    """Make the table of success by kinds of instructions, for example by difficulty.
+
+    Each kind has its gap to explicit instructions, which name the goal, on the same episodes.
+
+    Args:
+        breakdown: the column of the frame with the kinds, and its headings.
+        frame: the results.
+    """
     rows = []
     lacks_gap = False
     for measured in break_down(frame, breakdown):

@@ -93,7 +93,11 @@ class _FactSheet:
 
 
 def make_facts_table(data: RunData) -> Table:
-    """Make the table from the whole records of the runs of `data`."""
+    """Make the table of what a paper's methods section needs to name: versions, seeds, devices.
+
+    Its first rows are about the run, then come those about each policy. What needs more than
+    results, such as numbers of steps, is read from the whole records.
+    """
     results = data.frame.played
     run = _FactSheet()
     run.add(_run_conditions(results))
@@ -127,7 +131,11 @@ def _last_played(records: Iterable[Record], results: Iterable[Summary]) -> Itera
 
 
 def _of_calls(calls: Counter[str]) -> Facts:
-    """Yield how many steps a policy's calls are for."""
+    """Yield facts on how often a policy was called, and how many actions of a call were executed.
+
+    Args:
+        calls: numbers of control ``steps`` and ``calls``, and the most actions ``executed``.
+    """
     steps_per_call = None
     if calls["calls"]:
         steps_per_call = f"{calls['steps'] / calls['calls']:.1f}"
@@ -136,7 +144,10 @@ def _of_calls(calls: Counter[str]) -> Facts:
 
 
 def _run_conditions(results: Sequence[Summary]) -> Facts:
-    """Yield under which conditions and in which settings the run was played."""
+    """Yield the facts that all policies share, each with the values of all results.
+
+    They are versions, conditions such as the step limit, and settings of instructions.
+    """
     for name, field in _OF_RUN.items():
         yield name, map(operator.attrgetter(field), results)
     step_limits = [result.environment.max_steps for result in results]
@@ -148,7 +159,10 @@ def _run_conditions(results: Sequence[Summary]) -> Facts:
 
 
 def _run_counts(results: Sequence[Summary], data: RunData) -> Facts:
-    """Yield which episodes and seeds were played, and how many trials ended in which way."""
+    """Yield facts that count: episodes, policy seeds, and trials that were played, failed, missing.
+
+    A trial is an episode with a policy seed.
+    """
     episodes = {result.episode for result in results}
     yield "episodes", [f"{len(episodes)}, from {min(episodes)} to {max(episodes)}"]
     yield "policy seeds", sorted({result.policy_seed for result in results})
@@ -162,7 +176,10 @@ def _run_counts(results: Sequence[Summary], data: RunData) -> Facts:
 
 
 def _of_policy(record: Record) -> Facts:
-    """Yield the facts of a policy that a record of it has."""
+    """Yield what the record of an episode holds about its policy: version, needs, declarations.
+
+    What it does not hold is None, which the table prints as *not reported*.
+    """
     version = record.server_version or record.policy_version
     yield "version", [_unless_unknown(version)]
     yield "reads the simulator's state", [record.privileged]
@@ -181,9 +198,10 @@ def _unless_unknown(word: str) -> str | None:
 
 
 def _declared(record: Record) -> dict[str, object]:
-    """Return what a policy declares of itself, and otherwise what was measured of its process.
+    """Return what is known of a policy's software, by the keys of its metadata, such as ``dtype``.
 
-    What has no value, because there is no network, says that it is not applicable.
+    It is what the policy declares, or else what was measured of the process in which it played.
+    Keys that only networks have are *not applicable* to a policy without a network.
     """
     metadata = _metadata(record)
     declared: dict[str, object] = {}
@@ -205,21 +223,22 @@ def _declared(record: Record) -> dict[str, object]:
 
 
 def _metadata(record: Record) -> dict[str, Any]:
-    """Return a policy's metadata; for a planner's policy also those of the policy that it directs.
+    """Return what a policy declares about itself.
 
-    What the planner itself declares holds.
+    If it is a planner that directs another policy, this includes what that one declares; where both
+    have the same key, the planner's value counts.
     """
     metadata = record.policy_metadata
     behind_planner = metadata.get("policy")
     if not isinstance(behind_planner, Mapping):
         return dict(metadata)
-    inner = dict(behind_planner)
-    inner.pop("network", None)  # the planner's is not known from it
-    return {**inner, **metadata}
+    of_directed = dict(behind_planner)
+    of_directed.pop("network", None)  # says nothing about the planner's
+    return {**of_directed, **metadata}
 
 
 def _words(value: object) -> list[str]:
-    """Return the value of a fact in words, nothing if it is unknown.
+    """Return the value of a fact as texts to print; none if it is unknown.
 
     For example ``["yes"]`` for True, ``["front, wrist"]`` for a list of two cameras, and
     ``["numpy 2.1", "torch 2.6"]`` for a mapping.

@@ -70,7 +70,8 @@ def make_table(
         data: results, of which control arms are left out; without any, the table has no rows of
             policies that were played.
         published: whether to add the paper's rows, and to say which rates can be compared.
-        floors: those of `FLOORS` whose expected success is added below the policies.
+        floors: names of listeners that do not understand, such as ``chance``, whose expected
+            success is added below the policies.
     """
     if which == COVERAGE:
         return _coverage()
@@ -78,7 +79,7 @@ def make_table(
     table = PAPER_TABLES[which]
     # The harder settings have the tasks of a table of the paper, but no published rates.
     shows_published = published and table.of_paper == table.name
-    results = _results_of(table, data.told, with_differences=shows_published)
+    results = _results_of(table, data.without_control_arms, with_differences=shows_published)
     columns = table.columns(results.tasks)
     rows = _policy_rows(table, columns, results)
     if not table.is_by_stages:
@@ -91,14 +92,21 @@ def make_table(
         rows.sort(key=lambda row: setting_sort_key(row.group))
     rows = list(with_best(_compared_rows(table, columns, rows)))
     notes = notes_of(table, columns, rows, results, floors)
-    # Last, because the best policy is one of a setting's rows, which are apart from here on.
+    # Last, because the best policy was sought among a setting's rows, which this divides.
     if table.heads == (POLICY, "setting"):
         rows = _by_policy(rows)
     return Table(table.name, table.title, table.heads, columns, rows, notes)
 
 
 def _results_of(table: PaperTable, data: RunData, *, with_differences: bool) -> TableResults:
-    """Return the results behind a table, with differences from the published rates if wanted."""
+    """Return the results that a table of the paper shows.
+
+    Args:
+        table: which one.
+        data: of all that was played.
+        with_differences: whether to find out, for each rate, how the conditions differ from those
+            of the published rate.
+    """
     shown = table.shown(data.cells)
     differences: AllDifferences = {}
     if with_differences:
@@ -115,7 +123,7 @@ def is_informative(which: str, data: RunData) -> bool:
     """
     if which == COVERAGE:
         return False
-    shown = PAPER_TABLES[which].shown(data.told.cells)
+    shown = PAPER_TABLES[which].shown(data.without_control_arms.cells)
     options = {key.options for key in shown}
     if which == "planner":
         runs = {key.policy_run for key in shown}
@@ -129,8 +137,11 @@ def is_informative(which: str, data: RunData) -> bool:
 
 
 def _policy_rows(table: PaperTable, columns: Sequence[Column], results: TableResults) -> list[Row]:
-    """Return the rows of the policies that were played, as listed by the table."""
-    # One generator for all, so an interval depends on the entries before it.
+    """Return a row for each policy run and set of options of a table: its rate in each task.
+
+    Averages over tasks are added where the table has columns for them.
+    """
+    # One generator for all, so the resamples behind an interval depend on the entries before it.
     rng = np.random.default_rng(SEED)
     rows = []
     for policy_run, options, label in table.subjects(results.shown, results.names):
@@ -143,7 +154,11 @@ def _policy_rows(table: PaperTable, columns: Sequence[Column], results: TableRes
 
 
 def _entry(key: CellKey, results: TableResults, rng: np.random.Generator) -> Entry:
-    """Return the rate of a task in a setting; without a rate if no episode of it was planned."""
+    """Return the table's entry for a policy in a task and setting: rate, interval, and marks.
+
+    Marks show that some trials ended in an error or are missing. Without a planned episode the
+    entry is empty, or a dash if the task does not have the setting.
+    """
     cell = results.shown.get(key)
     if cell is None:
         return Entry(applies=_applies(key.task, key.options))
@@ -171,13 +186,18 @@ def _applies(task: str, options: InstructionOptions) -> bool:
 
 
 def _floor_rows(floor: str, columns: Sequence[Column], results: TableResults) -> Iterator[Row]:
-    """Yield the rows of a floor, one for each setting and split that any policy played.
+    """Yield rows with the expected success of a listener that does not understand instructions.
 
-    Their levels are of the same episodes.
+    There is a row for each setting and split that any policy played, over the same episodes.
+
+    Args:
+        floor: which listener, such as ``chance``.
+        columns: of the table.
+        results: of the policies.
     """
     judged = {key: cell for key, cell in results.shown.items() if cell.verdicts}
     jobs = _jobs_by_instructions(judged)
-    # Of several versions of the words it is not known what can be learned.
+    # What learners reach was measured for each version of the language; with several it is unknown.
     languages = {key.policy_run.language for key in judged}
     language = languages.pop() if len(languages) == 1 else ""
     has_several_splits = len({instructions.split for instructions in jobs}) > 1
@@ -199,7 +219,15 @@ def _floor_entries(
     jobs: Sequence[Job],
     language: str,
 ) -> dict[str, Entry]:
-    """Return the level of a floor in each task, over those of the jobs that are of the task."""
+    """Return the expected success of a listener that does not understand, in each task.
+
+    Args:
+        floor: which listener, such as ``chance``.
+        options: of the instructions.
+        tasks: of the table.
+        jobs: the episodes of all tasks over which it is the mean.
+        language: version of the language that was played; empty if there are several.
+    """
     entries = {}
     for task in tasks:
         jobs_of_task = [job for job in jobs if job.task == task]
@@ -221,9 +249,10 @@ def _instruction_order(instructions: _Instructions) -> SortKey:
 
 
 def _jobs_by_instructions(cells: Cells) -> dict[_Instructions, list[Job]]:
-    """Return the episodes with a verdict by split and options, each as a job without a policy.
+    """Return which episodes have a verdict, by split and instruction options.
 
-    Those of tasks and settings that are not installed are left out.
+    They are jobs without a policy, because their instructions do not depend on it. Those of tasks
+    and settings that are not installed are left out, as they cannot be worded.
     """
     jobs: defaultdict[_Instructions, list[Job]] = defaultdict(list)
     for (policy_run, task, options), cell in cells.items():
@@ -238,19 +267,22 @@ def _jobs_by_instructions(cells: Cells) -> dict[_Instructions, list[Job]]:
 
 
 def _published_row(table: PaperTable, columns: Sequence[Column], published: PublishedRow) -> Row:
-    """Return a row of the paper as a row of the table."""
+    """Return the rates of a published policy as a row of the table, next to played policies.
+
+    Averages over suites, which the paper lacks, are computed from its rates.
+    """
     entries = {}
     for task, rate in published.rates.items():
         entries[task] = Entry(percent=rate, applies=rate is not None)
     cells = list(with_averages(columns, entries))
-    # The overall average is the last column: as the paper prints it, which has none of suites.
+    # The last column is the overall average; it is kept as the paper prints it.
     cells[-1] = Entry(percent=published.average)
     row = table.row(published.options, published.model, cells)
     return replace(row, source="published")
 
 
 def _by_policy(rows: Sequence[Row]) -> list[Row]:
-    """Return rows in groups by policy, and named by setting, given the reverse.
+    """Regroup rows: from a group for each setting with rows of policies to the reverse.
 
     Published policies are apart from played ones of the same name.
     """
@@ -264,14 +296,14 @@ def _by_policy(rows: Sequence[Row]) -> list[Row]:
 def _compared_rows(
     table: PaperTable, columns: Sequence[Column], rows: Sequence[Row]
 ) -> Iterator[Row]:
-    """Yield rows with their changes from explicit, or from the shortest context.
+    """Yield rows with the change of each rate from the same policy's reference row.
 
-    A row is compared with another of the same policy and source; references stay as they are, and
-    so do floors, which are not of a policy.
+    The reference is explicit, or in the table of contexts the shortest context. Reference rows
+    themselves have no changes, nor have rows of expected success, which are of no policy.
     """
     rows_by_position = {row.position: row for row in rows}
     for row in rows:
-        reference = rows_by_position.get(table.reference_position(row), row)
+        reference = rows_by_position.get(table.reference_position(row), row)  # itself if absent
         if reference.position == row.position or row.source == "chance":
             yield row
         else:
@@ -279,9 +311,10 @@ def _compared_rows(
 
 
 def _coverage() -> Table:
-    """Return the paper's table of which benchmark has which setting.
+    """Return the paper's table of which benchmark has which kind of implicit instructions.
 
-    The row of this benchmark is not the paper's, but follows from its tasks.
+    Its texts are ``yes``, ``no`` or ``partial``. The row of this benchmark is not taken from the
+    paper, but from the settings of its tasks.
     """
     lines = published_lines(COVERAGE)
     settings = [name for name in lines[0] if name not in ("kind", "benchmark")]

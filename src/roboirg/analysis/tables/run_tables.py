@@ -76,9 +76,9 @@ _RunResults = Mapping[str, Mapping[InstructionOptions, _ScopeResult]]
 
 
 def make_run_tables(frame: Frame) -> list[Table]:
-    """Make a table for each policy run, in their order.
+    """Make a table of success by task and setting for each policy run.
 
-    What the signs mean is the last note of the last table.
+    The last note of the last table is the legend of all.
     """
     cells = cells_of(frame)
     results_by_run = _results_by_run(cells)
@@ -100,7 +100,10 @@ def make_run_tables(frame: Frame) -> list[Table]:
 
 
 def _results_by_run(cells: Cells) -> Mapping[PolicyRun, _RunResults]:
-    """Return the results of each policy run in its tasks and in all of them, not in suites."""
+    """Return the success of each policy run, and its gap to explicit, by scope and options.
+
+    A scope is here a task or all tasks; suites of tasks are left out.
+    """
     scopes = by_scope(cells)
     results: dict[PolicyRun, dict[str, dict[InstructionOptions, _ScopeResult]]] = {}
     for key, by_task in scopes.items():
@@ -113,9 +116,10 @@ def _results_by_run(cells: Cells) -> Mapping[PolicyRun, _RunResults]:
 
 
 def _explicit_differences(cells: Cells, policy_run: PolicyRun) -> AllDifferences:
-    """Return how the cells of explicit instructions differ from those of the published rates.
+    """Return why the rates of explicit instructions cannot be compared with published ones.
 
-    Rates of no other setting can be compared with these.
+    For each task of a policy run, these are the conditions in which it was played differently, such
+    as the step limit. Rates of other settings cannot be compared in any case.
     """
     differences = {}
     for key, cell in cells.items():
@@ -125,7 +129,10 @@ def _explicit_differences(cells: Cells, policy_run: PolicyRun) -> AllDifferences
 
 
 def print_failures(frame: Frame, console: Console) -> None:
-    """Print the first episodes without success of each policy run, and how many more there are."""
+    """Print up to `MAX_FAILURES` episodes without success of each policy run, and how many more.
+
+    A policy run is a policy under one set of conditions and versions.
+    """
     for run, label in frame.names.items():
         failures = [result for result in frame.where(run=run).played if result.outcome != "success"]
         failures.sort(key=_scene_order)
@@ -144,7 +151,7 @@ def _scene_order(result: Summary) -> SortKey:
 
 
 def failure_text(result: Summary) -> str:
-    """Return the episode, its instruction options and the cause of its failure.
+    """Return an episode without success in one line: which one, its options, and the cause.
 
     For example ``PickXtimes test/3 relational (policy seed 1): picked up the wrong cube``.
     """
@@ -160,10 +167,15 @@ def failure_text(result: Summary) -> str:
 
 
 def gap_text(key: ScopeKey, scopes: Mapping[ScopeKey, ByTask]) -> str:
-    """Return the gap to explicit on the same episodes, the mean over tasks.
+    """Return by how many points success differs from that in explicit instructions: ``−12``.
 
-    For example ``−12``; a dash if neither has a success, as such a gap says nothing. Empty for
-    explicit itself, and if no episode was played in both settings.
+    These name the goal. The gap is over the same episodes, and the mean over tasks. A dash if
+    neither has a success, as such a gap says nothing. Empty for explicit itself, and if no episode
+    was played in both settings.
+
+    Args:
+        key: policy run, scope (a task or all tasks) and instruction options.
+        scopes: the results of all of these, by task.
     """
     reference = key._replace(options=REFERENCE_OPTIONS)
     if key == reference:
@@ -181,11 +193,12 @@ def _make_run_table(
 ) -> Table:
     """Return the table of a policy run, with a row for each task and a column for each setting.
 
-    An entry is the success rate and, in brackets, the gap to explicit.
+    An entry is the success rate and, in brackets, the gap to explicit, the setting that names the
+    goal: ``62 (−12)``.
 
     Args:
         label: of the policy run, the title.
-        results: of the policy run.
+        results: by scope, a task or all tasks, and by instruction options.
         differences: from the conditions of the published rates.
         notes: below the table.
     """
@@ -211,9 +224,13 @@ def _has_several_tasks(results: _RunResults) -> bool:
 
 
 def _entry(result: _ScopeResult | None, differences: AllDifferences) -> Entry:
-    """Return an entry such as ``62 (−12)``, the success rate and the gap to explicit in brackets.
+    """Return an entry such as ``62 (−12)``: success in percent, in brackets the gap to explicit.
 
     It is a dash where nothing was played or planned, or no episode has a verdict.
+
+    Args:
+        result: of a policy run in a task, or all tasks, with some instruction options.
+        differences: for the cells that have a published rate, how their conditions differ.
     """
     if result is None:
         return Entry(applies=False)
@@ -248,7 +265,12 @@ def _color(rate: Fraction) -> str:
 
 
 def _legend(cells: Cells, results_of_runs: Iterable[_RunResults]) -> Iterator[str]:
-    """Yield what the signs mean that occur in the tables, given what all of them show."""
+    """Yield the phrases of the legend: what numbers and signs mean that occur in the tables.
+
+    Args:
+        cells: the trials of all tables.
+        results_of_runs: rates and gaps, as printed, of each table.
+    """
     gaps: set[str] = set()
     for results in results_of_runs:
         for by_options in results.values():
@@ -268,7 +290,7 @@ def _legend(cells: Cells, results_of_runs: Iterable[_RunResults]) -> Iterator[st
 
 
 def _sizes(results: _RunResults) -> str:
-    """Return how many trials a cell has, and how many all tasks together.
+    """Return how many trials each rate is of: those of single tasks, and the mean over all tasks.
 
     For example ``n = 10 to 20 episodes per cell, 160 episodes for all tasks, the mean over tasks``.
     """

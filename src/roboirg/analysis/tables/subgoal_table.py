@@ -54,7 +54,9 @@ _READ: Mapping[str, Callable[[Record], object]] = {
 
 
 def make_subgoal_table(data: RunData) -> Table:
-    """Make the table from the whole records of the runs of `data`.
+    """Make the table of planners, which name subgoals to a policy: right ones, costs, failures.
+
+    It has a row for each task in each setting of a policy, from the whole records of its episodes.
 
     Raises:
         InvalidValueError: no record holds a subgoal, or the failure of a planner.
@@ -62,6 +64,7 @@ def make_subgoal_table(data: RunData) -> Table:
     counts_by_cell = _count_in_cells(data)
     if not counts_by_cell:
         raise InvalidValueError("No planner of the runs named a subgoal; their records hold none.")
+    # Only failures and costs that occur have columns.
     occurring: set[str] = set()
     for counts in counts_by_cell.values():
         occurring.update(name for name in counts if counts[name] > 0)
@@ -87,7 +90,10 @@ def make_subgoal_table(data: RunData) -> Table:
 
 
 def _columns(failures: Iterable[str], costs: Iterable[str]) -> list[Column]:
-    """Return the columns: subgoals by verdict, then the failures and the costs that occur."""
+    """Return the columns of the table of planners: subgoals by verdict, failures, and costs.
+
+    Only failures and costs that occur are given, and have columns.
+    """
     columns = [Column("subgoals")]
     for verdict in SUBGOAL_VERDICTS:
         columns.append(Column(verdict.replace("_", " ")))
@@ -99,10 +105,11 @@ def _columns(failures: Iterable[str], costs: Iterable[str]) -> list[Column]:
 
 
 def _count_in_cells(data: RunData) -> dict[CellKey, Counter[str]]:
-    """Count what the table shows, in each cell in which a planner has a subgoal or a failure.
+    """Count subgoals by verdict, failures by name, and costs, in each task and setting.
 
-    A count is the number of ``episodes``, that of subgoals with a verdict or of failures, by name,
-    or the sum of a cost: ``{"episodes": 10, "right": 31, "wrong_place": 2, "calls": 40, …}``.
+    A cell is a policy run in a task and setting, for example
+    ``{"episodes": 10, "right": 31, "wrong_place": 2, "calls": 40, …}``: numbers of episodes,
+    subgoals and failures, and sums of costs. Cells in which no planner did anything are left out.
     """
     frame = with_columns(data.frame, data.records, _READ)
     counts_by_cell: defaultdict[CellKey, Counter[str]] = defaultdict(Counter)
@@ -128,10 +135,15 @@ def _has_planner(counts: Counter[str]) -> bool:
 
 
 def _words(counts: Counter[str], failures: Iterable[str], costs: Iterable[str]) -> Iterator[str]:
-    """Yield the cells of a row, in the order of the columns.
+    """Yield the texts of a row of the table of planners, one for each column.
 
-    The subgoals, those of each verdict with their share, such as ``31 (94 %)``, the failed
-    episodes, and the mean costs of an episode.
+    These are the number of subgoals, that of each verdict with its share, such as ``31 (94 %)``,
+    the failed episodes by failure, and the mean costs of an episode.
+
+    Args:
+        counts: of the row's episodes, subgoals and failures, and the sums of its costs.
+        failures: names of those that have a column.
+        costs: names of those that have a column.
     """
     total = sum(counts[verdict] for verdict in SUBGOAL_VERDICTS)
     yield str(total)

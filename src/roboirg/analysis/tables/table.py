@@ -57,7 +57,10 @@ class Entry:
 
     @property
     def text(self) -> str:
-        """The rate, a dash if the setting does not apply, or the word; empty without results."""
+        """What is printed: the word if there is one, else the rate in percent, else nothing.
+
+        It is a dash if the task does not have the setting.
+        """
         if self.word:
             return self.word
         if not self.applies:
@@ -168,7 +171,7 @@ class Table:
         return (*self.heads, *(column.name for column in self.columns))
 
     def lines(self) -> Iterator[PrintedRow]:
-        """Yield the rows as they are printed, group by group."""
+        """Yield the rows with their labels, group by group; the first row alone names the group."""
         for group in self.groups():
             for row in group:
                 begins_group = row is group[0]
@@ -184,11 +187,11 @@ class Table:
         return grouped(self.rows, lambda row: row.group)
 
     def labels(self, row: Row) -> tuple[str, ...]:
-        """Return the label of a row below each head; names of published policies are marked.
+        """Return what the first columns of a row print, one text for each of the table's `heads`.
 
-        Below the head ``task`` it is the name, below ``setting`` and ``policy`` also the group.
-        Below ``policy``, ``1``, ``3`` and ``5``, a row that is named ``1,5`` has the labels
-        ``("pi0", "✓", "", "✓")``.
+        With the heads ``setting`` and ``policy`` these are the row's group and its name; with the
+        head ``task`` alone, its name. With the heads ``policy``, ``1``, ``3`` and ``5``, a row of
+        pi0 that is named ``1,5`` has ``("pi0", "✓", "", "✓")``. Published policies are marked.
         """
         _, *name_heads = self.heads
         if not name_heads:
@@ -214,9 +217,9 @@ def grouped(rows: Iterable[Row], key: Callable[[Row], object]) -> list[list[Row]
 
 
 def average(entries: Sequence[Entry]) -> Entry:
-    """Return the average over the entries of tasks that have a rate.
+    """Return the entry for the average of several tasks' rates, as printed; empty without rates.
 
-    It is marked as partial if an entry lacks a rate or is incomplete. Tasks for which the setting
+    It is marked as partial if a task has no rate or an incomplete one. Tasks for which the setting
     is not defined do not count.
     """
     applying = [entry for entry in entries if entry.applies]
@@ -232,7 +235,12 @@ def average(entries: Sequence[Entry]) -> Entry:
 
 
 def with_averages(columns: Iterable[Column], entries: Mapping[str, Entry]) -> tuple[Entry, ...]:
-    """Return a row's entries: those of its tasks, and the averages over them."""
+    """Return a row's entries, one for each column: the rate of a task, or an average of rates.
+
+    Args:
+        columns: of the table; some are averages over tasks.
+        entries: the rates by task.
+    """
     row = []
     for column in columns:
         if column.averages:
@@ -244,10 +252,10 @@ def with_averages(columns: Iterable[Column], entries: Mapping[str, Entry]) -> tu
 
 
 def with_changes(columns: Sequence[Column], row: Row, reference: Row) -> Row:
-    """Return a row with the change of each of its entries from the reference's.
+    """Return a row whose entries have their changes from a reference row, such as explicit's.
 
-    An average is compared with the reference's average over the same tasks, as some tasks lack
-    some settings.
+    An average is compared with the reference's average over the same tasks, because some tasks
+    lack the row's setting.
     """
     names = [column.name for column in columns]
     entries = dict(zip(names, row.entries, strict=True))
@@ -255,10 +263,11 @@ def with_changes(columns: Sequence[Column], row: Row, reference: Row) -> Row:
     cells = []
     for column in columns:
         comparable = []
+        # A column that is no average is a task.
         for task in column.averages or [column.name]:
             if entries[task].applies:
                 comparable.append(reference_entries[task])
-        # Of a single task this is the entry itself.
+        # The average of a single entry is that entry.
         cells.append(_with_change(entries[column.name], average(comparable)))
     return replace(row, cells=cells)
 
@@ -271,10 +280,11 @@ def _with_change(entry: Entry, reference: Entry) -> Entry:
 
 
 def with_best(rows: Iterable[Row]) -> Iterator[Row]:
-    """Yield rows, those of a group together, with its best entries in each column marked.
+    """Yield rows, group by group, with the best entry of the group marked in each column.
 
-    Only rows of the same source compete, so published policies do not with played ones. None is
-    the best if all have the same rate, only one has a rate, or one is incomplete.
+    Only rows of the same source compete: played policies with played ones, published with
+    published. None is the best if all have the same rate, only one has a rate, or one is
+    incomplete.
     """
     for group in grouped(rows, lambda row: row.group):
         for rivals in grouped(group, lambda row: row.source):

@@ -100,7 +100,10 @@ class PaperTable:
         return len(self.heads) > 2  # noqa: PLR2004 - a column for each stage
 
     def tasks(self, cells: Cells) -> tuple[str, ...]:
-        """Return the paper's tasks, or all others that were played, those not installed last."""
+        """Return the tasks of the table: those of the paper's, or all that are in none of these.
+
+        Of the latter, tasks that were played but are not installed here come last.
+        """
         if self.of_paper is not None:
             return published_tasks(self.of_paper)
         in_paper = {*published_tasks("main"), *published_tasks("real")}
@@ -108,9 +111,9 @@ class PaperTable:
         return tuple(sorted(others, key=lambda task: (task not in every_task(), task)))
 
     def columns(self, tasks: Sequence[str]) -> tuple[Column, ...]:
-        """Return the columns of some tasks: by suite with its average, or in their order.
+        """Return a column for each task, and the average over all last.
 
-        The overall average comes last.
+        If the table is by suite, the tasks of a suite stand together, with their average behind.
         """
         overall = Column(AVERAGE, averages=tuple(tasks))
         if not self.by_suite:
@@ -127,7 +130,7 @@ class PaperTable:
         return (*columns, overall)
 
     def shown(self, cells: Cells) -> Cells:
-        """Return the cells of the table's tasks with options that it shows."""
+        """Select the cells that the table shows: of its tasks, and of options with a row."""
         tasks = self.tasks(cells)
         shown = {}
         for key, cell in cells.items():
@@ -136,9 +139,11 @@ class PaperTable:
         return shown
 
     def subjects(self, shown: Cells, names: RunNames) -> Iterator[RowSubject]:
-        """Yield what each row is about, by policy run and options, given the cells of the table.
+        """Yield what each row of the table is about: a policy run and its instruction options.
 
-        There is a row for what was planned, too.
+        Args:
+            shown: the cells of the table; those that were planned and not played have rows, too.
+            names: labels of the policy runs, in the order of their rows.
         """
         options_of_runs: dict[PolicyRun, set[InstructionOptions]] = {}
         for policy_run, _, options in shown:

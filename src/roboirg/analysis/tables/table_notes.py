@@ -52,14 +52,14 @@ def notes_of(
     results: TableResults,
     floors: Sequence[str],
 ) -> tuple[str, ...]:
-    """Return the notes of a table of rates.
+    """Return the sentences below a table of success rates: what its signs mean, and its limits.
 
     Args:
-        table: which one.
+        table: which of the paper's tables.
         columns: of the table.
         rows: of the table.
         results: behind the table.
-        floors: expected successes that are asked for.
+        floors: names of listeners that do not understand, whose expected success is in the table.
     """
     policy_runs = list(dict.fromkeys(key.policy_run for key in results.shown))
     entries: list[Entry] = []
@@ -83,8 +83,11 @@ def notes_of(
 
 
 def with_mixtures(tables: Sequence[Table], frame: Frame) -> list[Table]:
-    """Return tables with a note on everything that their results do not have in common."""
-    notes = mixtures(frame.told().played)
+    """Return tables with notes on what their results mix, such as several versions of the language.
+
+    Control arms, which have other words on purpose, do not count.
+    """
+    notes = mixtures(frame.without_control_arms().played)
     noted = []
     for table in tables:
         if table.key == "coverage":
@@ -95,9 +98,10 @@ def with_mixtures(tables: Sequence[Table], frame: Frame) -> list[Table]:
 
 
 def where_played(policy_runs: Collection[PolicyRun]) -> str:
-    """Return a sentence with the split, the words and the limit; each only if all have the same.
+    """Return a sentence with the conditions that all policy runs have in common.
 
-    For example ``Played on the test split, in own words, with at most 1300 steps.``
+    They are the split, the words and the limit of steps:
+    ``Played on the test split, in own words, with at most 1300 steps.``
     """
     phrases = {
         "split": "on the {} split",
@@ -124,7 +128,7 @@ def range_text(counts: Sequence[int], noun: str) -> str:
 
 
 def _sign_notes(table: PaperTable, entries: Sequence[Entry]) -> Iterator[str]:
-    """Yield what arrows, bold numbers and dashes mean, each only if some entry has one."""
+    """Yield sentences on what arrows, bold numbers and dashes mean, if an entry has one."""
     if any(entry.change is not None for entry in entries):
         reference = "the shortest context" if table.is_by_stages else "explicit"
         yield (
@@ -139,7 +143,7 @@ def _sign_notes(table: PaperTable, entries: Sequence[Entry]) -> Iterator[str]:
 
 
 def _sizes(judged: Sequence[Counts]) -> str:
-    """Return how many episodes and trials cells have.
+    """Return a sentence on how many episodes and trials the cells (a task in a setting) have.
 
     For example ``10 to 50 episodes per cell, each played once.``
     """
@@ -156,7 +160,11 @@ def _origin_notes(
     floors: Sequence[str],
     policy_runs: Iterable[PolicyRun],
 ) -> Iterator[str]:
-    """Yield what rows are that are not of a policy on its own robot or in the simulator."""
+    """Yield sentences on rows that no policy has played here.
+
+    They are those of a real robot's simulated twin, expected success without understanding (the
+    floors), and published rates.
+    """
     sources = {row.source for row in rows}
     if any(row.name.endswith(TWIN_MARK) for row in rows):
         yield _TWIN_NOTE
@@ -168,7 +176,12 @@ def _origin_notes(
 
 
 def _count_notes(cells: Sequence[Counts], entries: Sequence[Entry]) -> Iterator[str]:
-    """Yield how many trials cells with a verdict have, and what signs of incomplete ones mean."""
+    """Yield sentences on the numbers of trials, and on those that have no verdict.
+
+    Args:
+        cells: numbers of trials of each task in each setting.
+        entries: of the table; their marks are explained.
+    """
     judged = []
     errors = 0
     missing = 0
@@ -196,9 +209,9 @@ def _count_notes(cells: Sequence[Counts], entries: Sequence[Entry]) -> Iterator[
 
 
 def _omission_notes(results: TableResults) -> Iterator[str]:
-    """Yield what was played and is not in the table: other tasks, and other options.
+    """Yield sentences on what was played but is not in the main table: other tasks or settings.
 
-    Options that belong into the table of harder settings are named apart.
+    Settings that have a table of their own, that of harder settings, are named apart.
     """
     other_tasks = set()
     hidden = set()
@@ -221,7 +234,7 @@ def _omission_notes(results: TableResults) -> Iterator[str]:
 
 
 def _absent_tasks(shown: Iterable[CellKey]) -> str:
-    """Return which tasks are not installed here; nothing if all are."""
+    """Return a sentence on tasks that were played but are not installed here; empty without any."""
     absent = {key.task for key in shown} - every_task().keys()
     if not absent:
         return ""
@@ -230,9 +243,10 @@ def _absent_tasks(shown: Iterable[CellKey]) -> str:
 
 
 def _average_notes(columns: Sequence[Column], rows: Sequence[Row]) -> Iterator[str]:
-    """Yield which settings have averages over fewer tasks than the reference has, and how many.
+    """Yield a sentence for each setting that some tasks lack, so that its averages have fewer.
 
-    Their change is not the difference between the two averages as printed.
+    Such an average is compared with explicit's over the same tasks, which is not the one that is
+    printed: the note warns of subtracting the two.
     """
     played = []  # the numbers of the columns of tasks that were played
     for number, column in enumerate(columns):

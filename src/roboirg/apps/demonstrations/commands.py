@@ -101,7 +101,10 @@ def export_demonstrations(
 
 
 def _print_size(plan: ExportPlan) -> None:
-    """Print how much is recorded and exported, and a warning where that spoils a test."""
+    """Print how many trajectories the plan records, and how many episodes it exports.
+
+    Warn if episodes or words of the test split are exported, on which a policy must not be trained.
+    """
     from roboirg.apps.demonstrations.export_plan import recording_jobs
 
     if plan.split == "test":
@@ -115,7 +118,14 @@ def _print_size(plan: ExportPlan) -> None:
 
 
 def _export(plan: ExportPlan, out: Path, workers: int | None, trajectories: Path | None) -> None:
-    """Run an export with its progress; print what came of it."""
+    """Export demonstrations, with progress bars; print how many there are, and their size.
+
+    Args:
+        plan: what is exported.
+        out: folder of the dataset.
+        workers: worker processes; None for as many as there are processor cores.
+        trajectories: folder that keeps recorded trajectories for other exports; None to drop them.
+    """
     from rich.filesize import decimal
 
     from roboirg.apps.demonstrations.export_run import run_export

@@ -35,9 +35,10 @@ def card_text(
     Args:
         plan: what is exported.
         parts: of the dataset.
-        facts: of all trajectories, those that are left out, too.
+        facts: on all trajectories, those that are left out, too.
         root: folder of the dataset.
     """
+    # The head, between two lines of dashes, is YAML.
     lines = ["---", "license: apache-2.0", "task_categories: [robotics]"]
     lines.append("tags: [LeRobot, RoboIRGBench]")
     if plan.file_format.has_frame_tables:
@@ -83,7 +84,7 @@ class _Counts:
 
 
 def _counts(parts: Sequence[DatasetPart]) -> dict[str, _Counts]:
-    """Return the counts of each task, and of all."""
+    """Count trajectories, frames and episodes of each task, and as ``all`` those of all tasks."""
     by_task: dict[str, _Counts] = {}
     total = _Counts()
     for part in parts:
@@ -103,7 +104,7 @@ def _count_lines(counts: Mapping[str, _Counts]) -> Iterator[str]:
 
 
 def _words_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator[str]:
-    """Yield what is said, and how trajectories ended."""
+    """Yield the card's sentences on the instructions, and on how many trajectories succeeded."""
     yield (
         f"Settings: {', '.join(plan.settings)}; forms: {', '.join(plan.forms)}. Each trajectory "
         "comes once with the words of each of them that can express it; "
@@ -115,6 +116,7 @@ def _words_lines(plan: ExportPlan, facts: Sequence[TrajectoryFacts]) -> Iterator
 
 
 def _content_lines(plan: ExportPlan) -> Iterator[str]:
+    """Yield the card's lines on what a frame holds: state, action and pictures."""
     yield "State: seven joint angles (rad) and the first finger (m)."
     origin = "exactly what was executed"
     if plan.disturbed:

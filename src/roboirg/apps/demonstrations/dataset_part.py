@@ -70,7 +70,12 @@ class RecordedTexts(NamedTuple):
 
 
 def place_texts(recorded: Sequence[RecordedTexts]) -> list[RecordedEpisode]:
-    """Give every instruction its place; trajectories without frames are left out."""
+    """Give every instruction of a trajectory the numbers that LeRobot has for an episode.
+
+    An episode is a trajectory with one of its instructions, so a trajectory of 90 frames with two
+    makes the episodes 0 and 1, whose first frames have the numbers 0 and 90. Equal texts have the
+    same task index. Trajectories without frames are left out.
+    """
     task_indices: dict[str, int] = {}
     episode_index = 0
     first_index = 0
@@ -90,13 +95,13 @@ def place_texts(recorded: Sequence[RecordedTexts]) -> list[RecordedEpisode]:
 
 
 def all_texts(parts: Sequence[DatasetPart]) -> list[str]:
-    """Return all texts in the order of their indices."""
-    found = {}
+    """Return the distinct texts of all instructions, in the order of their indices from 0."""
+    text_by_index = {}
     for part in parts:
         for episode in part.episodes:
             for placed in episode.texts:
-                found[placed.task_index] = placed.words.text
-    return [found[index] for index in range(len(found))]
+                text_by_index[placed.task_index] = placed.words.text
+    return [text_by_index[index] for index in range(len(text_by_index))]
 
 
 def read_episodes(
@@ -109,7 +114,12 @@ def read_episodes(
 
 
 def episode_row(trajectory: Trajectory, placed: PlacedText) -> dict[str, Any]:
-    """Return the row of an episode in the table of facts next to the dataset."""
+    """Return what is known of an episode: a row of the table of facts next to the dataset.
+
+    Args:
+        trajectory: what the robot did.
+        placed: the episode's instruction, with its numbers in the dataset.
+    """
     facts = trajectory.facts
     words = placed.words
     final_joints = trajectory.joint_positions[-1].tolist()

@@ -10,7 +10,9 @@ from roboirg.core.errors import InvalidValueError
 
 
 def read_dataset(path: Path) -> list[ReplayableTrajectory]:
-    """Return every trajectory of a dataset once, whatever the number of its instructions.
+    """Read the trajectories of an exported dataset, to replay them; each comes once.
+
+    It may be in the dataset several times, with different instructions.
 
     Args:
         path: folder of an export, or of RoboMME's HDF5 files, or one of these files.
@@ -19,8 +21,8 @@ def read_dataset(path: Path) -> list[ReplayableTrajectory]:
         InvalidValueError: the path holds no dataset that can be read.
         MissingDependencyError: a package is not installed.
     """
-    for of_format in export_formats().values():
-        trajectories = list(of_format.read(path))
+    for file_format in export_formats().values():
+        trajectories = list(file_format.read(path))
         if trajectories:
             return trajectories
     raise InvalidValueError(

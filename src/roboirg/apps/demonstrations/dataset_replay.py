@@ -67,16 +67,19 @@ def replay_dataset(path: Path, workers: int) -> Iterator[ReplayResult]:
 
 
 def replay(recorded: ReplayableTrajectory) -> ReplayResult:
-    """Execute the actions of a trajectory in its episode."""
+    """Execute a trajectory's recorded actions in the simulator, and measure how far states differ.
+
+    Differences are between joint angles (rad) and finger positions (m), the largest of each step.
+    """
     env = make(_find_episode(recorded), cameras=(), actions=recorded.space)
     differences = []
-    final = float("nan")
+    final = float("nan")  # unknown if no action was executed, or no final state recorded
     try:
         env.reset()
         for action, expected in zip(recorded.actions, recorded.states, strict=True):
             observation, *_ = env.step(action)
             state = np.append(observation["joint_positions"], observation["gripper"])
-            one_finger = state[:-1]
+            one_finger = state[:-1]  # as datasets have it; both fingers move alike
             differences.append(_difference(one_finger, expected))
             if env.status != "ongoing":
                 break
@@ -102,7 +105,13 @@ def _difference(state: NDArray[np.floating[Any]], expected: NDArray[np.floating[
 
 
 def _find_episode(recorded: ReplayableTrajectory) -> Episode:
-    """Return the episode of a trajectory; RoboMME's are found by their seeds."""
+    """Return the episode of a trajectory.
+
+    It is named by split and number; RoboMME's files have only the seed, by which it is found.
+
+    Raises:
+        InvalidValueError: no episode has the seed.
+    """
     if recorded.split is not None and recorded.index is not None:
         return get_episode(recorded.task, recorded.split, recorded.index)
     place = _places(recorded.task).get(recorded.seed)
@@ -115,10 +124,10 @@ def _find_episode(recorded: ReplayableTrajectory) -> Episode:
 
 @functools.cache
 def _places(task: str) -> dict[int, tuple[str, int]]:
-    """Return split and index of each seed of a task."""
-    found = {}
+    """Return the split and the number in it of each episode of a task, by its seed."""
+    places = {}
     for split in SPLITS:
         for index in range(SIZES[split]):
             seed = get_episode(task, split, index).seed
-            found[seed] = (split, index)
-    return found
+            places[seed] = (split, index)
+    return places

@@ -94,6 +94,13 @@ class ExportPlan:
         return self
 
     def _check_disturbed(self) -> None:
+        """Check that the format has room for disturbed demonstrations, and for waypoints.
+
+        Of a disturbed demonstration both the executed and the right action are stored.
+
+        Raises:
+            InvalidValueError: it has not, or the policy is not the oracle.
+        """
         if self.disturbed and (self.policy != ORACLE or not self.file_format.has_labels):
             unlabeled = names_where(lambda known: not known.has_labels)
             raise InvalidValueError(
@@ -109,6 +116,11 @@ class ExportPlan:
             )
 
     def _check_pictures(self) -> None:
+        """Check the cameras and the size of pictures, also against what the format needs.
+
+        Raises:
+            InvalidValueError: a value or a combination is not possible.
+        """
         check_cameras(self.cameras)
         if not self.cameras:
             raise InvalidValueError("cameras is empty; without pictures, ask for --pictures none.")
@@ -214,7 +226,10 @@ class RecordingJob:
         return folder / f"{'-'.join([name, *self._spec_words()])}{SUFFIX}"
 
     def _spec_words(self) -> list[str]:
-        """Return what the trajectory holds, as words of its name; the usual is left out."""
+        """Return the words of the file's name for what it holds: ``["png", "video", "front"]``.
+
+        What is usual, such as all cameras, is left out.
+        """
         spec = self.spec
         words: list[str] = [spec.coding]
         if spec.video:
@@ -247,7 +262,7 @@ def training_words(split: str, options: InstructionOptions) -> InstructionOption
 
 
 def recording_jobs(plan: ExportPlan) -> list[SpokenJob]:
-    """Return the trajectories of a plan in the order of the dataset, with their instructions.
+    """Return what is to be recorded: trajectories with their instructions, in the dataset's order.
 
     Raises:
         InvalidValueError: no setting can express any of the episodes.
@@ -261,7 +276,11 @@ def recording_jobs(plan: ExportPlan) -> list[SpokenJob]:
 
 
 def _jobs_of(plan: ExportPlan, episode: Episode) -> list[SpokenJob]:
-    """Return the trajectories of an episode; only the oracle's is the same for all words."""
+    """Return the trajectories to record of an episode, each with the instructions that it fits.
+
+    The oracle, which knows the goal, moves in the same way whatever is said, so its trajectory
+    serves all instructions; any other policy is recorded once for each.
+    """
     texts = _texts_of(plan, episode)
     if not texts:
         return []
@@ -281,7 +300,11 @@ def _jobs_of(plan: ExportPlan, episode: Episode) -> list[SpokenJob]:
 
 
 def _texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
-    """Return the instructions of an episode; an explicit one is its own resolved form."""
+    """Return the instructions of an episode in all settings and forms of the plan.
+
+    Settings that cannot express the episode have none. The implicit form of an explicit instruction
+    is also its resolved form, so it is not given twice.
+    """
     words = InstructionOptions(wordings=plan.options.wordings)
     explicit = instruct_with(episode, words).text
     texts = []
@@ -292,6 +315,6 @@ def _texts_of(plan: ExportPlan, episode: Episode) -> tuple[TaskText, ...]:
         if is_explicit and is_resolved:
             continue
         options = replace(plan.options, setting=instruction.setting, form=instruction.form)
-        facts = row(episode, instruction) | {"explicit": explicit}
+        facts = row(episode, instruction) | {"explicit": explicit}  # columns of the facts' table
         texts.append(TaskText(options, instruction.text, facts))
     return tuple(texts)

@@ -104,8 +104,8 @@ def run_export(
         )
         recorded = _record_missing(jobs, usable, workers, report)
         facts = [load_facts(spoken.job.path(usable.folder)) for spoken in jobs]
-        texts = _wanted(plan, jobs, facts, usable.folder)
-        parts = plan.file_format.make_parts(plan, out, texts)
+        wanted = _wanted(plan, jobs, facts, usable.folder)
+        parts = plan.file_format.make_parts(plan, out, wanted)
         keeps_pictures = trajectories is not None
         _write_parts(parts, work / "parts", workers, report, keeps_pictures=keeps_pictures)
         _finish(plan, out, parts, facts)
@@ -116,10 +116,16 @@ def run_export(
 def _wanted(
     plan: ExportPlan, jobs: Sequence[SpokenJob], facts: Sequence[TrajectoryFacts], folder: Path
 ) -> list[RecordedTexts]:
-    """Return the trajectories of the dataset, with their instructions.
+    """Choose the trajectories that the plan exports, for example only successes.
+
+    Args:
+        plan: what is exported.
+        jobs: all trajectories, with their instructions.
+        facts: how each of them ended.
+        folder: of the trajectories' files.
 
     Raises:
-        InvalidValueError: there is none.
+        InvalidValueError: none is left.
     """
     pairs = zip(jobs, facts, strict=True)
     wanted = [spoken for spoken, recorded in pairs if _is_wanted(plan, recorded)]
@@ -142,7 +148,15 @@ def _episode_count(parts: Sequence[DatasetPart]) -> int:
 
 @contextlib.contextmanager
 def _opened(plan: ExportPlan, out: Path) -> Iterator[Path]:
-    """Yield the folder for unfinished work, which is deleted when the block ends without error."""
+    """Begin or continue an export; yield the folder for its unfinished work.
+
+    The folder is locked, and deleted when the block ends without error. After an error it stays, so
+    that the same plan can be continued.
+
+    Raises:
+        InvalidValueError: `out` holds other files, a complete export, or one of another plan, or
+            another process writes to it.
+    """
     work = out / WORK_FOLDER
     written = _read_fingerprint(out / EXPORT_FILE)
     if written is not None and not work.exists():
@@ -179,7 +193,14 @@ def _read_fingerprint(path: Path) -> str | None:
 def _record_missing(
     jobs: Sequence[SpokenJob], usable: _Usable, workers: int, report: Report
 ) -> int:
-    """Record the trajectories that are missing, and report all; returns how many were."""
+    """Record the trajectories that are not there yet; return how many these were.
+
+    Args:
+        jobs: all trajectories of the plan.
+        usable: the folder of trajectories, in which some may be there already.
+        workers: worker processes; 0 uses this process only.
+        report: called with the number of trajectories that are done, and of all.
+    """
     usable.folder.mkdir(parents=True, exist_ok=True)
     missing = [spoken.job for spoken in jobs if not usable.has(spoken.job)]
     done = len(jobs) - len(missing)
@@ -208,7 +229,11 @@ def _record_job(folder: Path, job: RecordingJob, *, only_successes: bool) -> Non
 
 
 def choose_policy(job: RecordingJob) -> Policy:
-    """Return the policy of a trajectory."""
+    """Return the policy that plays an episode to be recorded.
+
+    The oracle's motions go through waypoints if these are to be recorded, or if it is disturbed on
+    its way; else it is the policy of its name.
+    """
     disturbance = Disturbance() if job.spec.disturbed else None
     if job.policy == ORACLE and job.spec.actions == WaypointExpert.actions:
         return WaypointExpert(job.variation, disturbance)
@@ -232,7 +257,11 @@ class _Usable(NamedTuple):
     may_lack_pictures: bool
 
     def has(self, job: RecordingJob) -> bool:
-        """Return whether the folder has a trajectory as it is needed."""
+        """Return whether the folder has a trajectory of this version, with pictures if needed.
+
+        Pictures are not needed if the dataset has none, if it leaves the trajectory out, or if its
+        part may be written already.
+        """
         path = job.path(self.folder)
         if not path.exists():
             return False
@@ -257,7 +286,15 @@ def _write_parts(
     *,
     keeps_pictures: bool,
 ) -> None:
-    """Write the parts that are missing; pictures that are no longer needed are deleted."""
+    """Write the parts of the dataset that an earlier call has not written yet.
+
+    Args:
+        parts: of the dataset, all.
+        folder: with an empty file for each part that is written.
+        workers: worker processes; 0 uses this process only.
+        report: called with the number of parts that are done, and of all.
+        keeps_pictures: whether trajectories keep their pictures when their part is written.
+    """
     folder.mkdir(exist_ok=True)
     missing = [part for part in parts if not _mark(folder, part).exists()]
     done = len(parts) - len(missing)
@@ -283,7 +320,14 @@ def _write_part(part: DatasetPart) -> None:
 def _finish(
     plan: ExportPlan, out: Path, parts: Sequence[DatasetPart], facts: Sequence[TrajectoryFacts]
 ) -> None:
-    """Write what describes the dataset."""
+    """Write the dataset's card and metadata; last the file that marks it as complete.
+
+    Args:
+        plan: what was exported.
+        out: folder of the dataset.
+        parts: of the dataset, all written.
+        facts: of all trajectories, those that were left out, too.
+    """
     write_atomically(out / "README.md", data_card.card_text(plan, parts, facts, out))
     plan.file_format.finish(out, parts)
     content = {"fingerprint": plan.fingerprint(), "roboirg": __version__, "format": plan.format}

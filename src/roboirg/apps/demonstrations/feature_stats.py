@@ -16,13 +16,14 @@ FeatureStats = dict[str, list[Any]]
 
 
 def vector_stats(values: NDArray[Any]) -> FeatureStats:
-    """Return the statistics of a feature over its frames.
+    """Return minimum, maximum, mean, deviation and quantiles of each number of a feature.
 
     Args:
-        values: (frames, size), frames >= 1.
+        values: of the feature in each frame, such as joint angles, shape (frames, size); at least
+            one frame.
 
     Returns:
-        Lists of `size` numbers, and `count`, a list with the number of frames.
+        By the statistic's name a list of `size` numbers; `count`, a list with the number of frames.
     """
     numbers = values.astype(np.float64)
     stats: FeatureStats = {
@@ -56,7 +57,11 @@ def picture_stats(counts: NDArray[np.int64], pixels: int) -> FeatureStats:
 
 
 def _channel_stats(counts: NDArray[np.int64]) -> dict[str, float]:
-    """Return the statistics of values from 0, given how often each occurs."""
+    """Return the statistics of one color channel from how often each of its values occurs.
+
+    Args:
+        counts: of the values 0, 1, 2, … of all pixels, shape (256,).
+    """
     values = np.arange(len(counts), dtype=np.float64)
     total = int(counts.sum())
     mean = float(counts @ values) / total
@@ -72,11 +77,17 @@ def _channel_stats(counts: NDArray[np.int64]) -> dict[str, float]:
 
 
 def _quantile(counts: NDArray[np.int64], share: float) -> float:
-    """Return the quantile of counted values, with linear interpolation as in NumPy."""
+    """Return the quantile of values from how often each occurs, as NumPy does from the values.
+
+    Args:
+        counts: of the values 0, 1, 2, …
+        share: of the values that are smaller, 0 to 1.
+    """
     cumulative = np.cumsum(counts)
     last = int(cumulative[-1]) - 1
-    place = last * share
+    place = last * share  # in the sorted values, from 0; interpolated between two of them
     below = int(np.floor(place))
     above = min(below + 1, last)
+    # The value at a place is the first that, with all smaller ones, occurs more often than that.
     low, high = np.searchsorted(cumulative, [below, above], side="right")
     return float(low + (place - below) * (high - low))

@@ -86,7 +86,10 @@ class FrameColumns:
         return () if self.plan.pictures == "none" else self.plan.cameras
 
     def features(self) -> dict[str, dict[str, Any]]:
-        """Return what ``info.json`` says of each column."""
+        """Return the columns by name with type and shape, as LeRobot's ``info.json`` has them.
+
+        For example ``{"dtype": "float32", "shape": [8], "names": ["joint_1", …]}``.
+        """
         found = {self.keys[camera]: self._picture_feature() for camera in self.cameras}
         joint_names = [*JOINTS, "gripper"]
         names = _POSE if self.plan.actions == "waypoint" else joint_names
@@ -125,7 +128,14 @@ class FrameColumns:
         return feature
 
     def numbers(self, trajectory: Trajectory) -> dict[str, NDArray[Any]]:
-        """Return the columns of numbers that do not depend on the instruction, (frames, size)."""
+        """Return the columns of numbers that do not depend on the instruction.
+
+        Row 0 of a trajectory is before its first action. A frame has the state of one row and the
+        action that leads to the next, so there is one frame less than rows.
+
+        Returns:
+            Each of shape (frames, size).
+        """
         facts = trajectory.facts
         frames = np.arange(facts.frames, dtype=np.int64)
         columns: dict[str, NDArray[Any]] = {
@@ -162,7 +172,7 @@ class FrameColumns:
         }
 
     def pictures(self, trajectory: Trajectory) -> dict[str, list[bytes]]:
-        """Return the columns of PNGs."""
+        """Return the pictures of each camera as PNG files, one for each frame, by column."""
         rows = range(trajectory.facts.frames)
         columns = {}
         with zipfile.ZipFile(trajectory.path) as archive:
@@ -176,13 +186,18 @@ class FrameColumns:
         numbers: Mapping[str, list[NDArray[Any]]],
         counts: Mapping[str, NDArray[np.int64]],
     ) -> dict[str, FeatureStats]:
-        """Return the statistics of all columns but texts."""
-        found = {}
-        for name, of_values in counts.items():
-            found[name] = picture_stats(of_values, self.plan.size**2)
+        """Return the statistics, such as mean and deviation, of all columns but texts.
+
+        Args:
+            numbers: by column its values, arrays of shape (frames, size).
+            counts: by column of pictures, how often each value of a channel occurs, (3, 256).
+        """
+        stats = {}
+        for name, value_counts in counts.items():
+            stats[name] = picture_stats(value_counts, self.plan.size**2)
         for name, arrays in numbers.items():
-            found[name] = vector_stats(np.concatenate(arrays))
-        return found
+            stats[name] = vector_stats(np.concatenate(arrays))
+        return stats
 
 
 def _feature(dtype: str, names: list[str]) -> dict[str, Any]:

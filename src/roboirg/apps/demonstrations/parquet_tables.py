@@ -17,7 +17,11 @@ _DICTIONARY_LIMIT = 2**30
 
 
 def number_column(values: NDArray[Any]) -> Any:  # noqa: ANN401 - pyarrow ships no types
-    """Return numbers (frames, size) as a column: plain for size 1, else lists of fixed size."""
+    """Return numbers as a column for Parquet: of plain numbers for size 1, else of lists.
+
+    Args:
+        values: shape (frames, size).
+    """
     import pyarrow as pa
 
     if values.shape[1] == 1:
@@ -49,9 +53,9 @@ def write_frames(
     *,
     is_described: bool = False,
 ) -> None:
-    """Write the frames of one trajectory, once for each of its instructions.
+    """Write the frames of one trajectory as a Parquet file, once for each of its instructions.
 
-    Pictures are stored once, whatever the number of instructions.
+    The file stores each picture only once, whatever the number of instructions.
 
     Args:
         path: file to write.
@@ -87,7 +91,14 @@ def write_frames(
 def _storage(
     features: Mapping[str, Mapping[str, Any]], *, repeats_pictures: bool
 ) -> dict[str, Any]:
-    """Return how columns are stored: PNGs are compressed already, and have no statistics."""
+    """Return pyarrow's options on how to store columns: compression, dictionaries, statistics.
+
+    Pictures are compressed already, as PNG. If they are repeated, a dictionary stores each once.
+
+    Args:
+        features: type and shape of each column.
+        repeats_pictures: whether several rows have the same picture.
+    """
     pictures = [name for name, feature in features.items() if feature["dtype"] == "image"]
     dictionaries = [name for name, feature in features.items() if feature["dtype"] == "string"]
     compression = dict.fromkeys(features, "snappy")
@@ -104,7 +115,11 @@ def _storage(
 
 
 def _hugging_face_type(feature: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a column's type as Hugging Face's `datasets` stores it in a file."""
+    """Return a column's type as Hugging Face's `datasets` stores it in a file.
+
+    A vector of eight numbers is ``{"feature": {"dtype": "float32", "_type": "Value"}, "length": 8,
+    "_type": "Sequence"}``.
+    """
     if feature["dtype"] == "image":
         return {"_type": "Image"}
     value = {"dtype": feature["dtype"], "_type": "Value"}
@@ -115,7 +130,7 @@ def _hugging_face_type(feature: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write a table of facts, with types as inferred from all rows."""
+    """Write rows, each with its values by column, as a Parquet file; types follow from all rows."""
     import pyarrow as pa
     from pyarrow import parquet
 

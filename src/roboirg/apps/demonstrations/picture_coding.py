@@ -78,6 +78,7 @@ class VideoEncoder:
         stream.pix_fmt = codec.pixels
         stream.width = size
         stream.height = size
+        # Options of the encoder: crf is the quality (0 is lossless), g the distance of key frames.
         stream.options = {
             "crf": str(codec.quality),
             "preset": "veryfast",

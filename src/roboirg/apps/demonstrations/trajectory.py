@@ -145,7 +145,7 @@ class Trajectory:
 
 
 def load_trajectory(path: Path) -> Trajectory:
-    """Read a trajectory without its pictures.
+    """Read a trajectory from its file: facts, states and actions, but no pictures.
 
     Raises:
         InvalidValueError: the file is missing or damaged, or of another version.
@@ -177,7 +177,11 @@ def load_facts(path: Path) -> TrajectoryFacts:
 
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open a trajectory's file; what goes wrong while it is read is one error."""
+    """Open a trajectory's file, and turn every error of reading it into one.
+
+    Raises:
+        InvalidValueError: the file is missing or damaged.
+    """
     try:
         with zipfile.ZipFile(path) as archive:
             yield archive
@@ -203,7 +207,13 @@ def _read_array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
 def write_arrays(
     archive: zipfile.ZipFile, facts: TrajectoryFacts, arrays: Mapping[str, NDArray[Any]]
 ) -> None:
-    """Complete the open file of a trajectory, which has its pictures already."""
+    """Write arrays and facts into the open file of a trajectory, behind its pictures.
+
+    Args:
+        archive: the file.
+        facts: what identifies the trajectory, and how it ended.
+        arrays: by name, such as ``actions``, with a row for each time step.
+    """
     for name, array in arrays.items():
         file = io.BytesIO()
         np.save(file, array, allow_pickle=False)
@@ -234,7 +244,7 @@ def read_depth(archive: zipfile.ZipFile, camera: str, row: int) -> NDArray[np.in
 
 
 def drop_pictures(path: Path) -> None:
-    """Replace a trajectory's file by one without pictures; does nothing if it has none."""
+    """Remove the pictures from a trajectory's file, to save space; keep its facts and arrays."""
     if not has_pictures(path):
         return
     with (

@@ -80,15 +80,15 @@ class _Row(NamedTuple):
         observation: after the step.
         action: that was executed.
         label: that is to be learned.
-        subgoal: what the robot was doing, with ``{at}`` for the pixel.
-        online: what was due, with its pixel.
+        doing: what the robot was doing, with ``{at}`` for the pixel.
+        due: what was due by the task, with its pixel.
     """
 
     observation: Mapping[str, Any]
     action: CheckedActions
     label: CheckedActions
-    subgoal: str
-    online: str
+    doing: str
+    due: str
 
 
 class PictureTracks:
@@ -104,20 +104,25 @@ class PictureTracks:
                 camera: VideoEncoder(spec.coding, spec.size) for camera in spec.cameras
             }
         self.histograms = {camera: np.zeros((3, 256), np.int64) for camera in spec.cameras}
-        self._uncounted: Mapping[str, Pixels] = {}
+        self._last_pictures: Mapping[str, Pixels] = {}
 
     def add(self, pictures: Mapping[str, Any]) -> None:
-        """Add the pictures of a row: ``front_rgb`` and so on."""
+        """Encode the pictures of a time step into the trajectory's file.
+
+        Args:
+            pictures: by name, such as ``front_rgb``, and ``front_depth`` if depth is recorded.
+        """
         if self._spec.coding == "none":
             return
-        # The last row of all is never counted: no action follows it, so datasets leave it out.
-        for camera, picture in self._uncounted.items():
+        # Counted one row late, so that the last row never is: no action follows it, so datasets
+        # leave it out.
+        for camera, picture in self._last_pictures.items():
             self.histograms[camera] += count_values(picture)
-        self._uncounted = {
+        self._last_pictures = {
             camera: scaled_square(pictures[f"{camera}_rgb"], self._spec.size)
             for camera in self._spec.cameras
         }
-        for camera, picture in self._uncounted.items():
+        for camera, picture in self._last_pictures.items():
             if camera in self._encoders:
                 self._encoders[camera].add(picture)
             else:
@@ -175,6 +180,7 @@ def record_trajectory(
                 recorder = _Recorder(env, policy, spec, archive)
                 facts = recorder.record(policy_name, variation)
             if only_successes and facts.status != "success":
+                # Begins the file anew with the facts alone.
                 with zipfile.ZipFile(part, "w") as archive:
                     write_arrays(archive, facts, {})
     finally:
@@ -186,7 +192,11 @@ def record_trajectory(
 def _make_env(
     episode: Episode, spec: RecordingSpec, options: InstructionOptions, policy_name: str
 ) -> RoboIRGEnv:
-    """Return the environment of an episode; the oracle looks at nothing, so only we do."""
+    """Return the environment in which an episode is recorded, with the cameras that are needed.
+
+    The oracle knows the scene and looks at nothing, so with it pictures are made only for the
+    recording; other policies look through all cameras.
+    """
     is_drawn = spec.coding != "none"
     is_oracle = policy_name == "oracle"
     cameras: tuple[str, ...] = CAMERAS
@@ -220,10 +230,10 @@ class _Recorder(EpisodeLoop):
         self._tracks = PictureTracks(archive, spec)
         self._rows: list[_Row] = []
         self._video_session: object = None
-        self._is_waypoint = env.actions == WAYPOINT.name
+        self._acts_in_waypoints = env.actions == WAYPOINT.name
 
     def record(self, policy_name: str, variation: int) -> TrajectoryFacts:
-        """Play the episode and store what happens."""
+        """Play the episode, and store its pictures, states and actions; return how it ended."""
         if self._spec.video and self._spec.coding != "none":
             self.env.set_frame_hook(self._see_video)
         observation, info = self.begin()
@@ -237,7 +247,14 @@ class _Recorder(EpisodeLoop):
         return facts
 
     def _see_video(self, env: RoboIRGEnv, is_demonstration: bool) -> None:
-        """Encode the pictures of the video while it is played."""
+        """Encode the pictures of the demonstration video while the simulator plays it.
+
+        Called after each of its steps, and of the policy's, in which nothing is done.
+
+        Raises:
+            InvalidValueError: the video is played again from its beginning, in another session,
+                because it did not come to its end.
+        """
         if not is_demonstration:
             return
         if self._video_session not in (None, env.session):
@@ -255,12 +272,12 @@ class _Recorder(EpisodeLoop):
         self._tracks.add(pictures)
 
     def begin(self) -> Moment:
-        """Start the episode; store the policy's first observation, after a step at home."""
+        """Start the episode; store what the policy observes first, as if after a step at home."""
         from roboirg.simulation.physics_settings import HOME_ACTION
 
         observation, info = super().begin()
         home = HOME_ACTION
-        if self._is_waypoint:
+        if self._acts_in_waypoints:
             home = self._pose_actions(HOME_ACTION[None])[0]
         subgoal = self.env.subgoal
         self._add_row(_Row(observation, home, home, subgoal, subgoal))
@@ -274,7 +291,16 @@ class _Recorder(EpisodeLoop):
             raise _GivenUpError(str(error)) from error
 
     def execute(self, actions: ArrayLike) -> Moment:
-        """Execute and store one action after the other."""
+        """Execute the policy's actions one after the other, and store each step.
+
+        A disturbed expert has labels, which are the actions it should have done.
+
+        Args:
+            actions: shape (steps, size), in the action space of the recording.
+
+        Returns:
+            The last observation and info, with all turns of the instruction that came meanwhile.
+        """
         observation: dict[str, Any] = {}
         info: dict[str, Any] = {}
         heard: list[Mapping[str, Any]] = []
@@ -286,25 +312,25 @@ class _Recorder(EpisodeLoop):
             observation, info = super().execute(action[None])
             heard += info["heard"]
             due = self.env.subgoal
-            self._add_row(_Row(observation, action, label, self._doing(due), due))
+            self._add_row(_Row(observation, action, label, self._current_subgoal(due), due))
             if info["status"] != "ongoing":
                 break
         return observation, {**info, "heard": heard}
 
-    def _doing(self, due: str) -> str:
-        """Return what the policy is doing: what is due, unless it knows better."""
+    def _current_subgoal(self, due: str) -> str:
+        """Return the subgoal that the policy pursues: its own if it has one, else what is due."""
         stage = getattr(self.policy, "stage", None)
         return due if stage is None else str(stage.subgoal)
 
     def _rounded(self, action: CheckedActions) -> CheckedActions:
         """Return an action in float32; a waypoint's angles near those of the one before."""
-        if self._is_waypoint:
+        if self._acts_in_waypoints:
             angles = np.unwrap([self._rows[-1].action[_ANGLES], action[_ANGLES]], axis=0)[1]
             action = np.concatenate([action[:3], angles, action[POSE_SIZE:]])
         return action.astype(np.float32).astype(np.float64)
 
     def _add_row(self, row: _Row) -> None:
-        """Keep a row without its pictures, which go into the file at once."""
+        """Add what one step gave: its pictures to the file at once, the rest to the rows kept."""
         self._tracks.add(row.observation)
         pictures = ("_rgb", "_depth")
         names = [name for name in row.observation if not name.endswith(pictures)]
@@ -338,7 +364,10 @@ class _Recorder(EpisodeLoop):
         )
 
     def _arrays(self, info: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-        """Return the arrays of a trajectory, the video's rows first."""
+        """Return everything of the trajectory that is stored as arrays, the video's rows first.
+
+        They are states, actions, subgoals, and how often each value of a color channel occurs.
+        """
         length = info["demonstration"].length if self._spec.video else 0
         arrays = self._observed_arrays(info["demonstration"], length)
         arrays |= self._action_arrays(info["demonstration"].actions[:length])
@@ -348,7 +377,15 @@ class _Recorder(EpisodeLoop):
         return arrays
 
     def _observed_arrays(self, video: FetchedDemonstration, length: int) -> dict[str, NDArray[Any]]:
-        """Return states and, with depth, calibration."""
+        """Return the robot's states and, if depth is recorded, the cameras' calibration.
+
+        Args:
+            video: what was observed before the policy's turn.
+            length: how many rows of it are stored.
+
+        Returns:
+            A row for each time step; of the cameras' intrinsics a single one, as they are constant.
+        """
         names = ["joint_positions", "gripper", "end_effector"]
         if self._spec.depth:
             names += [f"{camera}_extrinsic" for camera in CAMERAS]
@@ -363,18 +400,30 @@ class _Recorder(EpisodeLoop):
         return arrays
 
     def _action_arrays(self, of_video: CheckedActions) -> dict[str, NDArray[Any]]:
-        """Return what was executed, and what is to be learned."""
+        """Return the actions of all rows: as executed, and as poses of the tool.
+
+        If the expert was disturbed, also the labels: the actions that it should have done.
+
+        Args:
+            of_video: the actions of the video, shape (rows, size), which come first.
+        """
         labels = np.array([*of_video, *(row.label for row in self._rows)])
         arrays = {"actions": np.array([*of_video, *(row.action for row in self._rows)])}
-        arrays["pose_actions"] = labels if self._is_waypoint else self._pose_actions(labels)
+        arrays["pose_actions"] = labels if self._acts_in_waypoints else self._pose_actions(labels)
         if self._spec.disturbed:
             arrays["labels"] = labels
         return arrays
 
     def _subgoal_arrays(self, of_video: Sequence[str]) -> dict[str, NDArray[Any]]:
-        """Return what the robot was doing, and what was due, with pixels and without."""
-        due = [row.online for row in self._rows]
-        doing = _with_pixels([row.subgoal for row in self._rows], due)
+        """Return the texts of all rows: what the robot was doing, and what was due by the task.
+
+        Both come with the pixel of the thing that is meant (``grounded_…``) and without.
+
+        Args:
+            of_video: what was due in the rows of the video, which come first.
+        """
+        due = [row.due for row in self._rows]
+        doing = _with_pixels([row.doing for row in self._rows], due)
         arrays = {}
         for name, of_policy in (("online_subgoals", due), ("subgoals", doing)):
             texts = [*of_video, *of_policy]
@@ -384,7 +433,15 @@ class _Recorder(EpisodeLoop):
         return arrays
 
     def _pose_actions(self, actions: CheckedActions) -> CheckedActions:
-        """Return the tool's pose at the joint targets of each action, with unwrapped angles."""
+        """Convert actions from joint angles to poses of the tool.
+
+        Args:
+            actions: joint angles (rad) and the gripper, shape (steps, 8).
+
+        Returns:
+            Position (m), Euler angles xyz (rad) and the gripper, shape (steps, 7). Angles do not
+            jump by 2 π from one step to the next.
+        """
         from roboirg.simulation.expert.motion_planning import MotionPlanner
 
         planner = MotionPlanner(self.env.session.world.robot)
@@ -399,18 +456,20 @@ def without_pixel(subgoal: str) -> str:
     return split_point(subgoal)[0]
 
 
-def _with_pixels(templates: Sequence[str], online: Sequence[str]) -> list[str]:
-    """Fill the pixels into subgoals, as the judge's view of the same subgoal found them.
+def _with_pixels(templates: Sequence[str], due_subgoals: Sequence[str]) -> list[str]:
+    """Fill pixels into the texts of what the robot was doing: where in the picture a thing is.
+
+    The pixel is that of the last row in which the same subgoal was due; without one, there is none.
 
     Args:
-        templates: subgoals, with ``{at}`` where the pixel goes, row by row.
-        online: grounded subgoals of the stages that were due, row by row.
+        templates: what the robot was doing in each row, with ``{at}`` where the pixel goes.
+        due_subgoals: what was due in each row, with its pixel.
     """
-    latest: dict[str, str] = {}
+    with_pixel: dict[str, str] = {}  # by the text without it; later rows replace earlier ones
     filled = []
-    for template, due in zip(templates, online, strict=True):
-        latest[without_pixel(due)] = due
+    for template, due in zip(templates, due_subgoals, strict=True):
+        with_pixel[without_pixel(due)] = due
         # A subgoal such as ``pick up {at} the cube``.
         simple = without_pixel(template.replace("{at} ", "").replace(" {at}", ""))
-        filled.append(latest.get(simple, simple))
+        filled.append(with_pixel.get(simple, simple))
     return filled

@@ -40,13 +40,14 @@ Guess = Callable[[GroundingItem, Episode, np.random.Generator], Goal | None]
 
 
 def floor_answers(name: str, items: Sequence[GroundingItem], seed: int = 0) -> Iterator[Answer]:
-    """Yield the answers of a floor to slots and choices; of oracle and chance also to points.
+    """Yield the answers that a listener without understanding gives, to compare models with.
 
-    A choice is that of the goal that was guessed, or a random one if it is not among them. Random
-    numbers depend on seed and item alone.
+    These listeners are the floors; the oracle, which knows the goal, is the exception. All answer
+    the questions for a goal's values (slots) and for one of several goals (choice); oracle and
+    chance also point at pixels. Random numbers depend on seed and item alone.
 
     Args:
-        name: of `FLOORS`.
+        name: one of `FLOORS`.
         items: questions.
         seed: of all random choices.
 
@@ -81,7 +82,10 @@ def _learned_guess(items: Sequence[GroundingItem]) -> Guess:
 def _goal_answers(
     item: GroundingItem, goal: Goal | None, rng: np.random.Generator
 ) -> Iterator[Answer]:
-    """Yield the slots of a goal and its choice; a random choice if it is none of them."""
+    """Yield a guessed goal as two answers: as values in JSON (slots), and as a letter (choice).
+
+    If the goal is none of the choices, the letter is random. Without a goal the slots are empty.
+    """
     answer = None if goal is None else goal_schema(item.task).answers[goal]
     yield Answer(item.id, "slots", answer or "")
     if answer in item.choice_answers:
@@ -92,12 +96,12 @@ def _goal_answers(
 
 
 def _random_points(item: GroundingItem, rng: np.random.Generator) -> str:
-    """Return a random pixel for each thing that is meant, as JSON."""
-    found = []
+    """Return a random pixel for each thing to point at: ``{"points": [{"x": 17, "y": 203}]}``."""
+    pixels = []
     for point in item.points:
-        height, width = point.size
-        found.append({"x": int(rng.integers(width)), "y": int(rng.integers(height))})
-    return json.dumps({"points": found})
+        height, width = point.size  # of the picture
+        pixels.append({"x": int(rng.integers(width)), "y": int(rng.integers(height))})
+    return json.dumps({"points": pixels})
 
 
 def _random_goal(_item: GroundingItem, episode: Episode, rng: np.random.Generator) -> Goal:
@@ -133,15 +137,18 @@ rules; and the learner of words, trained on the same options."""
 
 
 def _learn(items: Sequence[GroundingItem]) -> dict[str, TextGuess]:
-    """Return what the learner of words alone makes of each item."""
+    """Return, by the ids of items, the goals that a learner guesses from their words alone.
+
+    It learns anew for each task and set of instruction options.
+    """
     groups: dict[tuple[str, InstructionOptions], list[GroundingItem]] = {}
     for item in items:
         groups.setdefault((item.task, item.options), []).append(item)
-    found: dict[str, TextGuess] = {}
-    for (task, options), of_group in groups.items():
-        learner = learn_goals(task, options, scenes=0)
-        heard = [LearnerInput(item.text, item.hidden_slots) for item in of_group]
+    guess_by_id: dict[str, TextGuess] = {}
+    for (task, options), group in groups.items():
+        learner = learn_goals(task, options, scenes=0)  # no random ones besides the splits'
+        heard = [LearnerInput(item.text, item.hidden_slots) for item in group]
         guesses = learner.guesses("text-only", heard)
-        for item, guess in zip(of_group, guesses, strict=True):
-            found[item.id] = guess
-    return found
+        for item, guess in zip(group, guesses, strict=True):
+            guess_by_id[item.id] = guess
+    return guess_by_id

@@ -94,9 +94,10 @@ class ScoreRow:
 def score_answers(
     items: Sequence[GroundingItem], answers: Iterable[Answer], name: str
 ) -> tuple[GroundingScore, ...]:
-    """Score answers, kind by kind.
+    """Score a model's answers to grounding questions, apart for each kind of question.
 
-    An unreadable reply is wrong. An item without an answer is missing: it is in no rate.
+    Kinds are slots (the values of the goal), choice (a letter) and points (pixels). An unreadable
+    reply is wrong. An item without an answer is missing: it is in no rate.
 
     Args:
         items: of the dataset, all of one split and one wording.
@@ -107,6 +108,7 @@ def score_answers(
         InvalidValueError: the items are of several splits or wordings, or there is no answer.
         UnknownNameError: a task is not installed.
     """
+    # Replies by the ids of their items.
     by_kind: dict[QuestionKind, dict[str, str]] = {}
     for answer in answers:
         by_kind.setdefault(answer.kind, {})[answer.id] = answer.reply
@@ -130,7 +132,11 @@ def score_rows(score: GroundingScore) -> tuple[ScoreRow, ...]:
 
 
 def _policy_run(items: Sequence[GroundingItem], name: str) -> PolicyRun:
-    """Return a model's answers as a run, for the statistics of runs."""
+    """Describe a model's answers as the run of a policy, so that runs' statistics apply to them.
+
+    Raises:
+        InvalidValueError: the items differ in split, words or versions.
+    """
     runs = {_run_of(item, name) for item in items}
     if len(runs) != 1:
         raise InvalidValueError(
@@ -154,7 +160,14 @@ def _run_of(item: GroundingItem, name: str) -> PolicyRun:
 def _score(
     items: Sequence[GroundingItem], replies: Mapping[str, str], run: PolicyRun, kind: QuestionKind
 ) -> GroundingScore:
-    """Return the verdicts on a model's replies, given by the items' ids."""
+    """Judge a model's replies to one kind of question.
+
+    Args:
+        items: all of the dataset, answered or not.
+        replies: by the ids of their items.
+        run: describes the model and its conditions.
+        kind: slots, choice or points.
+    """
     verdicts: dict[str, ReplyVerdict] = {}
     judged = []
     for item in items:
@@ -167,7 +180,13 @@ def _score(
 def _frame(
     items: Sequence[GroundingItem], verdicts: Mapping[str, ReplyVerdict], run: PolicyRun
 ) -> Frame:
-    """Return a row for each item, sorted by task, options and episode."""
+    """Return the verdicts as a table for the statistics of runs, with a row for each item.
+
+    Args:
+        items: all of the dataset, which the table has sorted by task, options and episode.
+        verdicts: by the ids of the items that were answered; others are missing.
+        run: describes the model and its conditions.
+    """
     columns: dict[str, list[Any]] = defaultdict(list)
     for item in _sorted(items):
         row = {"run": run, "item": item, **_frame_row(item, verdicts.get(item.id))}
@@ -177,7 +196,7 @@ def _frame(
 
 
 def _sorted(items: Sequence[GroundingItem]) -> list[GroundingItem]:
-    """Return items by task, options and episode."""
+    """Sort items by task, instruction options and number of the episode."""
     tasks = task_order({item.task for item in items})
 
     def place(item: GroundingItem) -> tuple[Any, ...]:
@@ -206,7 +225,11 @@ def _outcome(verdict: ReplyVerdict | None) -> str:
 
 
 def _row(score: GroundingScore, summary: Measured[ScopeKey]) -> ScoreRow:
-    """Return the row of a set of options."""
+    """Return the row of a table of scores: success of one set of instruction options.
+
+    It includes the success of random answers and, if the items have it, of a guess from the command
+    alone, as means over tasks.
+    """
     options = summary.key.options
     judged = [answered for answered in score.judged if answered.item.options == options]
     chances: dict[str, list[float]] = defaultdict(list)
@@ -238,11 +261,12 @@ def _hidden_share(judged: Iterable[JudgedItem]) -> float | None:
 
 
 def hidden_fields(item: GroundingItem) -> tuple[str, ...]:
-    """Return the fields of the answer that the command leaves to its context.
+    """Return the fields of the right answer that the command does not name, such as ``("color",)``.
 
-    An answer has a field for each amount, while the goal has two slots for all of them.
+    They are those of the goal's slots that must be found in the context. Where an answer's fields
+    are amounts, such as how many cubes of each color, they are no slots of the goal, and all count.
     """
     fields = json.loads(item.answer)
     hidden = tuple(field for field in fields if field in item.hidden_slots)
-    is_amounts = bool(item.hidden_slots) and not hidden
-    return tuple(fields) if is_amounts else hidden
+    has_amounts = bool(item.hidden_slots) and not hidden
+    return tuple(fields) if has_amounts else hidden

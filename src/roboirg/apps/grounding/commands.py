@@ -83,7 +83,13 @@ def export_grounding(
 
 
 def _episode_names(words: PlanWords, tasks: Iterable[str], splits: str) -> tuple[EpisodeName, ...]:
-    """Return the episodes of tasks and splits; a plan may name other splits, and episodes."""
+    """Return the names of all episodes to export: task, split and number.
+
+    Args:
+        words: the plan, whose splits and episodes count before those of the command line.
+        tasks: names of tasks.
+        splits: names of splits, separated by commas.
+    """
     from roboirg.apps.grounding.items.question_set import EpisodeName
     from roboirg.runs.plan.option_parsing import parse_episodes, parse_splits
 
@@ -157,7 +163,13 @@ def score_grounding(
 def _floor_scores(
     name: str, items: Sequence[GroundingItem], folder: Path | None
 ) -> tuple[GroundingScore, ...]:
-    """Return the scores of a floor, and write its answers to a folder if there is one."""
+    """Score the answers of a listener without understanding (a floor), such as ``chance``.
+
+    Args:
+        name: of the floor.
+        items: the questions.
+        folder: that the answers are written to, as a file; None to write none.
+    """
     from roboirg.apps.grounding.answer_floors import floor_answers
     from roboirg.apps.grounding.answer_scores import score_answers
     from roboirg.apps.grounding.items.answer_file import write_answers
@@ -169,7 +181,11 @@ def _floor_scores(
 
 
 def _comparisons(scores: Sequence[GroundingScore]) -> list[str]:
-    """Return the paired comparison of two models in each kind of question that both answered."""
+    """Compare two models on the same items, apart for each kind of question; return the sentences.
+
+    Args:
+        scores: of both models, one for each kind of question that it answered.
+    """
     from roboirg.analysis.measures.comparison import compare
     from roboirg.analysis.measures.comparison_text import sentences
 

@@ -80,10 +80,12 @@ class DatasetFacts(NamedTuple):
 def export_grounding(
     request: ExportRequest, folder: Path, workers: int, progress: Progress | None = None
 ) -> DatasetFacts:
-    """Write the dataset; return its facts.
+    """Write a dataset of grounding questions; return its size and a digest of its content.
+
+    It has a file of items, Parquet files for each split, pictures, videos, and a card.
 
     Args:
-        request: what it holds.
+        request: which episodes, settings and options the questions are of.
         folder: created if missing, else empty.
         workers: worker processes; 0 uses this process only.
         progress: called with the number of episodes that are done, and of all.
@@ -96,8 +98,8 @@ def export_grounding(
     """
     items = collect_items(request, folder, workers, progress)
     content = write_items(items, folder)
-    for split, of_split in _by_split(items).items():
-        write_parquet(of_split, folder, split)
+    for split, items_of_split in _by_split(items).items():
+        write_parquet(items_of_split, folder, split)
     facts = DatasetFacts(
         items=len(items),
         pictures=len(_pictures(items)),
@@ -118,7 +120,7 @@ def _by_split(items: Sequence[GroundingItem]) -> dict[str, list[GroundingItem]]:
 
 
 def _pictures(items: Sequence[GroundingItem]) -> set[str]:
-    """Return the paths of all pictures, those of videos too."""
+    """Return the paths of all pictures of the items: first pictures, and frames of videos."""
     found: set[str] = set()
     for item in items:
         found.add(item.picture)
@@ -152,15 +154,15 @@ def _card(request: ExportRequest, items: Sequence[GroundingItem], facts: Dataset
 
 
 def _counts(items: Sequence[GroundingItem]) -> str:
-    """Return a table of the numbers of items by task and setting."""
-    counts: dict[str, Counter[str]] = {}
+    """Return a Markdown table of the numbers of items, tasks by settings; a dash for none."""
+    count_by_task: dict[str, Counter[str]] = {}
     for item in items:
-        counts.setdefault(item.task, Counter())[item.setting] += 1
+        count_by_task.setdefault(item.task, Counter())[item.setting] += 1
     asked = {item.setting for item in items}
     settings = [name for name in setting_names() if name in asked]
     lines = [_table_line("task", settings), f"| --- |{' ---: |' * len(settings)}"]
-    for task, of_task in counts.items():
-        lines.append(_table_line(task, [str(of_task[name] or "–") for name in settings]))
+    for task, counts in count_by_task.items():
+        lines.append(_table_line(task, [str(counts[name] or "–") for name in settings]))
     return "\n".join(lines)
 
 

@@ -25,9 +25,15 @@ _TEXT_LISTS = (
 
 
 def write_parquet(items: Sequence[GroundingItem], folder: Path, split: str) -> None:
-    """Write the items of a split with their pictures inside, for pandas and `datasets`.
+    """Write the questions of a split as a Parquet file with pictures inside.
 
-    Pictures are columns of the type Image of `datasets`, which loads the file without options.
+    It is for pandas, and for Hugging Face's `datasets`, which loads the file without options since
+    pictures are columns of its type Image.
+
+    Args:
+        items: the questions, a row for each.
+        folder: of the dataset, where pictures are read and the file is written.
+        split: for the file's name.
     """
     check_parquet_support()
     import pyarrow as pa
@@ -36,6 +42,7 @@ def write_parquet(items: Sequence[GroundingItem], folder: Path, split: str) -> N
     schema = _arrow_schema()
     path = folder / DATA / f"{split}-00000-of-00001.parquet"
     pictures = _PictureFiles(folder)
+    # Items of an episode share pictures: columns with a dictionary store equal values once.
     dictionaries = ["picture.bytes", "frames.list.element.bytes", *schema.names]
     with (
         replacing(path) as part,
@@ -76,6 +83,10 @@ def _row(item: GroundingItem, pictures: _PictureFiles) -> dict[str, Any]:
 
 
 def _arrow_schema() -> Any:  # noqa: ANN401 - pyarrow ships no types
+    """Return the columns of the Parquet file with their types: one for each field of an item.
+
+    A field is a text unless named here. The metadata has the types as `datasets` reads them.
+    """
     import pyarrow as pa
 
     text = pa.string()
@@ -106,7 +117,10 @@ def _arrow_schema() -> Any:  # noqa: ANN401 - pyarrow ships no types
 
 
 def _features(schema: Any) -> dict[str, Any]:  # noqa: ANN401 - pyarrow ships no types
-    """Return the description of the columns that `datasets` reads."""
+    """Return the types of the columns in the words of Hugging Face's `datasets`.
+
+    For example ``{"info": {"features": {"task": {"dtype": "string", "_type": "Value"}, …}}}``.
+    """
     image = {"_type": "Image"}
     found = {field.name: _feature(field.type) for field in schema}
     found["picture"] = image
@@ -115,6 +129,10 @@ def _features(schema: Any) -> dict[str, Any]:  # noqa: ANN401 - pyarrow ships no
 
 
 def _feature(kind: Any) -> Any:  # noqa: ANN401 - pyarrow ships no types
+    """Return the type of a column of pyarrow as Hugging Face's `datasets` describes it.
+
+    A list of numbers is ``{"feature": {"dtype": "int64", "_type": "Value"}, "_type": "List"}``.
+    """
     import pyarrow as pa
 
     if pa.types.is_list(kind):

@@ -50,7 +50,7 @@ EPISODE = "episode"
 def roboirg_grounding(
     data: str = "grounding", question: str = "slots", settings: str = "all", tasks: str = "all"
 ) -> Task:
-    """Ask one kind of question about every item of an exported dataset.
+    """Ask one kind of question about every item of an exported dataset: a task of Inspect.
 
     Args:
         data: folder that `roboirg export grounding` wrote.
@@ -82,7 +82,14 @@ def roboirg_grounding(
 
 @solver
 def ask(data: str, question: str) -> Solver:
-    """Query the model; an unusable answer about slots is asked for once more, with the reason."""
+    """Return a solver that asks the model, and asks once more if its answer cannot be used.
+
+    Only answers in JSON (slots) are asked for again, with the reason.
+
+    Args:
+        data: folder of the dataset.
+        question: slots, choice or points.
+    """
     again = load_prompts(PROMPTS)["again"]
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:
@@ -93,6 +100,7 @@ def ask(data: str, question: str) -> Solver:
                 goal_schema(item.task).read(state.output.completion)
             except UnparsableReplyError as error:
                 if not state.output.completion:
+                    # Services refuse an empty message as part of the conversation.
                     state.messages[-1].content = SILENCE
                 state.messages.append(ChatMessageUser(content=again.substitute(why=str(error))))
                 state = await generate(state)
@@ -103,7 +111,12 @@ def ask(data: str, question: str) -> Solver:
 
 @scorer(metrics=[accuracy(), stderr(cluster=EPISODE), grouped(accuracy(), "setting")])
 def right(data: str, question: str) -> Scorer:
-    """Score replies as `roboirg score grounding` does."""
+    """Return a scorer as of `roboirg score grounding`: 1 if all of a reply is right, else 0.
+
+    Args:
+        data: folder of the dataset.
+        question: slots, choice or points.
+    """
     kind = known_name("question", question, QUESTION_KINDS)
 
     async def score(state: TaskState, target: Target) -> Score:
@@ -127,7 +140,13 @@ def log_answers(log: EvalLog) -> list[Answer]:
 
 
 def _sample(item: GroundingItem, kind: QuestionKind, folder: Path) -> Sample:
-    """Return a question as Inspect asks it: texts and pictures in turn."""
+    """Return one question of an item as a sample of Inspect: messages, right reply and metadata.
+
+    Args:
+        item: with the instruction and the names of its pictures.
+        kind: slots, choice or points.
+        folder: of the dataset, with the pictures.
+    """
     texts = QuestionTexts(
         item.system_prompt(kind), item.said, item.shown, item.now, item.question(kind)
     )

@@ -32,7 +32,7 @@ class Confusion(NamedTuple):
 
 
 def report_text(scores: Sequence[GroundingScore], data: Path, target: Path) -> str:
-    """Return the report.
+    """Return a report in Markdown: scores, breakdowns, confusions and examples of wrong answers.
 
     Args:
         scores: of one or several models.
@@ -52,10 +52,10 @@ def report_text(scores: Sequence[GroundingScore], data: Path, target: Path) -> s
 
 
 def confusion_tables(score: GroundingScore) -> Iterator[Table]:
-    """Yield for each field of an answer a table of what was meant and what was understood.
+    """Yield a confusion table for each field of answers, such as ``color``: meant by understood.
 
-    Only instructions whose command leaves the field to its context count, those with an explicit
-    command in none.
+    An instruction counts in the fields that its command leaves to its context. Explicit ones, whose
+    command names all, count in none.
     """
     found: dict[str, Counter[Confusion]] = {}
     for item, verdict in score.judged:
@@ -70,7 +70,15 @@ def confusion_tables(score: GroundingScore) -> Iterator[Table]:
 
 
 def _confusion_table(field: str, counts: Counter[Confusion]) -> Table:
-    """Return a row for each value that was meant, and a column for each that was understood."""
+    """Return the table of how often which value was understood instead of which.
+
+    It has a row for each value that was meant, and a column for each that was understood; right
+    ones are marked.
+
+    Args:
+        field: of the answers, such as ``color``.
+        counts: by the values that were meant and understood.
+    """
     every_meant = set()
     every_understood = set()
     for pair in counts:
@@ -104,7 +112,12 @@ def _text(value: object) -> str:
 
 
 def _mistakes(score: GroundingScore, pictures: Path) -> Iterator[str]:
-    """Yield some wrong answers, with links to what was seen."""
+    """Yield a section of the report with some wrong answers, and links to what was seen.
+
+    Args:
+        score: of a model, in one kind of question.
+        pictures: folder of the dataset, as seen from the report.
+    """
     wrong = [answered for answered in score.judged if not answered.verdict.right]
     if not wrong:
         return
@@ -123,7 +136,10 @@ def _mistakes(score: GroundingScore, pictures: Path) -> Iterator[str]:
 
 
 def _spread(wrong: Iterable[JudgedItem]) -> list[JudgedItem]:
-    """Return at most `MOST_MISTAKES`, the first of every task and setting, then the second, ..."""
+    """Choose at most `MOST_MISTAKES` wrong answers from as many tasks and settings as possible.
+
+    They are the first one of every task and setting, then the second one of each, and so on.
+    """
     seen: Counter[tuple[str, str]] = Counter()
     by_rank: dict[int, list[JudgedItem]] = {}
     for answered in wrong:

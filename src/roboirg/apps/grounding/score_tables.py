@@ -23,7 +23,7 @@ QUESTIONS = {"slots": "slots", "choice": "choices", "points": "points"}
 
 
 def score_table(scores: Iterable[GroundingScore]) -> Table:
-    """Return a table with a row for each model, kind of question and set of options."""
+    """Return the table of scores: a row for each model, kind of question and set of options."""
     scores = tuple(scores)
     rows = []
     for score in scores:
@@ -46,7 +46,11 @@ def _title(score: GroundingScore) -> str:
 
 
 def breakdown_tables(score: GroundingScore) -> Iterator[Table]:
-    """Yield the gaps to explicit by pattern, expression, and names of hidden slots."""
+    """Yield tables of success by kinds of instructions, with gaps to explicit ones.
+
+    Kinds are reasoning patterns, referring expressions, and values that the command leaves to its
+    context. Explicit instructions name the goal.
+    """
     for name, labels_of in _LABELS.items():
         labels = [tuple(labels_of(item)) for item in score.frame["item"]]
         frame = score.frame.extended({name: as_column(labels)})
@@ -55,7 +59,10 @@ def breakdown_tables(score: GroundingScore) -> Iterator[Table]:
 
 
 def _words(row: ScoreRow) -> tuple[str, ...]:
-    """Return the cells of a row, in the order of `COLUMNS`."""
+    """Return the texts of a row of the table of scores, one for each of `COLUMNS`.
+
+    Rates are in percent, the gap to explicit in points.
+    """
     summary = row.summary
     value, _, p_value = gap_words(summary.gap, summary.p_holm)
     rate = None if summary.rate is None else float(summary.rate)
@@ -73,6 +80,7 @@ def _words(row: ScoreRow) -> tuple[str, ...]:
 
 
 def _notes(scores: Sequence[GroundingScore]) -> Iterator[str]:
+    """Yield the notes below the table: its columns, and answers that are unreadable or missing."""
     yield (
         "Percent correct, as means over tasks. Random: goals of the scene, letters or pixels "
         "drawn at random. Above random: 0 is random, 100 all correct. Command: a guess among the "

@@ -39,7 +39,10 @@ _ASCII = str.maketrans({"−": "-", "±": None})
 
 
 def csv_text(*tables: Table) -> str:
-    """Return every entry of some tables with its counts and the interval of its rate."""
+    """Return tables as comma-separated lines, one for each entry, below the headings `HEAD`.
+
+    A line has what is not printed, too: counts, and the interval of the rate.
+    """
     lines: list[Sequence[object]] = [HEAD]
     for table in tables:
         for row in table.rows:
@@ -49,7 +52,7 @@ def csv_text(*tables: Table) -> str:
 
 
 def json_text(*tables: Table) -> str:
-    """Return a JSON list with an object for each row: its table, and what is printed, by heading.
+    """Return tables as JSON: a list with an object for each row, its texts by their headings.
 
     For example ``[{"table": "main", "setting": "explicit", "policy": "pi0", "mean": "62.5"}]``.
     """
@@ -65,7 +68,14 @@ def json_text(*tables: Table) -> str:
 
 
 def _line(table: Table, row: Row, column: Column, entry: Entry) -> list[object]:
-    """Return the values of an entry, one for each column of `HEAD`."""
+    """Return the line of one entry of a table, with a value for each of the columns `HEAD`.
+
+    Args:
+        table: the entry's.
+        row: the entry's; its group and name are values.
+        column: the entry's; its name is a value.
+        entry: with the rate in percent, its counts and its interval.
+    """
     # Counts and interval take several columns each, which are empty without them.
     counts: Sequence[object] = [""] * len(Counts._fields)
     if entry.counts is not None:

@@ -82,7 +82,7 @@ _NAME = 30
 
 
 def latex(table: Table) -> str:
-    """Return table environments with rules between groups of columns and of rows.
+    """Return a table as LaTeX: several floats, each of a page at most, if it is wide or long.
 
     The averages of suites, which the paper does not have, are left out.
     """
@@ -124,9 +124,12 @@ class _Part(NamedTuple):
 
 
 def _blocks(table: Table) -> Iterator[list[Row]]:
-    """Yield the rows of each table; a group is divided only if it is longer than a table."""
+    """Yield the rows of a table in blocks that fit on a page.
+
+    Rows of a group stay together unless the group alone is longer than a page.
+    """
     longest_name = max([len(row.name) for row in table.rows], default=0)
-    lines_of_row = 1 + longest_name // _NAME
+    lines_of_row = 1 + longest_name // _NAME  # names are folded at this many letters
     most = _LINES // lines_of_row  # rows in a table
     block: list[Row] = []
     for group in table.groups():
@@ -140,9 +143,12 @@ def _blocks(table: Table) -> Iterator[list[Row]]:
 
 
 def _float(part: _Part, place: int, count: int) -> str:
-    """Return one of `count` tables as an environment that LaTeX places, a float.
+    """Return the LaTeX of one float; a wide or long table is divided among several.
 
-    Only the last one has the notes.
+    Args:
+        part: the rows and columns of this one.
+        place: its number, from 1, for its caption and label.
+        count: number of floats of the table; only the last one has the notes.
     """
     table = part.table
     caption = escaped(table.title)
@@ -164,7 +170,7 @@ def _float(part: _Part, place: int, count: int) -> str:
 
 
 def _column_kinds(part: _Part) -> str:
-    """Return how the columns are aligned, as LaTeX writes it.
+    """Return LaTeX's specification of a table's columns: how each is aligned.
 
     For example ``lrr``: names to the left, two columns of numbers to the right.
     """
@@ -181,7 +187,11 @@ def _column_kinds(part: _Part) -> str:
 
 
 def _lines(part: _Part) -> Iterator[str]:
-    """Yield the lines of a table: headings, then each group below a rule and its name."""
+    """Yield the LaTeX lines of a table: headings, then each group below a rule and its name.
+
+    Args:
+        part: the table, and which of its columns are shown.
+    """
     table = part.table
     columns = part.columns
     heads = list(map(escaped, table.heads[1:]))  # groups stand in lines of their own
@@ -201,7 +211,7 @@ def _lines(part: _Part) -> Iterator[str]:
 
 
 def _column_groups(columns: Sequence[Column], names: int) -> list[str]:
-    """Return the line with the groups of columns, and that of the rules below it.
+    """Return the two LaTeX lines above the headings: names of groups of columns, and rules below.
 
     A group's name is centered over its columns; no rule is below columns without a group.
 
@@ -225,7 +235,7 @@ def _column_groups(columns: Sequence[Column], names: int) -> list[str]:
 
 
 def _head(name: str) -> str:
-    """Return a heading with a line for each of its words; ``PickXtimes`` has Pick and Xtimes."""
+    """Return the LaTeX of a heading with its words stacked: Pick above Xtimes of ``PickXtimes``."""
     words = list(map(escaped, _HUMPS.split(name)))
     if len(words) == 1:
         return words[0]
@@ -239,7 +249,10 @@ def _line(cells: list[str]) -> str:
 
 
 def _cell(entry: Entry, column: Column) -> str:
-    """Return an entry: bold if it is the best, with a small colored arrow, and with its signs."""
+    """Return the LaTeX of an entry: its text, bold if the best, then its change, then its signs.
+
+    The change from the reference is a small colored arrow with a number, as ``↑1.33`` has.
+    """
     text = _foldable(entry.text) if column.is_text else escaped(entry.text)
     if entry.best:
         text = rf"\textbf{{{text}}}"

@@ -10,10 +10,10 @@ _SPECIAL = str.maketrans({sign: f"\\{sign}" for sign in "\\|*_`<[]"})
 
 
 def markdown(table: Table) -> str:
-    """Return title, table and notes; only the first row of a group names the group.
+    """Return a table in GitHub's Markdown, below its title and above its notes.
 
-    A table begins with its headings and a line of rules, ``| --- | ---: |``, of which a colon to
-    the right puts the column's cells to the right.
+    Between headings and rows is a line such as ``| --- | ---: |``, whose colons align columns to
+    the right. Only the first row of a group names the group.
     """
     rules = ["---"] * len(table.heads)
     for column in table.columns:

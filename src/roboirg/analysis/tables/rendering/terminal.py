@@ -20,10 +20,10 @@ _TEXT_WIDTH = 80
 
 
 def renderable(table: Table, console: Console) -> RenderableType:
-    """Return the table with its notes, split to fit the console's width.
+    """Return a table as the terminal prints it: title, grid and notes, several if it is too wide.
 
-    Columns without a result in any row are left out. A console that is no terminal is widened if
-    names need it; in a terminal they are folded.
+    Columns without a result in any row are left out. If the output is a file, its lines are made as
+    long as names need; in a terminal these are folded.
     """
     room = line_width(console) - _labels_width(table)
     parts = split_columns(table, _columns_with_text(table), room)
@@ -69,14 +69,18 @@ def plain(table: Table) -> str:
 
 
 def split_columns(table: Table, shown: Sequence[int], room: int) -> list[list[int]]:
-    """Return the columns of each part by number: whole groups if they fit, at least one column.
+    """Divide the columns of a table that is too wide into parts that fit.
 
-    For example ``[[0, 1, 2], [3, 4]]`` for five columns, of which three fit into the room.
+    For example ``[[0, 1, 2], [3, 4]]`` for five columns, of which three fit. A group of columns,
+    such as a suite of tasks, stays together if it fits into one part.
 
     Args:
         table: what is split.
-        shown: the columns that are printed.
-        room: characters of a part without the labels of its rows.
+        shown: numbers of the columns that are printed.
+        room: width of a part in characters, without the labels of its rows.
+
+    Returns:
+        The numbers of the columns of each part, at least one.
     """
     widths = _column_widths(table)
     groups: dict[str, list[int]] = {}
@@ -99,7 +103,7 @@ def split_columns(table: Table, shown: Sequence[int], room: int) -> list[list[in
 
 
 def _column_widths(table: Table) -> list[int]:
-    """Return the characters of each column, with its line and blanks."""
+    """Return the width of each column in characters, with its line and blanks."""
     widths = [len(column.name) for column in table.columns]
     for row in table.rows:
         for number, entry in enumerate(row.entries):
@@ -127,7 +131,10 @@ def _titles(table: Table, parts: Sequence[Sequence[int]]) -> list[str]:
 
 
 def _grid(table: Table, numbers: Sequence[int]) -> Grid:
-    """Return some columns of a table, given their numbers, as a table of the library rich."""
+    """Return some columns of a table, given their numbers, as the library rich prints them.
+
+    Rows that are not this run's, such as published ones, are dim.
+    """
     grid = Grid()
     for head in table.heads:
         grid.add_column(head, overflow="fold")
@@ -151,7 +158,10 @@ def _grid(table: Table, numbers: Sequence[int]) -> Grid:
 
 
 def _cell(entry: Entry) -> Text:
-    """Return an entry: bold if it is the best, then its change, then its signs in yellow."""
+    """Return an entry as the terminal prints it: the rate, bold if the best, change, and signs.
+
+    The change is from a reference, such as explicit; signs, in yellow, mark incomplete rates.
+    """
     parts = []
     if entry.text:
         parts.append(Text(entry.text, "bold" if entry.best else entry.style))

@@ -88,7 +88,10 @@ def make_parts(
 
 
 def write_part(part: DatasetPart) -> None:
-    """Write the frames and videos of one trajectory."""
+    """Write one trajectory as a Parquet file, with its videos: LeRobot's format 3.0.
+
+    The file has the trajectory's frames once for each of its instructions.
+    """
     (episode,) = part.episodes
     columns = part.columns
     trajectory = load_trajectory(episode.path)
@@ -110,16 +113,19 @@ def write_videos(part: DatasetPart, name_of: Callable[..., str]) -> None:
 
 
 def frame_columns(columns: FrameColumns, trajectory: Trajectory) -> dict[str, Any]:
-    """Return the columns of a trajectory's frames that every instruction shares."""
-    found = {}
+    """Return a trajectory's columns, as Parquet holds them, without those of single instructions.
+
+    They are numbers such as states and actions, texts, and pictures if these are not in videos.
+    """
+    arrow_columns = {}
     for name, numbers in columns.numbers(trajectory).items():
-        found[name] = number_column(numbers)
+        arrow_columns[name] = number_column(numbers)
     for name, texts in columns.texts(trajectory).items():
-        found[name] = text_column(texts)
+        arrow_columns[name] = text_column(texts)
     if not columns.has_videos:
         for name, pictures in columns.pictures(trajectory).items():
-            found[name] = picture_column(pictures)
-    return found
+            arrow_columns[name] = picture_column(pictures)
+    return arrow_columns
 
 
 def own_columns(placed: PlacedText, length: int) -> dict[str, Any]:
@@ -129,7 +135,10 @@ def own_columns(placed: PlacedText, length: int) -> dict[str, Any]:
 
 
 def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
-    """Write the metadata; ``info.json``, without which nothing reads the dataset, comes last."""
+    """Write the metadata of a complete dataset: episodes, texts, statistics, and ``info.json``.
+
+    The latter comes last, because nothing reads the dataset without it.
+    """
     columns = parts[0].columns
     stats = StatsCollector(columns)
     episodes = []
@@ -159,6 +168,8 @@ class StatsCollector:
 
     def __init__(self, columns: FrameColumns) -> None:
         self._columns = columns
+        # By column: the numbers of each episode, (frames, size), and of pictures (3, 256) how often
+        # each value of a color channel occurs.
         self._numbers: defaultdict[str, list[NDArray[Any]]] = defaultdict(list)
         self._counts: dict[str, NDArray[np.int64]] = {}
         # Instructions of a trajectory follow one another and share what is slow to compute.
@@ -166,7 +177,12 @@ class StatsCollector:
         self._shared_stats: dict[str, FeatureStats] = {}
 
     def add(self, trajectory: Trajectory, placed: PlacedText) -> dict[str, FeatureStats]:
-        """Add an episode; returns its own statistics."""
+        """Add an episode to the statistics of the dataset; return those of the episode alone.
+
+        Args:
+            trajectory: what the robot did.
+            placed: the episode's instruction, with its numbers in the dataset.
+        """
         shared = self._columns.numbers(trajectory)
         indices = self._columns.indices(placed, trajectory.facts.frames)
         for name, values in (shared | indices).items():
@@ -186,7 +202,10 @@ class StatsCollector:
     def _stats_of(
         self, trajectory: Trajectory, shared: Mapping[str, NDArray[Any]]
     ) -> dict[str, FeatureStats]:
-        """Return the statistics of what all instructions of a trajectory share."""
+        """Return the statistics of the columns that all instructions of a trajectory share.
+
+        They are kept until the next trajectory comes.
+        """
         if self._last_path != trajectory.path:
             numbers = {name: [values] for name, values in shared.items()}
             counts = self._picture_counts(trajectory)
@@ -200,7 +219,13 @@ class StatsCollector:
 
 
 def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[str, Any]:
-    """Return the row of an episode: where its frames are, in the table and in the videos."""
+    """Return a row of LeRobot's table of episodes: where an episode's frames are stored.
+
+    Args:
+        part: the file with its frames.
+        placed: its instruction, with its numbers in the dataset.
+        length: number of its frames.
+    """
     chunk, file = part.place
     entry: dict[str, Any] = {
         "episode_index": placed.episode_index,
@@ -225,15 +250,19 @@ def _episode_entry(part: DatasetPart, placed: PlacedText, length: int) -> dict[s
 
 def _flat(stats: Mapping[str, FeatureStats]) -> dict[str, Any]:
     """Return statistics in one level: that of ``action`` ``{"min": …}`` is ``stats/action/min``."""
-    found = {}
-    for feature, of_feature in stats.items():
-        for name, value in of_feature.items():
-            found[f"stats/{feature}/{name}"] = value
-    return found
+    flat = {}
+    for feature, stats_of_feature in stats.items():
+        for name, value in stats_of_feature.items():
+            flat[f"stats/{feature}/{name}"] = value
+    return flat
 
 
 def _write_tasks(path: Path, texts: Sequence[str]) -> None:
-    """Write the texts as pandas does with them as the index, which LeRobot expects."""
+    """Write the distinct texts of instructions with their indices, as LeRobot expects them.
+
+    It reads the file with pandas, and wants the texts as the index of the data frame; this is said
+    by the metadata that pandas itself would write.
+    """
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -274,7 +303,12 @@ def _write_tasks(path: Path, texts: Sequence[str]) -> None:
 
 
 def common_info(parts: Sequence[DatasetPart], texts: Sequence[str]) -> dict[str, Any]:
-    """Return what ``info.json`` says in both versions of the format."""
+    """Return the facts of ``info.json`` that versions 2.1 and 3.0 of LeRobot's format share.
+
+    Args:
+        parts: of the dataset, in the order of its frames.
+        texts: the distinct instructions.
+    """
     last = parts[-1].episodes[-1]
     placed = last.texts[-1]
     count = placed.episode_index + 1

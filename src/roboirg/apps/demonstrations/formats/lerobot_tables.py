@@ -26,9 +26,10 @@ _JOINTS = 7
 
 
 def read_tables(root: Path) -> Iterator[ReplayableTrajectory]:
-    """Yield the trajectories of an export, each with the frames of its first instruction.
+    """Read the trajectories of a dataset that was exported in LeRobot's format, to replay them.
 
-    A folder that holds no export has none.
+    A trajectory is in the dataset once for each instruction, of which the first is read. Frames of
+    the video that the policy was shown are left out. A folder without an export has none.
     """
     path = root / INFO
     if not path.is_file() or not (root / EPISODE_TABLE).is_file():
@@ -57,6 +58,7 @@ def read_tables(root: Path) -> Iterator[ReplayableTrajectory]:
             split=row["split"],
             index=row["episode"],
             actions=actions.astype(np.float64),
+            # After each action; frames have states before it. Of the final one, a single finger.
             states=np.concatenate([states[1:], final[None, : _JOINTS + 1]]),
             final_state=final,
             status=row["status"],

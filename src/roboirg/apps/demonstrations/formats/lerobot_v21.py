@@ -107,7 +107,10 @@ GR00T reads `meta/modality.json`; it needs videos, so export with `--pictures lo
 
 
 def write_part(part: DatasetPart) -> None:
-    """Write the episodes of one trajectory."""
+    """Write the episodes of one trajectory in LeRobot's format 2.1, each as a Parquet file.
+
+    An episode is the trajectory with one of its instructions.
+    """
     (episode,) = part.episodes
     columns = part.columns
     trajectory = load_trajectory(episode.path)
@@ -123,7 +126,10 @@ def write_part(part: DatasetPart) -> None:
 
 
 def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
-    """Write the metadata; ``info.json``, without which nothing reads the dataset, comes last."""
+    """Write the metadata of a complete dataset: episodes, texts, statistics, and ``info.json``.
+
+    The latter comes last, because nothing reads the dataset without it.
+    """
     columns = parts[0].columns
     collector = StatsCollector(columns)
     episodes = []
@@ -149,7 +155,12 @@ def finish(root: Path, parts: Sequence[DatasetPart]) -> None:
 
 
 def _info(parts: Sequence[DatasetPart], texts: Sequence[str]) -> dict[str, Any]:
-    """Return what ``info.json`` says."""
+    """Return the content of ``info.json``: counts, columns, and where files are.
+
+    Args:
+        parts: of the dataset, in the order of its frames.
+        texts: the distinct instructions.
+    """
     columns = parts[0].columns
     info = common_info(parts, texts)
     episodes = info["total_episodes"]
@@ -162,7 +173,10 @@ def _info(parts: Sequence[DatasetPart], texts: Sequence[str]) -> dict[str, Any]:
 
 
 def modality(columns: FrameColumns) -> dict[str, Any]:
-    """Return GR00T's description of the columns: which numbers are what."""
+    """Return the content of ``modality.json``, with which GR00T finds arm and gripper in columns.
+
+    For example, numbers 0 to 6 of the state are the arm, the last one is the gripper.
+    """
     state = {}
     action = {}
     for name, start, end in (("arm", 0, _ARM_JOINTS), ("gripper", _ARM_JOINTS, _ARM_JOINTS + 1)):

@@ -80,7 +80,13 @@ def words_of(words: TaskText) -> str:
 def make_parts(
     plan: ExportPlan, root: Path, recorded: Sequence[RecordedTexts]
 ) -> list[DatasetPart]:
-    """Return a part for each task."""
+    """Divide a dataset into parts, one for each task, as RoboMME has a file for each.
+
+    Args:
+        plan: what is exported.
+        root: folder of the dataset.
+        recorded: its trajectories, with their instructions.
+    """
     columns = FrameColumns(plan)
     by_task: dict[str, list[RecordedEpisode]] = {}
     for episode in place_texts(recorded):
@@ -97,7 +103,11 @@ def _task(episode: RecordedEpisode) -> str:
 
 
 def write_part(part: DatasetPart) -> None:
-    """Write the files of one task: one, or one for each setting and form that share its steps."""
+    """Write the demonstrations of one task as RoboMME's HDF5 files.
+
+    With one setting and form, this is one file. With several, each has a folder with a file of its
+    words, whose time steps are links to a common file, as they do not depend on words.
+    """
     import h5py
 
     name = f"record_dataset_{_task(part.episodes[0])}.h5"
@@ -115,7 +125,7 @@ def write_part(part: DatasetPart) -> None:
 
 
 def _folders(part: DatasetPart) -> list[str]:
-    """Return the folder of each setting and form of the instructions."""
+    """Return the folders of a part: one for each setting and form of its instructions."""
     folders: dict[str, None] = {}
     for episode in part.episodes:
         for placed in episode.texts:
@@ -124,7 +134,7 @@ def _folders(part: DatasetPart) -> list[str]:
 
 
 def _write_episode(file: Any, episode: RecordedEpisode) -> None:  # noqa: ANN401
-    """Write an episode with its time steps and its first instruction."""
+    """Write an episode into an open HDF5 file: its time steps and its first instruction."""
     trajectory = load_trajectory(episode.path)
     group = file.create_group(f"episode_{trajectory.facts.episode}")
     _write_setup(group, trajectory, episode.texts[0])
@@ -134,7 +144,14 @@ def _write_episode(file: Any, episode: RecordedEpisode) -> None:  # noqa: ANN401
 
 
 def _link_episode(file: Any, episode: RecordedEpisode, folder: str, home: str) -> None:  # noqa: ANN401
-    """Write an episode's own words, and links to its time steps."""
+    """Write an episode's words in one setting and form, and links to its time steps.
+
+    Args:
+        file: open HDF5 file of the setting and form.
+        episode: with its instructions.
+        folder: name of the setting and form.
+        home: path of the file with the time steps, from the folder.
+    """
     import h5py
 
     for placed in episode.texts:
@@ -155,7 +172,7 @@ def time_steps(trajectory: Trajectory) -> list[int]:
 
 
 def _write_setup(group: Any, trajectory: Trajectory, placed: PlacedText) -> None:  # noqa: ANN401
-    """Write what holds for all time steps of an episode."""
+    """Write the group ``setup`` of an episode: seed, difficulty, instruction, camera intrinsics."""
     import h5py
 
     facts = trajectory.facts
@@ -175,7 +192,14 @@ def _write_step(
     row: int,
     archive: zipfile.ZipFile,
 ) -> None:
-    """Write a time step from a row of a trajectory, with the pictures of its open file."""
+    """Write one time step of a trajectory as RoboMME has it: observation, actions and subgoals.
+
+    Args:
+        group: of HDF5, for the time step.
+        trajectory: what the robot did.
+        row: number of the time step in it.
+        archive: the trajectory's open file, with its pictures.
+    """
     _write_observation(group.create_group("obs"), trajectory, row, archive)
     done = group.create_group("action")
     done["joint_action"] = trajectory.actions[row]
@@ -198,7 +222,14 @@ def _write_observation(
     row: int,
     archive: zipfile.ZipFile,
 ) -> None:
-    """Write pictures, depth and the robot's state."""
+    """Write what is observed in one time step: pictures, depth, and the robot's state.
+
+    Args:
+        seen: group of HDF5.
+        trajectory: what the robot did.
+        row: number of the time step in it.
+        archive: the trajectory's open file, with its pictures.
+    """
     for camera in CAMERAS:
         picture = read_picture(archive, camera, row)
         depth = read_depth(archive, camera, row)
@@ -235,7 +266,11 @@ def training_text(_plan: ExportPlan, root: Path) -> str:
 
 
 def read(path: Path) -> Iterator[ReplayableTrajectory]:
-    """Yield the trajectories of RoboMME's files in a folder, or of one such file."""
+    """Read the trajectories of RoboMME's HDF5 files, to replay them.
+
+    Args:
+        path: a folder of files, each of one task, or one such file; anything else has none.
+    """
     for file_path in _hdf5_files(path):
         check_hdf5_support()
         import h5py
@@ -254,7 +289,16 @@ def _hdf5_files(path: Path) -> list[Path]:
 
 
 def _read_hdf5_episode(group: Any, task: str, name: str) -> ReplayableTrajectory:  # noqa: ANN401
-    """Return an episode of RoboMME's files, without the time steps of its video."""
+    """Read an episode of a RoboMME file, without the time steps of the video shown before it.
+
+    Args:
+        group: of HDF5, for the episode.
+        task: its task.
+        name: of the episode in the file.
+
+    Returns:
+        Actions and states have seven joint angles (rad) and one number for the gripper.
+    """
     actions = []
     states = []
     final = None

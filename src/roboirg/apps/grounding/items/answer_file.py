@@ -34,7 +34,11 @@ class Answer(msgspec.Struct, frozen=True):
 
 
 def read_answers(path: Path, items: Sequence[GroundingItem]) -> list[Answer]:
-    """Return the answers of a file, each for a question of the items.
+    """Read a model's answers to grounding questions from a file of JSON lines.
+
+    Args:
+        path: of the file; each line has the id of an item, the kind of question, and the reply.
+        items: of the dataset that the answers are for.
 
     Raises:
         InvalidValueError: the file cannot be read, a line is no answer, names an unknown item, or

@@ -32,13 +32,13 @@ class GoalChoices(NamedTuple):
 
 
 def draw_choices(episode: Episode, instruction: Instruction, identity: str) -> GoalChoices:
-    """Return the choices, in an order that does not depend on the goal.
+    """Return the choices of a multiple-choice question: the goal that is meant, and wrong ones.
 
-    The others are goals that fit the command alone: who ignores its context can only guess. Where
-    the command leaves none, they are goals with as many values, or any goals of the scene.
+    Wrong ones fit the command without its context, if there are any such goals, so a model that
+    ignores the context can only guess. The place of the right one does not depend on the goal.
 
     Args:
-        episode: the episode.
+        episode: whose goal is meant.
         instruction: what is said.
         identity: of the item; equal identities have equal choices.
     """
@@ -59,7 +59,10 @@ def _place_of_right(episode: Episode, instruction: Instruction, count: int) -> i
 
 
 def _wrong_goals(episode: Episode, instruction: Instruction) -> Sequence[Goal]:
-    """Return goals that are not meant: of those, the ones that are hardest to tell from it."""
+    """Return the wrong goals that are hardest to tell from the right one.
+
+    They fit the command without its context or, if none does, have as many values; else any.
+    """
     wrong = [goal for goal in goals_of(episode) if not is_right(goal, episode)]
     fit_command = set(blind_goals(instruction, episode))
     fitting = [goal for goal in wrong if goal in fit_command]

@@ -97,10 +97,10 @@ class GroundingItem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fi
 
     @property
     def options(self) -> InstructionOptions:
-        """The instruction options without `wordings`, as the columns of records.
+        """The options of the item's instruction, as records of episodes have them.
 
-        Those that an item does not have keep their defaults, such as the delivery: an item has both
-        the text and the turns.
+        They are without `wordings`, which records have apart. Options that an item does not have
+        keep their defaults, such as the delivery: an item has both the text and the turns.
         """
         known = [name for name in OPTION_NAMES if name in self.__struct_fields__]
         given = {name: getattr(self, name) for name in known}
@@ -125,7 +125,15 @@ def encode_mask(mask: Mask) -> list[int]:
 
 
 def decode_mask(counts: list[int], size: tuple[int, int]) -> Mask:
-    """Return the mask of `encode_mask`, shape `size`.
+    """Return a mask of a picture from the lengths of its runs, as `encode_mask` makes them.
+
+    Args:
+        counts: numbers of pixels that are outside and inside in turn, from the top left, column by
+            column. The first one is 0 if the first pixel is inside.
+        size: height and width of the picture.
+
+    Returns:
+        Booleans, shape (height, width).
 
     Raises:
         InvalidValueError: the runs do not fill the picture.
@@ -147,7 +155,9 @@ def write_items(items: list[GroundingItem], folder: Path) -> bytes:
 
 
 def decode_lines(content: bytes, kind: type[T], origin: Path) -> Iterator[tuple[int, T]]:
-    """Yield numbers and objects of JSON lines that are not empty.
+    """Yield the objects in a file of JSON lines, each with the number of its line, from 1.
+
+    Empty lines are left out.
 
     Raises:
         InvalidValueError: a line is no such object.
@@ -156,14 +166,17 @@ def decode_lines(content: bytes, kind: type[T], origin: Path) -> Iterator[tuple[
     for number, line in enumerate(content.splitlines(), start=1):
         if line.strip():
             try:
-                found = decoder.decode(line)
+                decoded = decoder.decode(line)
             except (msgspec.DecodeError, UnicodeDecodeError) as error:
                 raise InvalidValueError(f"{origin}, line {number}: not valid ({error}).") from error
-            yield number, found
+            yield number, decoded
 
 
 def read_items(folder: Path) -> list[GroundingItem]:
-    """Return all items of an exported dataset.
+    """Read the items of an exported dataset of grounding questions.
+
+    Args:
+        folder: of the dataset.
 
     Raises:
         InvalidValueError: the folder has no items, or a line is no item.

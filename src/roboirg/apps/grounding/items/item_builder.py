@@ -42,17 +42,18 @@ def wanted_options(
     *,
     every_variant: bool,
 ) -> Iterator[InstructionOptions]:
-    """Yield the options of an episode's items; equal words once.
+    """Yield the instruction options for which an episode gets a question, each once.
 
-    Leaves out settings that the task lacks or that cannot express the episode. An option that a
-    setting does not read keeps its default.
+    Settings that the task lacks or that cannot express the episode are left out. An option that a
+    setting does not use keeps its default.
 
     Args:
         episode: the episode.
         settings: names of settings.
         forms: implicit, resolved or both; explicit has one form.
-        options: all others.
-        every_variant: add every combination of options that changes the words of a setting.
+        options: values of all other options.
+        every_variant: whether to add every combination of options that changes the words of a
+            setting.
     """
     available = settings_of(get_task(episode.task))
     for name in settings:
@@ -66,7 +67,14 @@ def wanted_options(
 def _options_of(
     name: str, forms: Sequence[str], options: InstructionOptions, *, every_variant: bool
 ) -> Iterator[InstructionOptions]:
-    """Yield the options of a setting's items, some of them maybe twice."""
+    """Yield the instruction options for which a setting gets questions, some of them maybe twice.
+
+    Args:
+        name: of the setting.
+        forms: implicit, resolved or both; explicit has one form.
+        options: values that are used, of those that the setting reads.
+        every_variant: whether to add every combination of options that changes the words.
+    """
     setting = all_settings()[name]
     read = {str(option): getattr(options, option) for option in setting.reads - {"delivery"}}
     variants: list[Mapping[str, Any]] = [read]
@@ -131,7 +139,7 @@ def _episode_fields(episode: Episode) -> dict[str, Any]:
 
 
 def _option_fields(options: InstructionOptions) -> dict[str, Any]:
-    """Return the options of an item; those that it does not have are left out."""
+    """Return the fields of an item on the options of its instruction: setting, form, and so on."""
     known = GroundingItem.__struct_fields__
     fields = {name: value for name, value in asdict(options).items() if name in known}
     fields["stages"] = list(options.stages)
@@ -153,7 +161,11 @@ def _media_fields(media: EpisodeMedia) -> dict[str, Any]:
 def _instruction_fields(
     episode: Episode, instruction: Instruction, options: InstructionOptions
 ) -> dict[str, Any]:
-    """Return what is said, and what the command alone leaves open."""
+    """Return the fields of an item on its instruction: its words, and what the command leaves open.
+
+    ``command_chance`` is the success of a guess among the goals that fit the command alone, 0 to 1;
+    ``hidden_slots`` are the values of the goal that only the command's context names.
+    """
     hidden: list[str] = []
     if options.form != "resolved":  # a resolved command leaves none to its context
         hidden = list(hidden_slots((episode, instruction)))
@@ -189,7 +201,11 @@ def _slots_question(
 def _choice_question(
     episode: Episode, instruction: Instruction, choices: GoalChoices
 ) -> dict[str, Any]:
-    """Return the question for a letter: each goal in explicit words of the other pool."""
+    """Return the multiple-choice question: the choices in words, and the right letter.
+
+    Goals are said explicitly, and with words of the other pool (training or test) than the
+    instruction has, so that a choice cannot be found by comparing words.
+    """
     questions = load_prompts(QUESTIONS)
     (other_pool,) = set(POOLS) - {instruction.metadata["pool"]}
     explicit = InstructionOptions(wordings=other_pool)
@@ -204,7 +220,10 @@ def _choice_question(
 
 
 def _points_question(episode: Episode) -> dict[str, Any]:
-    """Return the question for pixels, and whether they have an order."""
+    """Return the question to point at the things that are meant, and whether they have an order.
+
+    They have one where things are handled one after the other, and none where the goal is amounts.
+    """
     questions = load_prompts(QUESTIONS)
     is_sequence = is_ordered(episode.goal)
     nouns = [noun(episode.task, kind) for kind in pointed_kinds(episode.task)]
@@ -219,7 +238,11 @@ def _points_question(episode: Episode) -> dict[str, Any]:
 
 
 def _answer_fields(episode: Episode, choices: GoalChoices) -> dict[str, Any]:
-    """Return the right answer, all equally right ones, and those of all goals and choices."""
+    """Return the fields of an item on its answers, each a goal as JSON.
+
+    They are the right answer, all that are equally right, those of every goal of the scene, and
+    those of the choices.
+    """
     answers = goal_schema(episode.task).answers
     right = []
     every_answer = []

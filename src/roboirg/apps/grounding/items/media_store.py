@@ -54,13 +54,15 @@ class EpisodeMedia(NamedTuple):
 
 
 def store_media(folder: Path, episode: Episode, every: int, most: int) -> EpisodeMedia:
-    """Play the video of an episode, if it has one, take its pictures and store them.
+    """Store the first picture of an episode, and the video before it if it has one.
+
+    Files are named by their content, so equal ones are stored once.
 
     Args:
         folder: of the dataset.
         episode: the episode.
         every: control steps between two frames of the video.
-        most: maximum of the frames that are stored as pictures, too.
+        most: how many frames of the video are stored as pictures, too, at most.
 
     Raises:
         RoboIRGError: a thing that is meant cannot be seen, or the video cannot be played.
@@ -93,11 +95,18 @@ def _store_frames(folder: Path, clip: Clip, most: int) -> tuple[str, ...]:
 
 
 def _points(env: RoboIRGEnv, episode: Episode) -> tuple[PointTarget, ...]:
-    """Return where the things that are meant are seen in the first picture."""
+    """Return where the things that the instruction means are seen in the first picture.
+
+    Each has a pixel and a mask.
+
+    Raises:
+        RoboIRGError: one of them cannot be seen.
+    """
     world = env.session.world
     segments = world.cameras.segmentation(FRONT)
     found = []
     for referent in find_referents(episode):
+        # `segments`, shape (height, width), has in each pixel the number of the body seen there.
         numbers = [world.bodies[name].segment for name in referent.objects]
         mask = np.isin(segments, numbers)
         if not mask.any():
@@ -110,7 +119,17 @@ def _points(env: RoboIRGEnv, episode: Episode) -> tuple[PointTarget, ...]:
 
 
 def store_content(folder: Path, kind: str, content: bytes, suffix: str) -> str:
-    """Store a file under a name that follows from its content; return its path in the dataset."""
+    """Store a file under a hash of its content, so that equal files are stored once.
+
+    Args:
+        folder: of the dataset.
+        kind: folder in it, such as ``pictures``.
+        content: of the file.
+        suffix: of its name, such as ``.png``.
+
+    Returns:
+        The path in the dataset: ``pictures/3f9c….png``.
+    """
     name = hashlib.sha256(content).hexdigest()[:NAME_DIGITS]
     path = folder / kind / f"{name}{suffix}"
     if not path.exists():

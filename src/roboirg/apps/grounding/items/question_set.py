@@ -61,10 +61,12 @@ class ExportRequest(NamedTuple):
 def collect_items(
     request: ExportRequest, folder: Path, workers: int, progress: Progress | None = None
 ) -> list[GroundingItem]:
-    """Make the items of a request, and store their pictures and videos; return the items.
+    """Make the grounding questions of some episodes, and store their pictures and videos.
+
+    Returns the items, each with its questions, in the order of the request's episodes.
 
     Args:
-        request: what is asked.
+        request: the episodes, settings and options.
         folder: created if missing, else empty.
         workers: worker processes; 0 uses this process only.
         progress: called with the number of episodes that are done, and of all.
@@ -75,6 +77,7 @@ def collect_items(
         RoboIRGError: a thing that is meant cannot be seen, or a video cannot be played.
     """
     _check_empty(folder)
+    # By episode, because worker processes end in any order.
     items_of: dict[EpisodeName, list[GroundingItem]] = {}
     work = functools.partial(_make_episode, folder, request)
     total = len(request.episodes)
@@ -101,7 +104,14 @@ def _check_empty(folder: Path) -> None:
 
 
 def _make_episode(folder: Path, request: ExportRequest, name: EpisodeName) -> list[GroundingItem]:
-    """Return the items of an episode, and store its pictures; runs in worker processes."""
+    """Return the questions of an episode, and store its pictures; runs in a worker process.
+
+    Args:
+        folder: of the dataset.
+        request: settings and options of the questions.
+        name: task, split and number of the episode.
+    """
+    # A process of its own has not read the file with words yet.
     open_wordings(request.wordings_file)
     episode = get_episode(*name)
     wanted = list(

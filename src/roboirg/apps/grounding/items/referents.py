@@ -41,27 +41,28 @@ def is_ordered(goal: Goal) -> bool:
 
 @functools.cache
 def pointed_kinds(task_name: str) -> tuple[ObjectKind, ...]:
-    """Return the kinds of objects to point at in a task, in the order of its stages.
+    """Return the kinds of objects that a question asks to point at, such as ``("cube",)``.
 
-    These are the kinds of which different goals of a scene need different objects. If there are
-    none, as where goals differ in a number only, it is the kind that the robot handles first.
+    These are the kinds of which different goals of a scene need different objects, so that pointing
+    shows which goal was understood. If there are none, as where goals differ in a number only, it
+    is the kind that the robot handles first. They are in the order of the task's stages.
     """
     task = get_task(task_name)
-    pointed: list[ObjectKind] = []
-    distinguished: set[ObjectKind] = set()
-    handled: set[ObjectKind] = set()
+    all_kinds: list[ObjectKind] = []
+    differing: set[ObjectKind] = set()
+    handled_first: set[ObjectKind] = set()
     for episode in split_episodes([task_name], [SOURCE]):
         scene = episode.scene
-        by_goal = [_pointed(task, scene, goal) for goal in task.goals(scene)]
-        shared = set(by_goal[0]).intersection(*by_goal)
-        for name in itertools.chain(*by_goal):
+        names_by_goal = [_pointed(task, scene, goal) for goal in task.goals(scene)]
+        in_every_goal = set(names_by_goal[0]).intersection(*names_by_goal)
+        for name in itertools.chain(*names_by_goal):
             kind = scene[name].kind
-            pointed.append(kind)
-            if name not in shared:
-                distinguished.add(kind)
-        handled.update(_first_handled(scene, by_goal[0]))
-    wanted = distinguished or handled
-    return tuple(kind for kind in dict.fromkeys(pointed) if kind in wanted)
+            all_kinds.append(kind)
+            if name not in in_every_goal:
+                differing.add(kind)
+        handled_first.update(_first_handled(scene, names_by_goal[0]))
+    wanted = differing or handled_first
+    return tuple(kind for kind in dict.fromkeys(all_kinds) if kind in wanted)
 
 
 def _first_handled(scene: Scene, names: Sequence[str]) -> list[ObjectKind]:
@@ -73,10 +74,11 @@ def _first_handled(scene: Scene, names: Sequence[str]) -> list[ObjectKind]:
 
 
 def find_referents(episode: Episode) -> tuple[Referent, ...]:
-    """Return the things that are meant, in the order in which they are handled.
+    """Return the things in the first picture that an instruction means: those to point at.
 
-    Where the things to handle are not there yet when the words are said, such as containers that
-    appear later, they are the things from which they are told apart: the cubes in their places.
+    They are in the order in which they are handled; if the goal is amounts, there is one for each
+    color, as any object of a color is right. Things that are not there yet when the words are said,
+    such as containers that appear later, are replaced by the cubes in their places.
     """
     task = get_task(episode.task)
     scene = episode.scene
@@ -100,7 +102,7 @@ def noun(task_name: str, kind: ObjectKind) -> str:
 
 
 def _pointed(task: Task, scene: Scene, goal: Goal) -> list[str]:
-    """Return the objects at which the stages of a goal point, each once."""
+    """Return the names of the objects that the stages of a goal are about, each once, in order."""
     names: list[str] = []
     for stage in task.stages(scene, goal):
         name = stage.points_at
@@ -118,12 +120,15 @@ def _seen_instead(task: Task, scene: Scene, name: str) -> str:
 
 
 def _by_color(scene: Scene, names: Iterable[str]) -> tuple[Referent, ...]:
-    """Return a referent for each color: any object of a color is as good as another."""
-    first_of: dict[object, SceneObject] = {}
+    """Return one referent for each color of some objects, with all objects of the color.
+
+    Any of them is right to point at, as the goal says only how many of each color.
+    """
+    first_of_color: dict[object, SceneObject] = {}
     for name in names:
-        first_of.setdefault(scene[name].color, scene[name])
+        first_of_color.setdefault(scene[name].color, scene[name])
     referents = []
-    for color, first in first_of.items():
+    for color, first in first_of_color.items():
         objects = [item.name for item in scene.of_kind(first.kind) if item.color == color]
         referents.append(Referent(first.kind, tuple(objects)))
     return tuple(referents)

@@ -59,22 +59,26 @@ def judge_reply(item: GroundingItem, kind: QuestionKind, reply: str) -> ReplyVer
 
 
 def guess_chance(item: GroundingItem, kind: QuestionKind) -> float:
-    """Return how often a random answer is right.
+    """Return the probability, 0 to 1, that a random answer to a question is right.
 
-    Slots are a goal of the scene, choices a letter that has one, and points as many random
-    pixels as there are things.
+    For slots the answer is a random goal of the scene, for a choice a random letter, for points
+    random pixels, as many as there are things to point at.
     """
     if kind == "slots":
         return len(item.answers) / len(item.goals)
     if kind == "choice":
         return 1 / len(item.choices)
-    shares = [float(point.mask.mean()) for point in item.points]
+    shares = [float(point.mask.mean()) for point in item.points]  # of the picture, for each thing
+    # Without an order, the same pixels are right in every order.
     orders = 1 if item.points_in_order else math.factorial(len(shares))
     return math.prod(shares) * orders
 
 
 def right_reply(item: GroundingItem, kind: QuestionKind) -> str:
-    """Return a reply that is right: slots as JSON, a letter, or a pixel for each thing."""
+    """Return a right reply to a question: the goal's values as JSON, a letter, or pixels as JSON.
+
+    There is a pixel for each thing to point at.
+    """
     if kind == "slots":
         return item.answer
     if kind == "choice":
@@ -84,6 +88,10 @@ def right_reply(item: GroundingItem, kind: QuestionKind) -> str:
 
 
 def _judge_slots(item: GroundingItem, reply: str) -> ReplyVerdict:
+    """Judge a reply that gives a goal's values as JSON: as a whole, and value by value.
+
+    Several goals may be right; single values are compared with those of the goal that is meant.
+    """
     schema = goal_schema(item.task)
     wanted = json.loads(item.answer)
     try:
@@ -104,6 +112,10 @@ def _judge_choice(item: GroundingItem, reply: str) -> ReplyVerdict:
 
 
 def _judge_points(item: GroundingItem, reply: str) -> ReplyVerdict:
+    """Judge a reply of pixels: right if each thing that is meant is hit, and there are no others.
+
+    If the things have an order, the first pixel must hit the first of them, and so on.
+    """
     points = _read_points(reply)
     parts = {}
     for number, target in enumerate(item.points):
@@ -116,9 +128,9 @@ def _judge_points(item: GroundingItem, reply: str) -> ReplyVerdict:
 
 
 def _read_points(reply: str) -> list[Pixel]:
-    """Return the points of a reply; empty if it has none or is unreadable.
+    """Return the pixels of a reply in JSON; empty if it has none or is unreadable.
 
-    They are in a field, in a list, or a single one is the object itself.
+    Read are ``{"points": [{"x": 1, "y": 2}]}``, the list alone, and a single ``{"x": 1, "y": 2}``.
     """
     try:
         found = last_json(reply)
