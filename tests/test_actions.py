@@ -23,7 +23,7 @@ finite = st.floats(-10, 10)
 
 
 @given(hnp.arrays(np.float64, 8, elements=finite))
-def test_good_actions_pass_unchanged(action):
+def test_an_action_of_eight_finite_numbers_passes_unchanged_as_array_or_list(action):
     assert np.array_equal(check_action(action), action)
     assert np.array_equal(check_action(action.tolist()), action)
     assert np.array_equal(check_chunk(action), action[None])
@@ -34,7 +34,8 @@ def test_good_actions_pass_unchanged(action):
         np.float32, st.tuples(st.integers(1, 20), st.just(8)), elements=st.floats(-1, 1, width=32)
     )
 )
-def test_good_chunks_pass_unchanged(chunk):
+def test_rows_of_actions_pass_unchanged_as_array_or_tensor(chunk):
+    """Several rows of eight numbers are a chunk."""
     assert np.array_equal(check_chunk(chunk), chunk)
     # NumPy takes no tensor in bfloat16, with a gradient, or on a GPU.
     made = "detach.return_value.cpu.return_value.double.return_value.numpy.return_value"
@@ -42,7 +43,7 @@ def test_good_chunks_pass_unchanged(chunk):
 
 
 @given(hnp.arrays(np.float64, hnp.array_shapes(min_dims=0, max_dims=3), elements=finite))
-def test_other_shapes_are_refused_with_their_shape(action):
+def test_an_action_of_another_shape_is_refused_with_its_shape(action):
     if action.shape != (8,):
         with pytest.raises(InvalidActionError, match=r"got shape"):
             check_action(action)
@@ -50,7 +51,7 @@ def test_other_shapes_are_refused_with_their_shape(action):
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("column", [0, 7])
-def test_values_that_are_not_finite_are_named(bad, column):
+def test_a_value_that_is_nan_or_infinite_is_refused_with_its_row_and_column(bad, column):
     action = np.zeros(8)
     action[column] = bad
     with pytest.raises(InvalidActionError, match=f"value {column} is {bad}"):
@@ -73,7 +74,7 @@ def test_what_is_not_an_array_of_numbers_is_refused(bad, got):
         check_chunk(bad)
 
 
-def masked(place):
+def array_masked_at(place):
     array = np.ma.array(np.zeros((3, 8)))
     array[place] = np.ma.masked
     return array
@@ -86,14 +87,15 @@ def masked(place):
         ([[0.0] * 8, [0.0] * 7 + [True]], "Action value 7 of row 1 is True"),
         ([True] * 8, "Action value 0 is True"),
         ([np.zeros(8), np.zeros(8) > 0], "Action value 0 of row 1 is False"),
-        (masked((1, 3)), "Action value 3 of row 1 is masked"),
-        (list(masked((1, 3))), "Action value 3 of row 1 is masked"),
-        (masked((1, 3))[1], "Action value 3 is masked"),
+        (array_masked_at((1, 3)), "Action value 3 of row 1 is masked"),
+        (list(array_masked_at((1, 3))), "Action value 3 of row 1 is masked"),
+        (array_masked_at((1, 3))[1], "Action value 3 is masked"),
         ([0.0] * 7 + [None], "Action value 7 is None"),
         ([[0.0] * 8, [Decimal("0.5")] + [0.0] * 7], r"Action value 0 of row 1 is Decimal\('0.5'\)"),
     ],
 )
-def test_flags_masked_values_and_what_is_no_number_are_named(bad, got):
+def test_a_flag_a_masked_value_or_no_number_is_refused_with_its_place(bad, got):
+    """NumPy would take True for 1, and a masked value for the number below its mask."""
     with pytest.raises(InvalidActionError, match=got):
         check_chunk(bad)
 
@@ -132,7 +134,8 @@ def test_unknown_action_spaces_are_named(name):
         find_action_space(name)
 
 
-def test_limits_enclose_home():
+def test_the_arms_home_pose_lies_within_the_limits_of_actions():
+    """As seven joint angles and a gripper, and as the pose of the tool: position, then angles."""
     home = np.array([0, 0, 0, -np.pi / 2, 0, np.pi / 2, np.pi / 4, 1])
     assert ((home >= JOINT_ANGLE.low) & (home <= JOINT_ANGLE.high)).all()
 

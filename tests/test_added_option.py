@@ -14,7 +14,7 @@ from plan_files import plan_file
 
 import roboirg
 
-CHANGES = {
+CHANGES_THAT_ADD_THE_OPTION = {
     "core/instruction_options.py": [
         (
             "    delivery: Label = field(",
@@ -47,7 +47,7 @@ CHANGES = {
 """All that is changed in the package to add it: texts and what they become, by file."""
 
 
-PROGRAM = """
+CALL_COMMANDS = """
 import contextlib, io, json, sys
 import roboirg
 from roboirg.main import main
@@ -64,10 +64,10 @@ print(json.dumps([*told, env.instruction.text]))
 
 
 @pytest.fixture
-def package(tmp_path: Path) -> Path:
+def source_with_the_option(tmp_path: Path) -> Path:
     folder = tmp_path / "src" / "roboirg"
     shutil.copytree(Path(roboirg.__file__).parent, folder)
-    for name, changes in CHANGES.items():
+    for name, changes in CHANGES_THAT_ADD_THE_OPTION.items():
         text = (folder / name).read_text()
         for before, after in changes:
             assert before in text
@@ -78,9 +78,10 @@ def package(tmp_path: Path) -> Path:
 
 @pytest.mark.sim
 @pytest.mark.slow
-def test_an_added_option_reaches_words_commands_plans_records_and_tables(
-    package: Path, tmp_path: Path
+def test_a_new_instruction_option_reaches_words_commands_plans_records_and_tables(
+    source_with_the_option: Path, tmp_path: Path
 ) -> None:
+    """`greeting` is added to a copy of the package, as a field and the code that reads it."""
     few = ("--tasks", "PickXtimes", "--settings", "explicit,direct")
     plan = plan_file(greeting="hello", max_steps=2, episodes=1)
     run, rows = tmp_path / "run", tmp_path / "rows.jsonl"
@@ -92,9 +93,9 @@ def test_an_added_option_reaches_words_commands_plans_records_and_tables(
         ("export", "instructions", *few, "--plan", plan, "--out", rows),
     ]
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, json.dumps(commands, default=str)],
+        [sys.executable, "-c", CALL_COMMANDS, json.dumps(commands, default=str)],
         capture_output=True, text=True, check=False, cwd=tmp_path,
-        env=os.environ | {"PYTHONPATH": str(package), "COLUMNS": "200"},
+        env=os.environ | {"PYTHONPATH": str(source_with_the_option), "COLUMNS": "200"},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     shown, planned, _, tables, _, made = json.loads(done.stdout)

@@ -40,7 +40,7 @@ def score_server(folder):
 
 
 @contextmanager
-def running(server):
+def port_of_running(server):
     thread = threading.Thread(target=server.serve_forever)
     thread.start()
     try:
@@ -51,7 +51,7 @@ def running(server):
         server.server_close()
 
 
-def get(server, path, **headers):
+def response_to(server, path, **headers):
     connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=600)
     if isinstance(server, ScoreServer):
         headers["Cookie"] = f"{server.cookie}={server.key}"
@@ -62,26 +62,26 @@ def get(server, path, **headers):
     return response
 
 
-def send(port, request):
+def socket_after(port, request):
     raw = socket.create_connection(("127.0.0.1", port), timeout=600)
     raw.sendall(request.encode("latin-1"))
     return raw
 
 
-def test_a_client_that_disconnects_prints_nothing(tmp_path, capfd):
+def test_a_client_that_hangs_up_makes_the_server_print_nothing_and_it_goes_on(tmp_path, capfd):
     server = page_server(tmp_path)
-    with running(server) as port:
+    with port_of_running(server) as port:
         host = f"Host: 127.0.0.1:{port}\r\n"
         for request in (
             "GET / HTTP/1.1\r\nHost: loc",
             f"POST /infer HTTP/1.1\r\n{host}Content-Length: 60000\r\n\r\nx",
             f"GET /video.mp4 HTTP/1.1\r\n{host}\r\n",
         ):
-            raw = send(port, request)
+            raw = socket_after(port, request)
             if "video" in request:
                 raw.recv(10)
             raw.close()
-        assert get(server, "/page").status == 200
+        assert response_to(server, "/page").status == 200
     assert capfd.readouterr() == ("", "")
 
 
@@ -93,21 +93,22 @@ def test_a_client_that_disconnects_prints_nothing(tmp_path, capfd):
         ("Content-Length: 5\r\nContent-Length: 6", 400),
     ],
 )
-def test_what_is_no_request_or_too_large_is_refused(headers, status, tmp_path, capfd):
+def test_a_request_with_a_wrong_or_huge_length_is_refused(headers, status, tmp_path, capfd):
     server = score_server(tmp_path)
-    with running(server) as port:
+    with port_of_running(server) as port:
         key = f"Cookie: {server.cookie}={server.key}\r\n"
         head = f"POST /score HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n{key}{headers}\r\n\r\n"
-        with send(port, head) as raw:
+        with socket_after(port, head) as raw:
             assert raw.recv(65536).startswith(f"HTTP/1.1 {status} ".encode())
-        assert get(server, "/").status == 200
+        assert response_to(server, "/").status == 200
     assert capfd.readouterr().err == ""
 
 
 @pytest.mark.parametrize(("make", "path"), [(page_server, "/page"), (score_server, "/")])
-def test_pages_of_other_sites_are_refused(make, path, tmp_path):
+def test_requests_from_pages_of_other_sites_are_refused(make, path, tmp_path):
+    """A browser gives the name it was asked for (Host) and the page that asks (Origin)."""
     server = make(tmp_path)
-    with running(server) as port:
+    with port_of_running(server) as port:
         for host, origin, status in (
             (f"localhost:{port}", None, 200),
             (f"127.0.0.1:{port}", f"http://127.0.0.1:{port}", 200),
@@ -119,34 +120,34 @@ def test_pages_of_other_sites_are_refused(make, path, tmp_path):
             ("127.0.0.1.evil.example", None, 403),
         ):
             headers = {"Host": host} | ({} if origin is None else {"Origin": origin})
-            response = get(server, path, **headers)
+            response = response_to(server, path, **headers)
             assert response.status == status, headers
             assert response.headers["X-Content-Type-Options"] == "nosniff"
 
 
-def test_a_body_that_does_not_come_is_not_logged(caplog):
+def test_a_client_that_hangs_up_before_its_body_is_not_logged_as_an_error(caplog):
     started = threading.Event()
 
     async def read(request):
         started.set()
         return PlainTextResponse(await read_body(request, 60_000))
 
-    with running(AppServer(Starlette(routes=[Route("/", read, methods=["POST"])]))) as port:
+    with port_of_running(AppServer(Starlette(routes=[Route("/", read, methods=["POST"])]))) as port:
         head = f"POST / HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nContent-Length: 60000\r\n\r\nx"
-        raw = send(port, head)
+        raw = socket_after(port, head)
         assert started.wait(60)
     raw.close()
     assert caplog.text == ""
 
 
-def test_an_error_of_ours_logs_its_traceback(caplog):
+def test_an_exception_in_the_servers_own_code_is_logged_with_its_traceback(caplog):
     def fail(request):
         raise RuntimeError("a bug")
 
     server = AppServer(Starlette(routes=[Route("/", fail)]))
 
-    with running(server):
-        assert get(server, "/").status == 500
+    with port_of_running(server):
+        assert response_to(server, "/").status == 500
         deadline = time.monotonic() + 60  # the log follows the response
         while "RuntimeError: a bug" not in caplog.text and time.monotonic() < deadline:
             time.sleep(0.05)
@@ -154,14 +155,14 @@ def test_an_error_of_ours_logs_its_traceback(caplog):
     assert "RuntimeError: a bug" in caplog.text
 
 
-def test_a_port_in_use_is_an_error(tmp_path):
+def test_a_port_in_use_or_out_of_range_is_refused(tmp_path):
     with run_server(tmp_path) as server:
         for port in (server.port, 70_000, -1):
             with pytest.raises(InvalidValueError, match=f"Cannot listen on 127.0.0.1:{port} "):
                 run_server(tmp_path, port)
 
 
-WAITING = """
+PROGRAM_WITH_A_SLOW_SERVER = """
 import sys, time
 from starlette.applications import Starlette
 from starlette.routing import Route
@@ -187,15 +188,18 @@ finally:
 
 
 @pytest.mark.parametrize("request_line", ["GET / HTTP/1.1", "POST / HTTP/1.1"])
-def test_ctrl_c_does_not_wait_for_a_request(request_line):
+def test_ctrl_c_ends_a_server_although_a_request_is_not_finished(request_line):
     with subprocess.Popen(
-        [sys.executable, "-c", WAITING], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", PROGRAM_WITH_A_SLOW_SERVER],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     ) as process:
         port = int(process.stdout.readline())
         head = f"{request_line}\r\nHost: 127.0.0.1:{port}\r\n"
         body = "Content-Length: 9\r\n\r\nx" if "POST" in request_line else "\r\n"
 
-        with send(port, head + body):
+        with socket_after(port, head + body):
             assert process.stdout.readline() == "waiting\n"
             process.send_signal(signal.SIGINT)
             assert process.wait(timeout=300) == 130

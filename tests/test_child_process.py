@@ -24,11 +24,11 @@ from roboirg.util.parallel_map import parallel_map
 from roboirg.util.process_guard import descendants
 
 
-def answer(connection: Connection) -> None:
-    serve(connection, obey)
+def answer_messages(connection: Connection) -> None:
+    serve(connection, obey_message)
 
 
-def obey(message: str) -> object:
+def obey_message(message: str) -> object:
     if message == "leave":
         os._exit(3)
     if message == "ignore":
@@ -53,7 +53,7 @@ def wait_for(what: Callable[[], bool]) -> bool:
 
 
 def test_a_child_answers_and_exits_when_its_channel_is_closed():
-    child = ChildProcess.spawn(answer)
+    child = ChildProcess.spawn(answer_messages)
     child.send("who")
 
     assert child.receive() == (child.pid, signal.SIG_IGN)
@@ -68,8 +68,8 @@ def test_a_child_answers_and_exits_when_its_channel_is_closed():
         ("kill", "the process died of signal 9 (Killed)", True),
     ],
 )
-def test_how_a_child_ended_is_told(message, words, was_killed):
-    child = ChildProcess.spawn(answer)
+def test_a_child_that_ended_is_reported_with_its_exit_code_or_signal(message, words, was_killed):
+    child = ChildProcess.spawn(answer_messages)
     child.send("who")
     child.receive()
     if message == "kill":
@@ -83,25 +83,28 @@ def test_how_a_child_ended_is_told(message, words, was_killed):
     assert isinstance(child.receive(), ChildExit)
 
 
-def test_a_child_that_the_kernel_does_not_end_is_left():
-    """`join` needs a limit here, as `abs` does: waiting for a driver would stop all workers."""
+def test_closing_does_not_wait_for_a_child_that_the_kernel_cannot_end():
+    """As one that hangs in a driver: `join` must get a limit, or all workers would stop.
+
+    Here `join` is `abs`, which fails without an argument.
+    """
     stuck = SimpleNamespace(exitcode=None, kill=str, pid=2**30, join=abs, close=str)
     assert ChildProcess(stuck, stuck).close() == ChildExit(None)  # type: ignore[arg-type]
 
 
-def test_where_no_process_can_start_one_sentence_says_what_would_help():
-    """The usual limit of open files is raised before that."""
+def test_a_child_that_cannot_start_is_reported_with_what_would_help():
+    """The limit of open files, 64 here, has been raised to at least 1,024 before that."""
     resource.setrlimit(resource.RLIMIT_NOFILE, (64, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
     with (
         patch.object(SpawnProcess, "start", side_effect=OSError(errno.EMFILE, "Too many files")),
         pytest.raises(RoboIRGError, match=r"be started: Too many files; use fewer workers, or"),
     ):
-        ChildProcess.spawn(answer)
+        ChildProcess.spawn(answer_messages)
     assert resource.getrlimit(resource.RLIMIT_NOFILE)[0] >= 1_024
 
 
-def test_what_a_child_has_started_ends_with_it():
-    child = ChildProcess.spawn(answer)
+def test_a_process_that_a_child_has_started_ends_with_the_child():
+    child = ChildProcess.spawn(answer_messages)
     child.send("group")
     grandchild = child.receive()
     assert is_alive(grandchild)
@@ -113,7 +116,8 @@ def test_what_a_child_has_started_ends_with_it():
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_a_guard_ends_only_when_nothing_is_left_even_of_what_a_look_at_all_processes_misses():
+def test_the_guard_of_a_child_looks_again_until_no_descendant_is_left():
+    """Its first look finds none, as if a process had just forked; the second finds `sleep`."""
     script = (
         "import subprocess\nfrom roboirg.util import process_guard\n"
         "child = subprocess.Popen(['sleep', '3600'], stdout=-3, start_new_session=True)\n"
@@ -127,7 +131,8 @@ def test_a_guard_ends_only_when_nothing_is_left_even_of_what_a_look_at_all_proce
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_processes_are_found_whatever_their_names():
+def test_descendants_are_found_although_their_names_contain_brackets_and_line_ends():
+    """/proc/PID/stat has the name in brackets, which a program may choose."""
     name = r"b'\xff) R 1\n(\xfe'"
     script = f"import ctypes; ctypes.CDLL(None).prctl(15, {name}); print(flush=True); input()"
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
@@ -157,7 +162,7 @@ def test_children_do_not_outlive_a_parent_that_is_killed(tmp_path):
     assert wait_for(lambda: not is_alive(pid))
 
 
-def root(number: int) -> float:
+def square_root_but_for_7_and_9(number: int) -> float:
     if number == 7:
         raise ValueError("seven")
     if number == 9:
@@ -165,16 +170,20 @@ def root(number: int) -> float:
     return number**0.5
 
 
-def test_a_map_names_the_item_at_which_a_process_died_and_raises_what_was_raised():
-    assert dict(parallel_map(root, range(5), 3)) == {n: n**0.5 for n in range(5)}
+def test_a_parallel_map_names_the_item_at_which_a_process_died_and_raises_its_exceptions():
+    """The function raises at 7 and ends its process at 9."""
+    assert dict(parallel_map(square_root_but_for_7_and_9, range(5), 3)) == {
+        n: n**0.5 for n in range(5)
+    }
     with pytest.raises(RoboIRGError, match="died at 9: the process ended with exit code 4"):
-        list(parallel_map(root, [9], 2))
+        list(parallel_map(square_root_but_for_7_and_9, [9], 2))
     with pytest.raises(ValueError, match="seven") as caught:
-        list(parallel_map(root, [7], 1))
+        list(parallel_map(square_root_but_for_7_and_9, [7], 1))
     assert "in root" in caught.value.__notes__[0]  # where it was raised
 
 
-def test_a_map_that_is_left_ends_its_processes():
+def test_a_parallel_map_that_is_closed_early_ends_its_processes():
+    """Two of three sleep for an hour, so the test would not end."""
     found = parallel_map(time.sleep, [0.0, 3600.0, 3600.0], 2)
     assert next(found) == (0.0, None)
     found.close()  # type: ignore[attr-defined]

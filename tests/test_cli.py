@@ -32,7 +32,7 @@ from roboirg.runs.plan.stored_plans import read_plan
 from roboirg.runs.run.runner import RunSummary
 from roboirg.util.console_width import progress_console
 
-RUN = ("run", "--policy", "random", "--tasks", "PickXtimes")
+RUN_RANDOM = ("run", "--policy", "random", "--tasks", "PickXtimes")
 
 
 @pytest.fixture
@@ -65,33 +65,34 @@ class CannedPlayer:
 
 
 @pytest.fixture
-def canned(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
+def player_without_simulator(monkeypatch: pytest.MonkeyPatch) -> type[CannedPlayer]:
     monkeypatch.setattr("roboirg.runs.run.runner.EpisodeRunner", CannedPlayer)
     monkeypatch.setattr(CannedPlayer, "result", {"outcome": "success", "steps": 7})
     return CannedPlayer
 
 
-def planned(**fields: object) -> tuple[str, ...]:
+def run_with_plan_file(**fields: object) -> tuple[str, ...]:
     """Return the words of a run with a plan file."""
-    return (*RUN, "--plan", plan_file(**fields))
+    return (*RUN_RANDOM, "--plan", plan_file(**fields))
 
 
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ((*RUN, "--settings", "implicit"), "'implicit' is a form of the instruction"),
-        ((*RUN, "--episodes", "9" * 5000), "…' is not a valid episode; write numbers and ranges"),
-        ((*RUN, "--stages", "5-1"), "the possible lists are 1,5;"),
-        ((*RUN, "--out", ""), "The run's folder is ''; it must be a path"),
+        ((*RUN_RANDOM, "--settings", "implicit"), "'implicit' is a form of the instruction"),
+        ((*RUN_RANDOM, "--episodes", "9" * 5000),
+         "…' is not a valid episode; write numbers and ranges"),
+        ((*RUN_RANDOM, "--stages", "5-1"), "the possible lists are 1,5;"),
+        ((*RUN_RANDOM, "--out", ""), "The run's folder is ''; it must be a path"),
         (("report", "x" * 260), "xxx' cannot be used: File name too long."),
-        ((*RUN, "--episodes", "50,"), "no episode 50: split 'test' has episodes 0 to 49."),
-        ((*RUN, "--policy", "../../x=random"), "is '../../x' (in '../../x=random')"),
-        (planned(actions="joints"), "known: joint_angle, ee_pose, waypoint, choice."),
-        (planned(episode_timeout_s=1e30), "it must be at most 2147483."),
-        (planned(long_prompts="cut"), "it must be 'send' or 'refuse'."),
-        (planned(distractor="nutral"), "Did you mean 'neutral'?"),
-        (planned(instruction={"distracter": "neutral"}), "distracter"),
-        (planned(instruction={"setting": "direct"}), "no key of instruction 'setting'"),
+        ((*RUN_RANDOM, "--episodes", "50,"), "no episode 50: split 'test' has episodes 0 to 49."),
+        ((*RUN_RANDOM, "--policy", "../../x=random"), "is '../../x' (in '../../x=random')"),
+        (run_with_plan_file(actions="joints"), "known: joint_angle, ee_pose, waypoint, choice."),
+        (run_with_plan_file(episode_timeout_s=1e30), "it must be at most 2147483."),
+        (run_with_plan_file(long_prompts="cut"), "it must be 'send' or 'refuse'."),
+        (run_with_plan_file(distractor="nutral"), "Did you mean 'neutral'?"),
+        (run_with_plan_file(instruction={"distracter": "neutral"}), "distracter"),
+        (run_with_plan_file(instruction={"setting": "direct"}), "no key of instruction 'setting'"),
         (("run", "--plan", "paper"), "No policy given"),
         (("run", "--plan", "demo", "--out", " "), "folder"),
         (("play",), "play"),
@@ -100,7 +101,7 @@ def planned(**fields: object) -> tuple[str, ...]:
         (("show", "PickXtimes", "0", "--out", "sheet.gif"), "must end in .png"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_one_sentence_and_exit_code_2(
+def test_a_wrong_command_line_is_one_sentence_with_exit_code_2_and_writes_nothing(
     roboirg, tmp_path, monkeypatch, words, sentence
 ):
     monkeypatch.chdir(tmp_path)
@@ -114,7 +115,8 @@ def test_what_is_wrong_is_one_sentence_and_exit_code_2(
 
 @pytest.mark.parametrize("words", ["tasks", "--help", "tables --published --which main",
                                    "tables --published --format csv"])  # fmt: skip
-def test_an_output_that_cannot_be_written_is_one_sentence(words):
+def test_a_command_whose_output_cannot_be_written_ends_in_one_sentence(words):
+    """As into a full disk: /dev/full refuses every byte."""
     command = [sys.executable, "-m", "roboirg", *words.split()]
     with Path("/dev/full").open("w") as full:
         child = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
@@ -123,7 +125,8 @@ def test_an_output_that_cannot_be_written_is_one_sentence(words):
     assert child.returncode == 2
 
 
-def test_a_reader_that_leaves_is_no_error():
+def test_a_command_whose_reader_has_closed_the_pipe_prints_no_error():
+    """As `roboirg tasks | head -1`."""
     read, write = os.pipe()
     os.close(read)
     command = [sys.executable, "-m", "roboirg", "tasks"]
@@ -134,7 +137,7 @@ def test_a_reader_that_leaves_is_no_error():
     assert (child.returncode, child.stderr) == (1, "")
 
 
-def test_help_and_version_are_answered(roboirg):
+def test_help_and_version_are_printed(roboirg):
     assert roboirg("--version").out == f"roboirg {version('roboirgbench')}\n"
     for words in (("--help",), ("run", "-h")):
         said = roboirg(*words)
@@ -143,7 +146,9 @@ def test_help_and_version_are_answered(roboirg):
     assert roboirg().code in {0, 2}  # Click before 8.2 sees no fault in it
 
 
-def test_a_missing_pyav_is_told_before_anything_is_played(roboirg, tmp_path, monkeypatch):
+def test_without_pyav_a_run_with_videos_is_refused_before_anything_is_played(
+    roboirg, tmp_path, monkeypatch
+):
     monkeypatch.setitem(sys.modules, "av", None)
     said = roboirg("run", "--plan", "demo", "--out", tmp_path / "out")
 
@@ -151,12 +156,24 @@ def test_a_missing_pyav_is_told_before_anything_is_played(roboirg, tmp_path, mon
     assert not (tmp_path / "out").exists()
 
 
-def test_lost_videos_are_reported_once(roboirg, tmp_path, monkeypatch, canned):
+def test_videos_that_could_not_be_written_are_reported_once_and_change_no_verdict(
+    roboirg, tmp_path, monkeypatch, player_without_simulator
+):
     def play(_self: CannedPlayer, job: Job):
-        return make_record(job, **canned.result, video_error="OSError: disk full")
+        return make_record(job, **player_without_simulator.result, video_error="OSError: disk full")
 
     monkeypatch.setattr(CannedPlayer, "__call__", play)
-    words = (*RUN, "--episodes", "2", "--workers", "0", "--video", "all", "--out", tmp_path)
+    words = (
+        *RUN_RANDOM,
+        "--episodes",
+        "2",
+        "--workers",
+        "0",
+        "--video",
+        "all",
+        "--out",
+        tmp_path,
+    )
 
     said = roboirg(*words)
 
@@ -168,9 +185,10 @@ def test_lost_videos_are_reported_once(roboirg, tmp_path, monkeypatch, canned):
     assert roboirg(*words).err == ""
 
 
-@pytest.mark.usefixtures("canned")
-def test_a_run_goes_on_where_it_was_and_has_a_report(roboirg, tmp_path):
-    command = (*RUN, "--episodes", "2", "--workers", "0", "--out", tmp_path)
+@pytest.mark.usefixtures("player_without_simulator")
+def test_the_same_run_command_plays_nothing_twice_and_report_writes_its_page(roboirg, tmp_path):
+    """Two episodes in five settings each."""
+    command = (*RUN_RANDOM, "--episodes", "2", "--workers", "0", "--out", tmp_path)
     said = roboirg(*command)
     assert said.code == 0, said.err
     lines = (tmp_path / "records.jsonl").read_text().splitlines()
@@ -189,17 +207,24 @@ def test_a_run_goes_on_where_it_was_and_has_a_report(roboirg, tmp_path):
     assert (tmp_path / "report.html").exists()
 
 
-def test_errors_are_told_and_are_exit_code_2(roboirg, tmp_path, canned):
+def test_a_run_with_errors_has_exit_code_2_until_they_were_played_again(
+    roboirg, tmp_path, player_without_simulator
+):
     cause = "invalid action: Action value 3 is nan"
-    canned.result = {"outcome": "error", "error": "invalid_action", "cause": cause, "steps": 2}
-    command = (*RUN, "--episodes", "1", "--workers", "0", "--out", tmp_path)
+    player_without_simulator.result = {
+        "outcome": "error",
+        "error": "invalid_action",
+        "cause": cause,
+        "steps": 2,
+    }
+    command = (*RUN_RANDOM, "--episodes", "1", "--workers", "0", "--out", tmp_path)
     said = roboirg(*command)
 
     assert said.code == 2
     assert "5 of 5 episodes ended in an error" in said.err
     assert "Action value 3 is nan" in said.err
 
-    canned.result = {"outcome": "success"}
+    player_without_simulator.result = {"outcome": "success"}
     assert roboirg(*command).code == 0
 
 
@@ -213,9 +238,14 @@ def test_instructions_are_printed(roboirg, snapshot):
     assert (wrong.code, wrong.err.count("\n")) == (2, 1)
 
 
-def test_failures_are_named_below_the_table(roboirg, tmp_path, canned):
-    canned.result = {"outcome": "failure", "cause": "pressed the button too early"}
-    said = roboirg(*RUN, "--episodes", "3", "--workers", "0", "--out", tmp_path)
+def test_run_and_report_list_ten_failures_and_count_the_others(
+    roboirg, tmp_path, player_without_simulator
+):
+    player_without_simulator.result = {
+        "outcome": "failure",
+        "cause": "pressed the button too early",
+    }
+    said = roboirg(*RUN_RANDOM, "--episodes", "3", "--workers", "0", "--out", tmp_path)
 
     assert said.code == 0
     assert "random: 15 episodes without success" in said.out
@@ -241,7 +271,8 @@ def test_an_episode_is_shown(roboirg, tmp_path, monkeypatch, snapshot):
     assert said.out == snapshot
 
 
-def test_help_needs_nothing_heavy():
+def test_help_imports_no_large_library():
+    """Would find a command line that takes seconds to answer."""
     code = (
         "import sys; sys.argv = ['roboirg', '--help']\n"
         "from roboirg.main import main\n"
@@ -253,7 +284,7 @@ def test_help_needs_nothing_heavy():
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
 
 
-NOTE_HANDLER = """
+PRINT_WHEN_CTRL_C_IS_HANDLED = """
 import signal
 from roboirg import __main__
 install = signal.signal
@@ -266,11 +297,11 @@ __main__.main()
 """
 
 
-def test_ctrl_c_at_any_moment_is_one_sentence():
+def test_ctrl_c_at_any_moment_prints_one_sentence_and_no_traceback():
     ends = []
     for delay_s in np.linspace(0, 0.24, 5):
         command = subprocess.Popen(
-            [sys.executable, "-c", NOTE_HANDLER, "run", "--help"],
+            [sys.executable, "-c", PRINT_WHEN_CTRL_C_IS_HANDLED, "run", "--help"],
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -290,7 +321,7 @@ def test_ctrl_c_at_any_moment_is_one_sentence():
     assert stopped in ends
 
 
-INTERRUPTED_CLASS = """
+INTERRUPT_IN_A_CLASS_BODY = """
 import os, signal
 from roboirg import __main__, main
 class Field:
@@ -306,23 +337,28 @@ __main__.main()
 """
 
 
-def test_ctrl_c_within_a_class_definition_is_one_sentence():
+def test_ctrl_c_within_a_class_definition_prints_one_sentence():
     # Python 3.11 makes a RuntimeError of it, as happened while a library was imported.
     ended = subprocess.run(
-        [sys.executable, "-c", INTERRUPTED_CLASS], capture_output=True, text=True, check=False
+        [sys.executable, "-c", INTERRUPT_IN_A_CLASS_BODY],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert (ended.returncode, ended.stderr) == (130, "roboirg: stopped.\n")
 
 
-def test_episodes_that_were_not_played_are_an_error(capsys):
-    summary = RunSummary(10, 7, (), 3, (), ())
+def test_a_run_with_missing_episodes_has_exit_code_2_and_asks_for_the_same_command(capsys):
+    summary = RunSummary(10, 7, (), 3, (), ())  # planned, played, errors, missing
     with pytest.raises(SystemExit, match="2"):
         report_problems(summary, Path("out"))
     assert "3 of 10 episodes were not played; run the same command" in capsys.readouterr().err
 
 
-def test_what_is_typed_goes_before_what_the_plan_says(roboirg, tmp_path, canned):
-    del canned
+def test_an_option_on_the_command_line_replaces_that_of_the_plan_file(
+    roboirg, tmp_path, player_without_simulator
+):
+    del player_without_simulator
     plan = tmp_path / "plan.yaml"
     plan.write_text("policies: [random]\ntasks: StopCube\nsettings: explicit\nepisodes: 3\n")
     said = roboirg("run", "--plan", plan, "--episodes", "2", "--workers", "0", "--out", tmp_path)
@@ -335,7 +371,7 @@ def test_what_is_typed_goes_before_what_the_plan_says(roboirg, tmp_path, canned)
     assert (made.tasks, made.episodes) == (("StopCube",), (0, 1))
 
 
-def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path):
+def test_a_dry_run_prints_episodes_and_model_calls_and_plays_nothing(roboirg, tmp_path):
     model = "p=planner:stateless?model=x&base_url=http://localhost:1/v1"
     words = ("run", "--plan", "paper", "--policy", model, "--dry-run", "--out", tmp_path / "out")
 
@@ -348,7 +384,8 @@ def test_a_dry_run_counts_and_plays_nothing(roboirg, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_dry_run_counts_calls_of_models_for_what_is_still_to_be_played(roboirg, tmp_path):
+def test_a_dry_run_counts_model_calls_only_for_episodes_that_are_not_stored(roboirg, tmp_path):
+    """One of three is stored; a listener asks its model once an episode: 2."""
     model = "p=vlm-listener:openai?model=x&base_url=http://localhost:1/v1"
     played = make_plan([model], tasks="PickXtimes", settings="direct", episodes="1").jobs()
     store(tmp_path, [make_record(job, "success") for job in played])
@@ -366,8 +403,10 @@ def test_a_dry_run_counts_calls_of_models_for_what_is_still_to_be_played(roboirg
         (("--settings", "direct", "--forms", "implicit,resolved"), "episodes: implicit + resolved"),
     ],
 )
-def test_a_dry_run_names_the_forms_it_counts(roboirg, tmp_path, words, caption):
-    said = roboirg(*RUN, *words, "--dry-run", "--out", tmp_path / "out")
+def test_a_dry_run_names_the_forms_of_instructions_whose_episodes_it_counts(
+    roboirg, tmp_path, words, caption
+):
+    said = roboirg(*RUN_RANDOM, *words, "--dry-run", "--out", tmp_path / "out")
     assert caption in map(str.strip, said.out.splitlines())
 
 
@@ -379,7 +418,9 @@ def test_a_dry_run_names_the_forms_it_counts(roboirg, tmp_path, words, caption):
         (("--out", "{other}"), "language version is 1.1"),
     ],
 )
-def test_a_dry_run_checks_what_a_run_checks(roboirg, tmp_path, words, sentence):
+def test_a_dry_run_refuses_an_output_folder_as_the_run_itself_does(
+    roboirg, tmp_path, words, sentence
+):
     file = tmp_path / "file"
     other = tmp_path / "other"
     file.write_text("x")
@@ -390,9 +431,9 @@ def test_a_dry_run_checks_what_a_run_checks(roboirg, tmp_path, words, sentence):
 
     before = sorted(tmp_path.rglob("*"))
 
-    # Twice: without --dry-run, too.
+    # First as a dry run, then as a run.
     for last in (["--dry-run"], []):
-        said = roboirg(*RUN, "--out", tmp_path / "out", *given, *last)
+        said = roboirg(*RUN_RANDOM, "--out", tmp_path / "out", *given, *last)
         assert said.code == 2, said
         assert sentence.format(**places) in said.err
         assert len(said.err.splitlines()) == 1
@@ -400,12 +441,14 @@ def test_a_dry_run_checks_what_a_run_checks(roboirg, tmp_path, words, sentence):
             assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_a_run_s_own_plan_can_be_played_again(roboirg, tmp_path, canned):
-    del canned
+def test_the_plan_that_a_run_has_written_plays_the_same_run_again(
+    roboirg, tmp_path, player_without_simulator
+):
+    del player_without_simulator
     words = "--settings contextual,direct --stages 1,5;1-5 --episodes 3,"
     words += f" --plan {plan_file(retry_on='none', frame='camera')}"
     words += " --wordings train --forms implicit,resolved --workers 0 --out"
-    first = roboirg(*RUN, *words.split(), tmp_path / "a")
+    first = roboirg(*RUN_RANDOM, *words.split(), tmp_path / "a")
 
     assert first.code == 0, first.err
 
@@ -425,7 +468,9 @@ class Wanderer(CannedPlayer):
         return super().__call__(job)
 
 
-def test_a_relative_folder_stays_where_it_is(roboirg, tmp_path, monkeypatch):
+def test_a_relative_output_folder_stays_the_same_although_a_policy_changes_directory(
+    roboirg, tmp_path, monkeypatch
+):
     home = tmp_path / "home"
     away = tmp_path / "away"
     home.mkdir()
@@ -434,25 +479,27 @@ def test_a_relative_folder_stays_where_it_is(roboirg, tmp_path, monkeypatch):
     monkeypatch.setattr("roboirg.runs.run.runner.EpisodeRunner", Wanderer)
     monkeypatch.setattr(Wanderer, "away", away)
 
-    said = roboirg(*RUN, "--episodes", "2", "--workers", "0", "--out", "mine")
+    said = roboirg(*RUN_RANDOM, "--episodes", "2", "--workers", "0", "--out", "mine")
 
     assert said.code == 0, said.err
     assert (home / "mine" / "records.jsonl").exists()
     assert list(away.iterdir()) == []
 
 
-def test_unfinished_videos_of_a_run_that_died_are_deleted(roboirg, tmp_path, canned):
+def test_a_run_deletes_the_unfinished_videos_of_one_that_died_and_no_other_file(
+    roboirg, tmp_path, player_without_simulator
+):
     videos = tmp_path / "videos"
     videos.mkdir()
     for name in (".a.mp4.part", "b.mp4", ".c.mp4.part.keep"):
         (videos / name).write_bytes(b"x")
     (videos / ".d.mp4.part").mkdir()  # not ours
 
-    assert roboirg(*RUN, "--workers", "0", "--out", tmp_path).code == 0
+    assert roboirg(*RUN_RANDOM, "--workers", "0", "--out", tmp_path).code == 0
     assert {path.name for path in videos.iterdir()} == {"b.mp4", ".c.mp4.part.keep", ".d.mp4.part"}
 
 
-def test_long_lists_of_options_have_panels(roboirg, monkeypatch):
+def test_help_groups_the_many_options_of_run_in_four_panels(roboirg, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     out = roboirg("run", "--help").out
     assert "\x1b" not in out  # no color in what is no terminal
@@ -466,7 +513,8 @@ def test_long_lists_of_options_have_panels(roboirg, monkeypatch):
     assert all(1 < size <= 9 for size in sizes.values()), sizes
 
 
-def test_progress_moves_no_cursor_in_a_pipe_even_if_colors_are_forced(monkeypatch, capsys):
+def test_progress_in_a_pipe_is_plain_lines_even_if_colors_are_forced(monkeypatch, capsys):
+    """At most a line in some seconds, with the time left by the pace so far."""
     monkeypatch.setenv("FORCE_COLOR", "1")
     # The time left goes by what was done since the first of them.
     times = iter([0, 20, 60, 65, 100, 101])

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-SCRIPT = """
+COMPLETE_IN_BASH = """
 eval "$(_ROBOIRG_COMPLETE=source_bash roboirg)"
 complete -p roboirg >/dev/null || exit 3
 COMP_WORDS=(roboirg "$@") COMP_CWORD=$#
@@ -30,7 +30,7 @@ def test_bash_completes_commands_and_options(tmp_path, words, wanted):
     command.chmod(0o755)
 
     done = subprocess.run(
-        ["bash", "--norc", "-c", SCRIPT, "bash", *words],
+        ["bash", "--norc", "-c", COMPLETE_IN_BASH, "bash", *words],
         env=os.environ | {"PATH": f"{tmp_path}:{os.environ['PATH']}"},
         capture_output=True, text=True, check=False,
     )  # fmt: skip

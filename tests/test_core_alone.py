@@ -12,7 +12,7 @@ from all_commands import all_commands, make_run, words_of
 
 from roboirg.main import _MODULES, describe_missing
 
-WALK = """
+RUN_COMMANDS_WITHOUT_EXTRAS = """
 import importlib.metadata, io, json, sys, traceback
 from contextlib import redirect_stderr, redirect_stdout
 
@@ -44,7 +44,7 @@ for name, words in commands.items():
 sys.__stdout__.write(json.dumps(found))
 """
 
-NEEDS = {
+EXTRA_OF_COMMAND = {
     "run": "sim", "show": "sim", "report": "report",
     "figures": "report", "compare": "report", "serve": "remote",
     "real score": "pages",
@@ -55,12 +55,12 @@ NEEDS = {
 
 
 @pytest.fixture(scope="module")
-def walked(tmp_path_factory):
+def results_of_commands(tmp_path_factory):
     folder = tmp_path_factory.mktemp("core")
     words = words_of(str(folder), str(make_run(folder / "run")))
     refused = sorted({module for modules in _MODULES.values() for module in modules})
     done = subprocess.run(
-        [sys.executable, "-c", WALK, json.dumps(refused), json.dumps(words)],
+        [sys.executable, "-c", RUN_COMMANDS_WITHOUT_EXTRAS, json.dumps(refused), json.dumps(words)],
         check=True, capture_output=True, text=True, cwd=folder,
         env=os.environ | {"ROBOIRG_WORKERS": "0"},
     )  # fmt: skip
@@ -68,18 +68,20 @@ def walked(tmp_path_factory):
 
 
 @pytest.mark.parametrize("command", sorted(all_commands()))
-def test_a_command_works_or_names_its_extra(walked, command):
-    code, out, err = walked[command]
-    if command in NEEDS:
-        assert (code, out) == (2, ""), walked[command]
+def test_without_extras_a_command_works_or_names_the_extra_to_install(results_of_commands, command):
+    """An extra is a set of optional libraries, as in pip install 'roboirgbench[sim]'."""
+    code, out, err = results_of_commands[command]
+    if command in EXTRA_OF_COMMAND:
+        assert (code, out) == (2, ""), results_of_commands[command]
         assert err.startswith("roboirg: ")
         assert len(err.splitlines()) == 1
-        assert f"[{NEEDS[command]}]'" in err, err
+        assert f"[{EXTRA_OF_COMMAND[command]}]'" in err, err
     else:
-        assert code == (1 if command == "doctor" else 0), walked[command]
+        assert code == (1 if command == "doctor" else 0), results_of_commands[command]
 
 
-def test_the_modules_of_every_extra_are_known():
+def test_every_extra_of_the_package_has_its_modules_listed_in_the_command():
+    """Else a missing module could not be traced to the extra that brings it."""
     extras = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
     assert set(_MODULES) | {"dev", "docs", "learn"} == set(extras["optional-dependencies"])
     assert describe_missing(ModuleNotFoundError("", name="numpyy")) is None

@@ -9,10 +9,12 @@ from roboirg.util.csv_text import csv_text
 
 @pytest.mark.parametrize("text", ["=cmd|' /C calc'!A0", "@SUM(1)", "+1+1", "-2+3", "-x", "\t=1"])
 def test_a_text_that_a_spreadsheet_would_compute_gets_an_apostrophe(text):
+    """Names come from strangers; "=cmd|…" would start a program when the file is opened."""
     assert csv_text([{"name": text}]).strip() == f"name\n'{text}"
 
 
-def test_numbers_and_plain_texts_stay_as_they_are():
+def test_numbers_intervals_and_plain_texts_are_written_to_csv_as_they_are():
+    """Although some begin with a sign, as formulas do."""
     row = {"change": Decimal("-3.2"), "excess": "-0.0125", "share": "-5%", "name": "pick-2=a"}
     assert csv_text([row]) == "change,excess,share,name\n-3.2,-0.0125,-5%,pick-2=a\n"
 

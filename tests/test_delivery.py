@@ -26,7 +26,7 @@ from roboirg.tasks import all_tasks
 from roboirg.tasks.splits.splits import get_episode
 
 
-def test_a_prompt_is_heard_at_once():
+def test_an_instruction_delivered_as_a_prompt_is_heard_whole_at_step_0():
     spoken = SpokenInstruction(("It is red.", "Take it."), "prompt")
     assert spoken.heard == [("It is red.", 0), ("Take it.", 0)]
     assert (spoken.prompt, spoken.unheard) == ("It is red. Take it.", 0)
@@ -37,7 +37,8 @@ def test_a_prompt_is_heard_at_once():
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 9, 100])
-def test_turns_begin_at_the_reset_and_end_with_the_command(count):
+def test_utterances_in_turns_are_spaced_evenly_from_step_0_until_the_latest_step(count):
+    """SPACING steps lie between two, fewer if the last would be after step LATEST."""
     steps = utterance_steps(count, "turns")
     assert len(steps) == count
     assert steps[0] == 0
@@ -48,7 +49,8 @@ def test_turns_begin_at_the_reset_and_end_with_the_command(count):
         assert len(set(steps)) == count
 
 
-def test_an_utterance_is_heard_at_the_first_observation_after_it():
+def test_an_utterance_is_heard_at_the_first_observation_after_it_was_said():
+    """Each letter is one. Observed are steps 9, 10, 12, ...: what is new, and how many are left."""
     spoken = SpokenInstruction("abcde", "turns")  # said at 0, 10, 20, 30 and 40
     heard = []
 
@@ -61,7 +63,7 @@ def test_an_utterance_is_heard_at_the_first_observation_after_it():
     assert [spoken.said_at(step) for step in (0, 9, 20, 29, 39, 40, 90)] == list("aaccdee")
 
 
-def test_the_settings_with_several_utterances_read_the_delivery():
+def test_settings_declare_that_they_can_come_in_turns_if_they_have_several_utterances():
     several = set()
     for name in all_tasks():
         for index in (0, 3):
@@ -74,7 +76,7 @@ def test_the_settings_with_several_utterances_read_the_delivery():
     }
 
 
-def test_a_delivery_changes_no_word_and_an_unknown_one_is_told():
+def test_the_words_are_the_same_in_either_delivery_and_an_unknown_delivery_is_refused():
     episode = get_episode("PickXtimes", "test", 1)
     one, two = (
         language.instruct_with(episode, InstructionOptions("contextual", delivery=delivery))
@@ -86,7 +88,7 @@ def test_a_delivery_changes_no_word_and_an_unknown_one_is_told():
         language.instruct_with(episode, InstructionOptions(delivery="turn"))
 
 
-class Remembering:
+class NotesInstructions:
     """Holds still in chunks of 15 and writes down what it is told."""
 
     cameras = ()
@@ -110,7 +112,7 @@ class Remembering:
 
 
 @pytest.mark.sim
-def test_an_episode_in_turns_tells_them_in_order():
+def test_a_policy_in_an_episode_with_turns_hears_each_utterance_once_in_order():
     env = roboirg.make(
         "PickXtimes",
         setting="contextual",
@@ -120,7 +122,7 @@ def test_an_episode_in_turns_tells_them_in_order():
         delivery="turns",
     )
     turns = env.instruction.turns
-    policy = Remembering()
+    policy = NotesInstructions()
     assert play(env, policy)["status"] == "timeout"
     # Said at 0, 10, 20, 30 and 40; observed every 15 steps.
     assert policy.told == list(zip(turns, (0, 15, 30, 30, 45), strict=True))
@@ -138,7 +140,8 @@ def test_an_episode_in_turns_tells_them_in_order():
 
 
 @pytest.mark.sim
-def test_nothing_is_heard_after_the_end():
+def test_an_utterance_that_would_come_after_the_end_of_the_episode_is_not_heard():
+    """The episode ends after 20 steps, in the middle of a chunk of 30; one utterance is left."""
     env = roboirg.make("PickXtimes", setting="direct", cameras=(), max_steps=20, delivery="turns")
     observation, info = env.reset()
     action = [*observation["joint_positions"], 1.0]
@@ -151,14 +154,15 @@ def test_nothing_is_heard_after_the_end():
 
 
 @pytest.mark.sim
-def test_the_listener_hears_all_turns_before_the_earliest_press():
+def test_all_turns_of_a_stopcube_episode_come_before_its_earliest_press():
+    """Else it could not be won in turns: here the button has to be pressed at step 60."""
     told = {"setting": "contextual", "delivery": "turns"}
     env = roboirg.make("StopCube", episode=3, cameras=(), **told)  # press at step 60
     assert play(env, make_policy("listener", 0))["status"] == "success"
 
 
 @pytest.mark.sim
-def test_a_run_in_turns_has_records_and_videos_of_them(tmp_path):
+def test_a_run_in_turns_records_the_step_of_each_utterance(tmp_path):
     words = ["--policy", "listener", "--tasks", "VideoUnmask", "--settings", "explicit,direct"]
     words += ["--plan", plan_file(delivery="turns", episodes=1, video="all"), "--workers", "0"]
     result = CliRunner().invoke(app, ["run", *words, "--out", str(tmp_path)])

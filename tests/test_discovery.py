@@ -17,7 +17,7 @@ MODULE = ModuleType("outside")
 MODULE.TASK = OUTSIDE
 
 
-def fail():
+def raise_error():
     raise RuntimeError("out of order")
 
 
@@ -32,7 +32,7 @@ class EntryPoint:
 
 
 @pytest.fixture
-def install(monkeypatch):
+def install_entry_points(monkeypatch):
     """Make entry points the only ones that are installed; they are found in any order."""
 
     def add(*loads):
@@ -42,22 +42,30 @@ def install(monkeypatch):
     return add
 
 
-def found():
+def tasks_found():
     return list(discovery.discover("roboirg.tasks", "TASK", Task, tasks.ENTRY_POINTS).values())
 
 
 @pytest.mark.parametrize("thing", [OUTSIDE, MODULE], ids=["object", "module"])
-def test_an_entry_point_names_the_object_or_its_module(install, thing):
-    install(lambda: thing, lambda: OTHER)
-    assert found()[-2:] == [OUTSIDE, OTHER]
-    assert len(found()) == len(discovery.discover_in_modules("roboirg.tasks", "TASK", Task)) + 2
+def test_another_packages_entry_point_may_name_a_task_or_the_module_that_has_it(
+    install_entry_points, thing
+):
+    """An entry point is a name under which an installed package offers something."""
+    install_entry_points(lambda: thing, lambda: OTHER)
+    assert tasks_found()[-2:] == [OUTSIDE, OTHER]
+    assert (
+        len(tasks_found()) == len(discovery.discover_in_modules("roboirg.tasks", "TASK", Task)) + 2
+    )
     assert discovery.find_entry("outside-1", "TASK", Task, tasks.ENTRY_POINTS) is OTHER
 
 
 @pytest.mark.parametrize(
     ("load", "sentence"),
     [
-        (fail, r"'outside-0' \(outside:TASK\) of a-lab .*: RuntimeError: out of .*, line 21\)\.$"),
+        (
+            raise_error,
+            r"'outside-0' \(outside:TASK\) of a-lab .*: RuntimeError: out of .*, line 21\)\.$",
+        ),
         (lambda: 7, r"of a-lab in the group 'roboirg.tasks' is 7; it must be a Task, or a module"),
         (lambda: ModuleType("empty"), "is None; it must be a Task, or a module with one as TASK"),
         (lambda: get_task("BinFill"), "a-lab adds 'BinFill' .* a name that roboirg has; choose"),
@@ -65,14 +73,17 @@ def test_an_entry_point_names_the_object_or_its_module(install, thing):
     ],
     ids=["raises", "no task", "empty module", "taken", "taken by another"],
 )
-def test_a_bad_entry_point_is_one_sentence_that_names_its_package(install, load, sentence):
+def test_a_bad_entry_point_is_one_sentence_that_names_its_package(
+    install_entry_points, load, sentence
+):
     get_task("BinFill")  # known before the entry points change
-    install(load, lambda: OTHER)
+    install_entry_points(load, lambda: OTHER)
     with pytest.raises(InvalidValueError, match=sentence):
-        found()
+        tasks_found()
 
 
-def test_the_suites_of_the_benchmark_are_closed(install):
-    install(lambda: dataclasses.replace(OUTSIDE, suite="counting"))
+def test_a_task_of_another_package_may_not_join_a_suite_of_the_benchmark(install_entry_points):
+    """Averages over the suite would change with what is installed."""
+    install_entry_points(lambda: dataclasses.replace(OUTSIDE, suite="counting"))
     with pytest.raises(InvalidValueError, match="Outside of another package is in the suite"):
         tasks._registry.__wrapped__()

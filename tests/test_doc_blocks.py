@@ -28,7 +28,7 @@ from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.plan.stored_plans import write_plan
 
 ROOT = Path(__file__).parent.parent
-ELSEWHERE = dict.fromkeys(
+PAGES_TESTED_ELSEWHERE = dict.fromkeys(
     ("integrations.md", "training.md"), "tests/apps/integrations, by `make integrations`"
 )
 """Pages whose blocks other tests run."""
@@ -80,22 +80,22 @@ def words_of(line: str) -> list[str] | None:
     return None if found is None else shlex.split(found[1], comments=True)
 
 
-def write_run(folder: Path, lost: int) -> None:
+def write_run(folder_of_a_reader: Path, lost: int) -> None:
     plan = make_plan(
         ["listener", "forgetful"], tasks="PickXtimes,VideoUnmask", forms="implicit,resolved",
         episodes="2",
     )  # fmt: skip
-    with RecordStore(folder) as store:
+    with RecordStore(folder_of_a_reader) as store:
         for job in plan.jobs():
             if job.policy == "listener" or (job.setting == "explicit" and job.episode != lost):
                 store.append(make_record(job, "success"))
             else:
                 store.append(make_record(job, "failure", "wrong"))
-    write_plan(plan, folder)
+    write_plan(plan, folder_of_a_reader)
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder_of_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("pages") / "runs"
     for lost, name in enumerate(("first", "second", "a", "b")):
         write_run(folder / name, lost)
@@ -103,12 +103,14 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def folder(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder_of_a_reader(
+    folder_of_runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Path:
     policy = next(
         block.text for block in blocks_of(ROOT / "README.md") if "class MyPolicy" in block.text
     )
     (tmp_path / "my_policy.py").write_text(policy)
-    shutil.copytree(runs, tmp_path / "runs")
+    shutil.copytree(folder_of_runs, tmp_path / "runs")
     (tmp_path / "results").symlink_to(ROOT / "results")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
@@ -116,11 +118,11 @@ def folder(runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     sys.modules.pop("my_policy", None)
 
 
-def run_script(text: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def run_script(text: str, folder_of_a_reader: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for line in command_lines(text):
         words = words_of(line)
         if words is None:
-            subprocess.run(["bash", "-ec", line], cwd=folder, check=True)
+            subprocess.run(["bash", "-ec", line], cwd=folder_of_a_reader, check=True)
             continue
         monkeypatch.setattr(sys, "argv", ["roboirg", *words])
         with pytest.raises(SystemExit) as left:
@@ -131,11 +133,11 @@ def run_script(text: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.mark.slow
 @pytest.mark.sim
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_the_blocks_of_a_page_run(
-    page: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+def test_the_code_blocks_of_a_page_run_in_order_without_an_error(
+    page: Path, folder_of_a_reader: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     namespace: dict[str, object] = {"__name__": "page"}
-    for block in blocks_of(page) if page.name not in ELSEWHERE else ():
+    for block in blocks_of(page) if page.name not in PAGES_TESTED_ELSEWHERE else ():
         if block.why is not None:
             continue
         named = re.match(r"# ([\w-]+\.\w+)\n", block.text)
@@ -152,7 +154,7 @@ def test_the_blocks_of_a_page_run(
                 assert named is not None
                 read_plan_file(named[1])
             case _:
-                run_script(block.text, folder, monkeypatch)
+                run_script(block.text, folder_of_a_reader, monkeypatch)
 
 
 def commands_of(page: Path) -> list[str]:
@@ -176,7 +178,7 @@ def check_command(command: Any, words: list[str]) -> None:
         pass
 
 
-def test_commands_of_the_documents_exist() -> None:
+def test_every_roboirg_command_in_the_documents_exists_with_its_options() -> None:
     lines = [(page.name, line) for page in PAGES for line in commands_of(page)]
     assert len(lines) > 100
     command, wrong = typer.main.get_command(app), []
@@ -188,8 +190,13 @@ def test_commands_of_the_documents_exist() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-def test_most_blocks_say_something_if_they_are_not_run() -> None:
-    found = [block for page in PAGES if page.name not in ELSEWHERE for block in blocks_of(page)]
+def test_code_blocks_that_are_not_run_give_a_reason_and_are_not_too_many() -> None:
+    found = [
+        block
+        for page in PAGES
+        if page.name not in PAGES_TESTED_ELSEWHERE
+        for block in blocks_of(page)
+    ]
     marked = [block for block in found if block.why]
     assert len(marked) <= MOST_MARKED_SHARE * len(found)
     assert all(len(str(block.why).split()) > 1 for block in marked)

@@ -35,19 +35,19 @@ def python_blocks(text: str) -> list[str]:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_links_lead_somewhere(page):
+def test_every_link_to_a_file_leads_to_one(page):
     for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text()):
         if "://" not in target:
             assert (page.parent / target).exists(), target
 
 
-def test_the_page_of_the_record_names_every_key():
+def test_the_page_about_records_lists_exactly_the_keys_of_a_record():
     table = (ROOT / "docs" / "record.md").read_text().split("## In Python")[0]
     keys = " ".join(line.split("|")[1] for line in table.splitlines() if line.startswith("| "))
     assert set(re.findall(r"`(\w+)`", keys)) == {*Record.__struct_fields__, "schema_version"}
 
 
-def test_every_dependency_is_explained_once():
+def test_every_dependency_is_explained_once_on_the_page_of_dependencies():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"].values()
     learn = tomllib.loads((ROOT / "packages" / "learn" / "pyproject.toml").read_text())["project"]
@@ -61,7 +61,7 @@ def test_every_dependency_is_explained_once():
     assert sorted(explained) == sorted(names)
 
 
-def test_the_version_is_said_once():
+def test_the_version_is_the_same_in_all_files_that_name_it():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert project["version"] == roboirg.__version__
     assert f"## {roboirg.__version__}" in (ROOT / "CHANGELOG.md").read_text()
@@ -69,7 +69,7 @@ def test_the_version_is_said_once():
     assert f"version = {{{roboirg.__version__}}}" in README
 
 
-def test_readme_s_policy_is_a_policy_in_fifteen_lines():
+def test_the_policy_in_readme_has_at_most_15_lines_and_answers_with_an_action():
     block = next(block for block in python_blocks(README) if "class MyPolicy" in block)
     body = [line for line in block.splitlines() if line.strip() and not line.startswith("#")]
     assert len(body) <= 15
@@ -85,23 +85,24 @@ def test_readme_s_policy_is_a_policy_in_fifteen_lines():
 
 
 @pytest.mark.sim
-def test_readme_s_environment_plays(capsys):
+def test_the_last_python_block_of_readme_runs(capsys):
     exec(python_blocks(README)[-1], {})  # noqa: S102 - it is our own README
     assert capsys.readouterr().out.strip().endswith(".")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
-def test_a_page_is_read_in_one_go(page):
+def test_a_page_has_at_most_1800_words_of_prose(page):
+    """Without code and what programs write into it."""
     prose = re.sub(r"^ *```.*?^ *```", "", page.read_text(), flags=re.DOTALL | re.MULTILINE)
     prose = re.sub(r"<!-- ([\w ]+) -->.*?<!-- end of \1 -->", "", prose, flags=re.DOTALL)  # made
     assert page.name == GENERATED or len(prose.split()) <= MOST_WORDS
 
 
-def row_of(name: str, page: str = (ROOT / "docs" / "floors.md").read_text()) -> str:
+def table_row_with(name: str, page: str = (ROOT / "docs" / "floors.md").read_text()) -> str:
     return next(line for line in page.splitlines() if name in line and line.startswith("|"))
 
 
-def test_readme_repeats_the_published_averages():
+def test_percentages_in_readme_are_those_of_the_published_table():
     best = [row for row in published_rows("main") if row.model == "FrameS-Modul"]
     rows = {row.options.setting: row for row in best}
     explicit = rows["explicit"].average
@@ -119,7 +120,8 @@ def test_readme_repeats_the_published_averages():
     assert spatial / same_tasks < 0.5
 
 
-def test_what_came_since_the_paper_is_the_file_s():
+def test_results_published_since_the_paper_are_on_the_pages_as_in_their_file():
+    """Means over the tasks of a CSV file, for each system."""
     rates = defaultdict(list)
     with (ROOT / "docs" / "robomme-since.csv").open(encoding="utf-8") as file:
         for line in csv.DictReader(file):
@@ -128,12 +130,12 @@ def test_what_came_since_the_paper_is_the_file_s():
 
     page = (ROOT / "docs" / "comparability.md").read_text()
 
-    assert f"| {means['GPT-6']:.1f} |" in row_of("GPT-6 Astra", page)
-    assert f"| {means['agentic']:.1f} " in row_of("memory agent", page)
+    assert f"| {means['GPT-6']:.1f} |" in table_row_with("GPT-6 Astra", page)
+    assert f"| {means['agentic']:.1f} " in table_row_with("memory agent", page)
     assert f"reaches {means['GPT-6']:.0f} %" in README
 
 
-def test_the_page_of_earlier_words_has_the_rows_of_its_file():
+def test_the_table_of_earlier_words_has_the_rates_of_its_csv_file():
     rows = defaultdict(list)
     with (ROOT / "results" / "earlier-words.csv").open(encoding="utf-8") as file:
         for line in csv.DictReader(file):
@@ -145,13 +147,13 @@ def test_the_page_of_earlier_words_has_the_rows_of_its_file():
     assert "\n" + "\n".join(lines) + "\n\n" in (ROOT / "docs" / "earlier-words.md").read_text()
 
 
-def test_what_a_guess_solves_is_the_same_on_all_pages():
+def test_the_success_of_guessing_is_the_same_number_on_all_pages():
     statistics = (ROOT / "docs" / "statistics.md").read_text()
     direct, reasoning, spatial = re.search(
         r"([\d.]+) in direct and contextual, ([\d.]+) in reasoning, ([\d.]+) in spatial", statistics
     ).groups()
 
-    assert row_of("`forgetful` hears").endswith(
+    assert table_row_with("`forgetful` hears").endswith(
         f"100 | {direct} | {reasoning} | {direct} | {spatial} |"
     )
     assert f"{float(reasoning):.0f} to {float(spatial):.0f} % of the implicit" in README
@@ -165,7 +167,10 @@ def test_what_a_guess_solves_is_the_same_on_all_pages():
         ("chance: ", "chance", "direct"),
     ],
 )
-def test_exact_rates_are_the_program_s(row, floor, setting):
+def test_rates_of_shortcuts_on_the_page_of_floors_are_those_that_the_program_computes(
+    row, floor, setting
+):
+    """A mean over all tasks of 50 test episodes each, in percent."""
     options = InstructionOptions(setting)
     levels = []
     for task in find_tasks(["all"]):
@@ -173,12 +178,12 @@ def test_exact_rates_are_the_program_s(row, floor, setting):
         jobs = [msgspec.structs.replace(job, episode=number) for number in range(50)]
         levels.append(floor_level(floor, jobs))
 
-    written = row_of(row).strip("| ").split(" | ")[1 + SETTINGS.index(setting)]
+    written = table_row_with(row).strip("| ").split(" | ")[1 + SETTINGS.index(setting)]
 
     assert float(written) == round(100 * float(sum(levels) / len(levels)), 1)
 
 
-def test_the_tasks_that_need_no_video_are_those_of_their_page():
+def test_the_six_tasks_named_as_without_video_are_those_of_the_table_of_tasks():
     page = (ROOT / "docs" / "own-checkpoint.md").read_text()
     listed = re.search(r"Six are left: ([\w,\s]+)\.", page)[1]
 

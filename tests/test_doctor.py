@@ -25,14 +25,14 @@ def run_module(*arguments: str, **environment: str) -> subprocess.CompletedProce
 
 
 @pytest.mark.sim
-def test_a_healthy_machine_passes():
+def test_the_doctor_passes_all_checks_on_a_machine_with_everything():
     text = doctor.report(doctor.run_checks(render_s=1))
     assert text.endswith("All checks passed.")
-    # Two cameras; a picture that is not drawn anew would take no time.
+    # Two cameras, so an even number; a picture that is not drawn anew would take no time.
     assert re.search(r"ok    1 s of pictures +\d*[02468] pictures in 1 s\n", text), text
 
 
-def test_without_vulkan_the_remedy_is_named():
+def test_without_vulkan_the_doctor_names_what_to_unset_or_install():
     result = run_module(VK_DRIVER_FILES="/nonexistent", VK_ICD_FILENAMES="/nonexistent")
     assert result.returncode == 1
     assert "not tried: no device" in result.stdout
@@ -49,7 +49,8 @@ def test_an_unknown_render_device_is_named_with_the_known_ones():
     assert "'cuda:77' does not exist; set ROBOIRG_RENDER_DEVICE to one of " in result.stderr
 
 
-def test_a_missing_package_is_named(monkeypatch):
+def test_a_missing_or_old_package_is_named_with_the_command_that_installs_it(monkeypatch):
+    """Of the extras of users only; another build of OpenCV counts as OpenCV."""
     headless = "opencv-contrib-python-headless"
     versions = {"roboirgbench": "0.1.0", "av": "9.2", "sapien": "3.0.3", "jinja2": "3.2rc1"}
     versions[headless] = "5.0"
@@ -81,7 +82,9 @@ def test_a_missing_package_is_named(monkeypatch):
     ]
 
 
-def test_missing_model_files_are_named(tmp_path, monkeypatch):
+def test_missing_robot_models_are_reported_with_the_command_that_fetches_them(
+    tmp_path, monkeypatch
+):
     monkeypatch.setenv("ROBOIRG_MODEL_FILES", str(tmp_path))
     check = doctor._check_files()[0]
 
@@ -107,7 +110,7 @@ def test_a_crash_of_the_driver_is_a_failed_check(monkeypatch, code, words):
     assert (frame.ok, frame.found) == (False, words)
 
 
-def test_the_report_has_a_remedy_below_every_failure():
+def test_the_doctor_prints_what_to_do_below_each_failed_check():
     text = doctor.report([Check("a", True, "1"), Check("bb", False, "none", "install b")])
     assert text.splitlines() == [
         "ok    a   1",

@@ -36,7 +36,7 @@ pytestmark = pytest.mark.sim
 @pytest.mark.parametrize(
     ("task", "options"), [("ButtonUnmask", {}), ("VideoUnmask", {"observe_every": 1})]
 )
-def test_gymnasium_s_checker_is_content(task, options):
+def test_the_environment_passes_gymnasiums_own_checker(task, options):
     # Drawing is tested elsewhere; the checker resets a dozen times.
     env = roboirg.make(task, setting="direct", cameras=(), **options)
     with warnings.catch_warnings():
@@ -45,7 +45,8 @@ def test_gymnasium_s_checker_is_content(task, options):
         check_env(env)
 
 
-def test_observations_hold_what_they_promise():
+def test_observations_and_the_video_have_the_declared_shapes_and_show_what_they_should():
+    """VideoUnmask shows a video in which colored cubes are hidden below containers."""
     env = roboirg.make("VideoUnmask", setting="spatial", episode=1, demonstration_frames=2)
     observation, info = env.reset()
     assert observation in env.observation_space
@@ -66,7 +67,8 @@ def test_observations_hold_what_they_promise():
     assert (reward, terminated, truncated, info["steps"]) == (0.0, False, False, 1)
 
 
-def test_depth_and_calibration_are_there_for_the_cameras_asked_for():
+def test_depth_and_calibration_are_given_for_the_wanted_camera_alone():
+    """Intrinsic and extrinsic matrices are of every step of the video, depth of every 33rd."""
     options = {"episode": 1, "cameras": ("front",), "demonstration_frames": 33}
     env = roboirg.make("VideoUnmask", depth=True, calibration=True, **options)
     observation, info = env.reset()
@@ -89,7 +91,8 @@ def test_depth_and_calibration_are_there_for_the_cameras_asked_for():
     assert np.array_equal(plain["front_rgb"], observation["front_rgb"])
 
 
-def test_a_subgoal_is_grounded_once_its_object_is_seen():
+def test_a_grounded_subgoal_points_at_the_pixel_of_its_object():
+    """A subgoal is the next act in words; *grounded* adds a pixel (row, column) of the front."""
     env = roboirg.make("VideoUnmask", episode=1, cameras=(), grounded=True)
     _, info = env.reset()
     assert info["demonstration_subgoals"] == ["static"] * 66
@@ -109,7 +112,7 @@ def test_a_subgoal_is_grounded_once_its_object_is_seen():
     assert column == pytest.approx(middle + middle * y / distance, abs=6)
 
 
-def test_a_grounded_subgoal_is_frozen_until_its_stage_is_over():
+def test_the_pixel_of_a_subgoal_stays_the_same_until_its_act_is_done():
     """Lifting moves the container, not its pixel; after the end the last one stays."""
     env = roboirg.make("VideoUnmask", episode=1, cameras=(), grounded=True)
     _, info = env.reset()
@@ -129,7 +132,8 @@ def test_a_grounded_subgoal_is_frozen_until_its_stage_is_over():
     assert all(len(grounded) == 1 for grounded in subgoals.values())
 
 
-def test_subgoals_change_one_step_after_their_stage_and_only_pointing_ones_are_grounded():
+def test_a_subgoal_changes_one_step_after_its_act_and_has_a_pixel_only_if_it_points():
+    """Acts that point at a thing are to pick it up, for instance; pressing a button need not."""
     env = roboirg.make("PickXtimes", episode=1, cameras=(), grounded=True)
     changes = []
 
@@ -155,7 +159,8 @@ def test_subgoals_change_one_step_after_their_stage_and_only_pointing_ones_are_g
         assert ("<" in grounded) == (stage.points_at is not None)
 
 
-def test_make_is_typed_with_the_options_of_the_environment():
+def test_the_types_of_the_options_of_make_are_those_of_the_environment():
+    """Editors read them from one class; would find an option that is missing there."""
     typed = {name: hint.__forward_arg__ for name, hint in EnvOptions.__annotations__.items()}
     own = {option.name: option.type for option in dataclasses.fields(EnvSettings)}
     del own["words"], own["environment"]  # whose fields are options
@@ -167,7 +172,7 @@ def test_make_is_typed_with_the_options_of_the_environment():
         assert annotation == "Unpack[EnvOptions]"
 
 
-def test_options_of_make_are_documented_and_others_are_refused():
+def test_every_option_of_make_is_in_its_docstring_and_an_unknown_one_is_refused():
     _, _, documented = inspect.getdoc(roboirg.make).partition("Keyword Args:")
     documented, _, _ = documented.partition("Raises:")
     shared = {*OPTION_NAMES, *ENVIRONMENT_OPTIONS}
@@ -178,14 +183,16 @@ def test_options_of_make_are_documented_and_others_are_refused():
         roboirg.make("PickXtimes", camera=("front",))
 
 
-def test_an_environment_of_another_action_space_is_refused():
+def test_a_policy_is_not_played_in_an_environment_of_another_action_space():
     env = roboirg.make("PickXtimes", cameras=(), actions="ee_pose")
     with pytest.raises(InvalidValueError, match="make it with actions='joint_angle'"):
         play(env, make_policy("oracle", 0))
 
 
 @pytest.mark.parametrize("attribute", ["depth", "calibration"])
-def test_an_environment_without_what_a_policy_looks_at_is_refused(attribute):
+def test_a_policy_is_not_played_in_an_environment_without_the_depth_or_calibration_it_needs(
+    attribute,
+):
     policy = make_policy("random", 0)
     setattr(policy, attribute, True)
     policy.cameras = ("front",)
@@ -194,7 +201,7 @@ def test_an_environment_without_what_a_policy_looks_at_is_refused(attribute):
         play(roboirg.make("PickXtimes", cameras=()), policy)
 
 
-def test_runs_give_policies_their_action_space():
+def test_a_run_makes_the_environment_with_the_action_space_that_the_policy_declares():
     job = job_of(policy="random", task="PickXtimes", split="test", episode=2, setting="direct")
     for space in ACTION_SPACES.values():
         env = make_env(PreparedJob(job), PolicyNeeds(cameras=(), actions=space.name))
@@ -202,7 +209,7 @@ def test_runs_give_policies_their_action_space():
         assert np.array_equal(env.action_space.low, space.low)
 
 
-def test_tasks_without_a_video_have_an_empty_demonstration():
+def test_a_task_without_a_video_has_a_demonstration_of_no_frames():
     env = roboirg.make("PickXtimes", cameras=("wrist",))
     observation, info = env.reset()
 
@@ -217,7 +224,8 @@ def test_tasks_without_a_video_have_an_empty_demonstration():
     assert info["elapsed_steps"] == 1
 
 
-def test_the_frame_hook_is_called_at_its_period_and_at_the_end():
+def test_the_frame_hook_is_called_every_eighth_step_and_at_the_end():
+    """The first 66 steps are the video."""
     env = roboirg.make("VideoUnmask", cameras=())
     calls = []
     env.set_frame_hook(
@@ -231,7 +239,8 @@ def test_the_frame_hook_is_called_at_its_period_and_at_the_end():
     assert [demonstration for step, demonstration in calls] == [step <= 66 for step in expected]
 
 
-def test_a_chunk_does_what_its_rows_do_keeps_every_nth_observation_and_stops_at_the_end():
+def test_a_chunk_of_actions_does_what_its_rows_do_one_by_one_and_stops_at_the_end():
+    """It keeps every fourth observation as history. The limit is 25 steps of 27 actions."""
     rng = np.random.default_rng(0)
     noise = np.append(rng.normal(0, 0.1, (27, 7)), rng.normal(0, 1, (27, 1)), 1)
     actions = HOME_ACTION + noise
@@ -258,19 +267,20 @@ def test_a_chunk_does_what_its_rows_do_keeps_every_nth_observation_and_stops_at_
         history = last.pop("history")
         assert len(history) == len(kept)
         for seen, step in zip((*history, last), (*kept, info["steps"]), strict=True):
-            check_same(seen, steps[step][0])
+            check_same_observation(seen, steps[step][0])
     assert ended == [0.0, False, True]
     assert info["status"] == "timeout"
     assert env.events == single.events
 
 
-def check_same(seen, expected):
+def check_same_observation(seen, expected):
     assert list(seen) == list(expected)
     for key, value in expected.items():
         assert np.array_equal(seen[key], value), key
 
 
-def test_history_may_have_fewer_cameras(monkeypatch):
+def test_the_history_of_a_chunk_draws_only_the_cameras_it_was_asked_for(monkeypatch):
+    """Of 20 steps the 8th and 16th from the front, then both cameras at the end."""
     drawn = []
     picture = Cameras.picture
     monkeypatch.setattr(
@@ -289,7 +299,7 @@ def test_history_may_have_fewer_cameras(monkeypatch):
         assert "wrist_rgb" not in seen
 
 
-class Choosy:
+class NeedsHistory:
     """Requires its own observations and video."""
 
     cameras = ()
@@ -304,8 +314,9 @@ class Choosy:
         return np.tile(HOME_ACTION, (7, 1))
 
 
-def test_policies_are_shown_what_they_ask_for():
-    policy = Choosy()
+def test_a_policy_gets_the_history_and_the_video_that_it_declares():
+    """Every 5th step of chunks of 7: none at the reset, then step 5, then step 10."""
+    policy = NeedsHistory()
     wrong = roboirg.make("PickXtimes", cameras=(), demonstration_frames="none")
     with pytest.raises(InvalidValueError, match=r"needs observe_every=5, but .* has None"):
         play(wrong, policy)
@@ -321,7 +332,7 @@ def test_policies_are_shown_what_they_ask_for():
     assert policy.seen == [3, 0, 1, 1]
 
 
-def test_a_reset_makes_the_words_again_only_for_other_options():
+def test_a_reset_with_another_setting_changes_the_words_for_that_episode_alone():
     env = roboirg.make("PickXtimes", cameras=())
     said = env.instruction
     env.reset()
@@ -334,7 +345,8 @@ def test_a_reset_makes_the_words_again_only_for_other_options():
     assert env.instruction == said
 
 
-def test_angles_of_the_tool_do_not_jump():
+def test_the_tools_angles_in_observations_do_not_jump_by_a_full_turn():
+    """The wrist swings through half a turn, where an angle would go from 180° to -180°."""
     env = roboirg.make("PickXtimes", cameras=())
     observation, _ = env.reset()
     angles = [observation["end_effector"][3:]]
@@ -348,7 +360,8 @@ def test_angles_of_the_tool_do_not_jump():
     assert np.abs(np.diff(angles, axis=0)).max() < 0.5
 
 
-def test_a_closed_environment_lets_go_of_its_world():
+def test_closing_an_environment_frees_its_world():
+    """Would find a reference that keeps the memory of every episode."""
     env = roboirg.make("VideoUnmask", cameras=(), max_steps=60)
     policy = make_policy("oracle", 0)
     assert play(env, policy)["status"] == "timeout"
@@ -382,12 +395,12 @@ def test_a_closed_environment_lets_go_of_its_world():
         ({"cameras": ("front",), "history_cameras": ("wrist",)}, "'wrist', but cameras is"),
     ],
 )
-def test_names_and_numbers_are_checked_before_anything_is_built(options, message):
+def test_make_refuses_wrong_names_and_numbers_before_anything_is_built(options, message):
     with pytest.raises(RoboIRGError, match=message):
         roboirg.make(**{"task": "PickXtimes", **options})
 
 
-WITHOUT_VULKAN = """
+PROGRAM_WITHOUT_VULKAN = """
 import sys, roboirg
 print(roboirg.make("PickXtimes", cameras=()).reset()[1]["status"])
 try:
@@ -395,7 +408,7 @@ try:
 finally:
     print(sorted({"torch", "mani_skill", "mplib"} & set(sys.modules)))
 """
-WITHOUT_GYMNASIUM = """
+PROGRAM_WITHOUT_GYMNASIUM = """
 import sys; sys.modules["gymnasium"] = None
 import roboirg, roboirg.language, roboirg.judging, roboirg.tasks.splits.splits
 roboirg.make("PickXtimes")
@@ -405,13 +418,12 @@ roboirg.make("PickXtimes")
 @pytest.mark.parametrize(
     ("code", "printed", "complaint"),
     [
-        (WITHOUT_VULKAN, "ongoing\n[]\n", "mesa-vulkan-drivers"),
-        (WITHOUT_GYMNASIUM, "", "[sim]'"),
+        (PROGRAM_WITHOUT_VULKAN, "ongoing\n[]\n", "mesa-vulkan-drivers"),
+        (PROGRAM_WITHOUT_GYMNASIUM, "", "[sim]'"),
     ],
 )
-def test_without_vulkan_or_the_simulator_what_can_is_done_and_what_to_install_is_said(
-    code, printed, complaint
-):
+def test_without_vulkan_or_gymnasium_the_error_names_what_to_install(code, printed, complaint):
+    """Without Vulkan an episode without cameras still begins ("ongoing")."""
     missing = {"VK_DRIVER_FILES": "/nonexistent", "VK_ICD_FILENAMES": "/nonexistent"}
     done = subprocess.run(
         [sys.executable, "-c", code],

@@ -15,7 +15,8 @@ from roboirg.core.extras import extra_needed, install_command
 ROOT = Path(__file__).parents[1]
 
 
-def test_from_a_checkout_it_names_the_folder(monkeypatch, tmp_path):
+def test_from_a_checkout_the_install_command_names_its_folder(monkeypatch, tmp_path):
+    """A dot if that is the working directory."""
     monkeypatch.chdir(tmp_path)
     assert install_command("sim").endswith(f"install -e '{ROOT}[sim]'")
 
@@ -37,7 +38,10 @@ def test_from_a_checkout_it_names_the_folder(monkeypatch, tmp_path):
         ),
     ],
 )
-def test_elsewhere_it_names_what_pip_installed_from(monkeypatch, tmp_path, noted, wanted):
+def test_an_installed_package_is_installed_again_from_where_pip_got_it(
+    monkeypatch, tmp_path, noted, wanted
+):
+    """pip notes in direct_url.json that it was a file or a repository; None is the registry."""
     kept = {"direct_url.json": noted and json.dumps(noted)}
     installed = SimpleNamespace(read_text=kept.__getitem__)
     monkeypatch.setattr(extras, "_CHECKOUT", tmp_path)
@@ -46,7 +50,9 @@ def test_elsewhere_it_names_what_pip_installed_from(monkeypatch, tmp_path, noted
     assert install_command("vlm").endswith(f"install {wanted}")
 
 
-def test_another_python_s_pip_is_not_named(monkeypatch, tmp_path):
+def test_the_install_command_calls_pip_by_its_python_if_the_pip_on_the_path_is_anothers(
+    monkeypatch, tmp_path
+):
     (tmp_path / "pip").write_text("#!/bin/sh\n")
     (tmp_path / "pip").chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
@@ -56,7 +62,8 @@ def test_another_python_s_pip_is_not_named(monkeypatch, tmp_path):
     assert install_command("sim").startswith("pip install ")
 
 
-def test_a_library_that_cannot_be_loaded_is_not_called_missing():
+def test_a_library_that_is_installed_but_cannot_be_loaded_is_not_called_missing():
+    """As OpenCV without the system's libGL; then `roboirg doctor` helps, not pip."""
     with (
         pytest.raises(MissingDependencyError, match=r"is not installed .*nowhere_at_all"),
         extra_needed("This needs it", "sim"),

@@ -18,8 +18,8 @@ from roboirg.runs.plan.plan_fields import plan_options
 from roboirg.runs.plan.plan_file import plan_text, read_plan_file
 from roboirg.runs.plan.plan_maker import make_plan
 
-LINES = 45
-LINES_OF_RUN = 60
+MOST_LINES = 45
+MOST_LINES_OF_RUN = 60
 COLUMNS = 100
 
 
@@ -31,7 +31,7 @@ def help_of(name, columns, monkeypatch, capsys):
     return capsys.readouterr().out
 
 
-def test_the_command_line_is_small():
+def test_the_number_of_commands_and_parameters_stays_below_its_limits():
     found = count_commands.commands()
     assert count_commands.entries() <= count_commands.MOST_ENTRIES
     assert len(found) - 1 <= count_commands.MOST_COMMANDS
@@ -41,7 +41,7 @@ def test_the_command_line_is_small():
 @pytest.mark.parametrize("name", sorted(all_commands()))
 def test_help_is_short_and_has_an_example(name, monkeypatch, capsys):
     text = help_of(name, COLUMNS, monkeypatch, capsys)
-    assert len(text.strip().splitlines()) <= (LINES_OF_RUN if name == "run" else LINES)
+    assert len(text.strip().splitlines()) <= (MOST_LINES_OF_RUN if name == "run" else MOST_LINES)
 
     (example,) = re.findall(r"Example: roboirg (.*)", text)
     words = shlex.split(example)
@@ -67,7 +67,7 @@ def test_help_cuts_no_word_and_is_no_wider_than_the_terminal(name, monkeypatch, 
 
 
 @pytest.mark.parametrize("episodes", ["3,0-2,7", "7,"])  # 7 alone would be the first seven
-def test_a_plan_explains_all_of_its_fields_and_is_read_back(tmp_path, episodes):
+def test_a_plan_written_as_yaml_explains_each_field_and_is_read_back_the_same(tmp_path, episodes):
     plan = make_plan(
         ["oracle", "bär=listener"], tasks="PickXtimes,VideoUnmask", settings="direct,contextual",
         forms="implicit,resolved", episodes=episodes, stages="1,5;1-5", distractors=3,
@@ -85,7 +85,7 @@ def test_a_plan_explains_all_of_its_fields_and_is_read_back(tmp_path, episodes):
     assert make_plan(fields.pop("policies"), **fields) == plan
 
 
-def test_options_of_instructions_are_listed_once():
+def test_every_option_of_instructions_is_a_keyword_and_an_option_of_the_command_show():
     assert set(get_type_hints(InstructionKeywords)) == set(OPTION_NAMES)
 
     (shown,) = (

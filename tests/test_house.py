@@ -14,7 +14,7 @@ import layout
 import pytest
 from house_rooms import PACKAGE, PACKAGES, ROOT, SOURCES, TESTS, house_files
 
-EVERY = [
+ALL_SOURCE_FILES = [
     *SOURCES,
     *(path for package in PACKAGES for path in package.rglob("*.py") if path not in TESTS),
 ]
@@ -94,7 +94,8 @@ def lines_of(suffixes):
     return sum(path.read_text("utf-8").count("\n") for path in counted)
 
 
-def test_the_house_stays_under_its_ceilings():
+def test_the_code_of_each_room_stays_below_its_ceiling():
+    """A room is a folder of the package; size is counted in nodes of the syntax tree."""
     ceilings = tomllib.loads(CEILINGS.read_text("utf-8"))
     sizes = {room: size_of(paths) for room, paths in house_files().items()}
     nodes = sum(size.nodes for size in sizes.values())
@@ -120,7 +121,9 @@ def test_the_house_stays_under_its_ceilings():
     check_empty(found)
 
 
-def test_ceilings_rise_only_by_a_growth_that_they_name():
+def test_a_ceiling_is_raised_only_with_a_growth_that_gives_the_reason():
+    """Over all commits of the file of ceilings."""
+
     def git(*words):
         done = subprocess.run(
             ("git", *words), check=False, cwd=ROOT, capture_output=True, text=True
@@ -152,7 +155,7 @@ def test_files_import_each_other_in_no_circle():
     check_empty(layout.file_circles())
 
 
-def test_rooms_and_arrows_are_few():
+def test_the_package_has_few_rooms_and_few_imports_between_them():
     assert len(layout.arrows()) <= MOST_ROOMS, sorted(layout.arrows())
     assert sum(map(len, layout.arrows().values())) <= MOST_ARROWS, {
         room: sorted(others) for room, others in layout.arrows().items()
@@ -170,7 +173,7 @@ def test_applications_do_not_import_each_other():
 def test_packages_import_documented_names_alone():
     """What is behind the facades can change: a package that imports it would break."""
     names = set()
-    for path in EVERY[len(SOURCES) :]:
+    for path in ALL_SOURCE_FILES[len(SOURCES) :]:
         for node in ast.walk(layout.tree(path)):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("roboirg."):
                 names |= {(node.module, alias.name) for alias in node.names}
@@ -198,7 +201,7 @@ def test_no_text_below_the_applications_names_one():
     check_empty(found)
 
 
-def test_low_rooms_import_what_they_may():
+def test_reader_records_and_stats_import_only_the_rooms_that_they_may():
     for room, others in MAY_IMPORT.items():
         assert layout.arrows()[room].keys() <= others, room
 
@@ -218,23 +221,24 @@ def repeated(places):
 
 def test_every_class_has_a_name_of_its_own():
     places = defaultdict(list)
-    for path in EVERY:
+    for path in ALL_SOURCE_FILES:
         for node in ast.walk(layout.tree(path)):
             if isinstance(node, ast.ClassDef):
                 places[node.name].append(f"{path.relative_to(ROOT)}:{node.lineno}")
     check_empty(repeated(places))
 
 
-def test_the_verb_of_a_count_agrees_with_it():
+def test_no_message_has_a_plural_verb_after_a_count_that_may_be_one():
+    """As "1 episode are missing"; `plain_text.verb_for` gives the right verb."""
     found = [
         f"{path.relative_to(ROOT)}: {match[0]}"
-        for path in EVERY
+        for path in ALL_SOURCE_FILES
         for match in re.finditer(
             r"counted\([^{}]*\)\} (are|were|have|do)\b", path.read_text("utf-8")
         )
     ]
-    check_empty(found)  # `plain_text.verb_for`
+    check_empty(found)
 
 
-def test_inside_a_room_no_import_runs_back_up():
+def test_inside_a_room_no_file_imports_from_a_folder_above_its_own():
     check_empty(layout.imports_back_up())

@@ -21,20 +21,24 @@ def notebook(request):
 
 @pytest.mark.slow
 @pytest.mark.sim
-def test_a_notebook_runs(notebook, tmp_path, monkeypatch):
+def test_a_notebook_runs_and_its_stored_outputs_are_of_the_same_kinds(
+    notebook, tmp_path, monkeypatch
+):
     # Shell lines call `roboirg`, which lies beside this Python.
     monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
-    kept = [kinds(cell) for cell in notebook.cells]
+    kept = [kinds_of_outputs(cell) for cell in notebook.cells]
 
     nbclient.NotebookClient(
         notebook, timeout=None, resources={"metadata": {"path": str(tmp_path)}}
     ).execute()
 
-    assert [kinds(cell) for cell in notebook.cells] == kept, "its outputs are old: execute it"
+    assert [kinds_of_outputs(cell) for cell in notebook.cells] == kept, (
+        "its outputs are old: execute it"
+    )
 
 
-def kinds(cell):
+def kinds_of_outputs(cell):
     return {(output.output_type, output.get("name")) for output in cell.get("outputs", ())}
 
 

@@ -25,7 +25,7 @@ PROXIES = {
 
 
 @pytest.fixture
-def bare(monkeypatch):
+def environment_without_proxies(monkeypatch):
     """The environment, without proxies."""
     for name in [name for name in os.environ if name.lower().endswith("_proxy")]:
         monkeypatch.delenv(name)
@@ -44,9 +44,11 @@ def bare(monkeypatch):
         *((f"http://{it}", "") for it in ("a.lab:80", "10.0.0.1", "[fd00::1]:80")),
     ],
 )
-def test_a_proxy_is_named_and_this_machine_needs_none(bare, url, named):
+def test_the_proxy_of_an_address_is_named_without_its_password_and_local_ones_have_none(
+    environment_without_proxies, url, named
+):
     for name, value in PROXIES.items():
-        bare.setenv(name, value)
+        environment_without_proxies.setenv(name, value)
     assert proxy_of(url).words == named
 
 
@@ -57,16 +59,20 @@ def test_a_proxy_is_named_and_this_machine_needs_none(bare, url, named):
         *(("http://h:1", f"sec{mark}ret") for mark in "/?#\n "),
     ],
 )
-def test_a_proxy_that_cannot_be_used_is_one_sentence(bare, proxy, secret):
-    bare.setenv("ALL_PROXY", proxy.replace("h:", f"u:{secret}@h:"))
-    bare.setitem(sys.modules, "socksio", None)
+def test_a_proxy_that_cannot_be_used_is_refused_without_printing_its_password(
+    environment_without_proxies, proxy, secret
+):
+    environment_without_proxies.setenv("ALL_PROXY", proxy.replace("h:", f"u:{secret}@h:"))
+    environment_without_proxies.setitem(sys.modules, "socksio", None)
     with pytest.raises(MissingDependencyError, match=f"proxy {proxy} of ALL_PROXY cannot be used"):
         make_model(ModelOptions(model="m", base_url="http://models.org/v1"))
 
     make_model(ModelOptions(model="m", base_url="http://127.0.0.1:8/v1"))
 
 
-def test_without_a_home_folders_are_temporary(monkeypatch, tmp_path):
+def test_a_user_without_a_home_gets_a_private_folder_among_the_temporary_ones(
+    monkeypatch, tmp_path
+):
     monkeypatch.setenv("HOME", "")
     monkeypatch.setattr("pwd.getpwuid", {}.__getitem__)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
@@ -90,7 +96,7 @@ def test_a_temporary_folder_that_another_user_made_a_link_is_refused(monkeypatch
         temporary_folder()
 
 
-def hang(connection, watchdog):
+def begin_a_phase_and_wait(connection, watchdog):
     """Begin a phase, and wait."""
     watchdog.write("policy's act()", 1e9)
     connection.send(None)
@@ -103,7 +109,7 @@ def test_a_worker_is_watched_without_shared_memory(monkeypatch, has_memory):
     if not has_memory:  # as in Pythons that are built for old systems
         monkeypatch.delattr(os, "memfd_create")
     watchdog = Watchdog()
-    child = ChildProcess.spawn(hang, watchdog)
+    child = ChildProcess.spawn(begin_a_phase_and_wait, watchdog)
     child.receive()
 
     assert watchdog.phase == "policy's act()"
@@ -114,7 +120,9 @@ def test_a_worker_is_watched_without_shared_memory(monkeypatch, has_memory):
 @pytest.mark.parametrize(
     ("encoding", "shown"), [("ascii", b"?"), ("latin-1", b"?"), ("utf-8", "≠".encode())]
 )
-def test_what_the_output_cannot_show_is_replaced(monkeypatch, encoding, shown):
+def test_a_character_that_the_terminal_cannot_show_is_printed_as_a_question_mark(
+    monkeypatch, encoding, shown
+):
     monkeypatch.setattr(sys, "stdout", out := io.TextIOWrapper(io.BytesIO(), encoding))
     monkeypatch.setattr(cli, "app", lambda **_: out.write("≠"))
     with pytest.raises(SystemExit):
@@ -124,10 +132,12 @@ def test_what_the_output_cannot_show_is_replaced(monkeypatch, encoding, shown):
     assert out.buffer.getvalue() == shown
 
 
-def test_the_doctor_names_what_is_odd(bare, tmp_path):
-    bare.setattr("tempfile.tempdir", str(tmp_path / "gone"))
-    bare.setenv("ROBOIRG_CACHE", "~nobody-here/x")
-    bare.setenv("http_proxy", "http://a:b@h:1")
+def test_the_doctor_names_a_missing_temporary_folder_a_wrong_cache_path_and_proxies(
+    environment_without_proxies, tmp_path
+):
+    environment_without_proxies.setattr("tempfile.tempdir", str(tmp_path / "gone"))
+    environment_without_proxies.setenv("ROBOIRG_CACHE", "~nobody-here/x")
+    environment_without_proxies.setenv("http_proxy", "http://a:b@h:1")
     _, files, cache, _, proxies = doctor._check_files()
 
     assert (files.ok, files.found, cache.ok) == (False, "No such file or directory", False)
@@ -137,5 +147,5 @@ def test_the_doctor_names_what_is_odd(bare, tmp_path):
     )
     assert proxies == Check("proxies", True, "through the proxy http://h:1 of http_proxy")
 
-    bare.setenv("http_proxy", "socks://h:1")
+    environment_without_proxies.setenv("http_proxy", "socks://h:1")
     assert doctor._check_files()[-1].ok

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 HOUSE = Path(__file__).parents[1]
-PLAY = """
+PLAY_ONE_STEP = """
 import roboirg
 
 env = roboirg.make("PickXtimes", max_steps=1)
@@ -18,7 +18,8 @@ print(__debug__, observation["front_rgb"].any())
 """
 
 
-def test_no_source_has_an_assert():
+def test_no_source_file_has_an_assert():
+    """`python -O` leaves them out, and with them whatever they check."""
     files = [
         path
         for folder in ("src", "packages", "integrations")
@@ -36,6 +37,6 @@ def test_no_source_has_an_assert():
 def test_an_episode_is_drawn_and_played_without_asserts(monkeypatch):
     monkeypatch.setenv("PYTHONOPTIMIZE", "1")
     child = subprocess.run(
-        [sys.executable, "-c", PLAY], capture_output=True, text=True, check=False
+        [sys.executable, "-c", PLAY_ONE_STEP], capture_output=True, text=True, check=False
     )
     assert child.stdout == "False True\n", child.stderr

@@ -20,8 +20,13 @@ from roboirg.util import processor
         ({"quota": "400000", "period": "100000"}, 4),
     ],
 )
-def test_a_container_has_the_cores_of_its_limit(limits, cores, tmp_path, monkeypatch):
-    """Otherwise it starts a worker for each core of its host, and runs out of memory."""
+def test_a_container_counts_the_cores_that_it_may_use_and_not_those_of_its_host(
+    limits, cores, tmp_path, monkeypatch
+):
+    """The host has 8. Linux notes microseconds of processor time and a period: 200000 100000 is 2.
+
+    Would find a worker for each core of the host, which runs out of memory.
+    """
     for name, text in limits.items():
         (tmp_path / name).write_text(f"{text}\n")
     monkeypatch.chdir(tmp_path)
@@ -38,7 +43,7 @@ def test_a_container_has_the_cores_of_its_limit(limits, cores, tmp_path, monkeyp
         (9, "one per core, or about 8 per GPU that renders if the policy wants every picture"),
     ],
 )
-def test_a_gpu_is_shared_by_no_more_workers_than_it_serves(cores, advice, monkeypatch):
-    """Sixteen were slower than eight on the GPU that was measured; chunks are bound by cores."""
+def test_more_than_8_cores_come_with_the_advice_of_8_workers_for_a_gpu(cores, advice, monkeypatch):
+    """Sixteen were slower than eight on the GPU that was measured."""
     monkeypatch.setattr(processor, "core_count", lambda: cores)
     assert processor.worker_advice() == advice

@@ -8,7 +8,7 @@ import pytest
 
 SETUP = Path(__file__).parent.parent / "scripts" / "setup"
 
-DEB822 = """\
+SOURCE_IN_DEB822_FORMAT = """\
 # a comment
 Types: deb deb-src
 URIs: http://mirror.example/debian
@@ -23,7 +23,7 @@ Suites: bookworm
 Components: main
 """
 
-EMBEDDED_KEY = """\
+SOURCE_WITH_A_KEY_INSIDE = """\
 Types: deb
 URIs: http://mirror.example/ubuntu
 Suites: noble
@@ -66,12 +66,13 @@ def apt_dir(tmp_path: Path) -> Path:
         ("", False),
     ],
 )
-def test_versions_are_compared_as_numbers(version, enough):
+def test_a_version_of_mesa_is_compared_with_23_2_as_a_number(version, enough):
+    """Debian adds an epoch before and a revision after it; as text, 9.0 would be enough."""
     assert (bash(f"version_at_least '{version}' 23.2").returncode == 0) is enough
 
 
 def test_backports_use_the_mirror_and_key_of_a_deb822_source(apt_dir):
-    (apt_dir / "sources.list.d" / "debian.sources").write_text(DEB822)
+    (apt_dir / "sources.list.d" / "debian.sources").write_text(SOURCE_IN_DEB822_FORMAT)
     assert bash("backports_source bookworm", apt_dir).stdout == (
         "Types: deb\n"
         "URIs: http://mirror.example/debian\n"
@@ -82,7 +83,7 @@ def test_backports_use_the_mirror_and_key_of_a_deb822_source(apt_dir):
 
 
 def test_a_key_inside_the_source_is_kept_as_it_is(apt_dir):
-    (apt_dir / "sources.list.d" / "ubuntu.sources").write_text(EMBEDDED_KEY)
+    (apt_dir / "sources.list.d" / "ubuntu.sources").write_text(SOURCE_WITH_A_KEY_INSIDE)
     source = bash("backports_source noble", apt_dir).stdout
 
     assert "Suites: noble-backports\n" in source
@@ -111,7 +112,7 @@ def test_backports_use_the_mirror_and_key_of_a_one_line_source(apt_dir, line, ke
     assert source.partition("Signed-By: ")[2].strip() == key
 
 
-def test_files_that_apt_ignores_are_ignored(apt_dir):
+def test_source_files_that_apt_ignores_give_no_mirror(apt_dir):
     line = "deb http://wrong.example/debian bookworm main\n"
     for name in ("a.list.disabled", "b.list~", "c.save", "d,e.list"):
         (apt_dir / "sources.list.d" / name).write_text(line)
@@ -120,8 +121,8 @@ def test_files_that_apt_ignores_are_ignored(apt_dir):
     assert bash("backports_source bookworm", apt_dir).returncode == 1
 
 
-def test_the_administrator_is_told_every_command(apt_dir):
-    (apt_dir / "sources.list.d" / "debian.sources").write_text(DEB822)
+def test_commands_for_the_administrator_add_backports_if_mesa_is_too_old(apt_dir):
+    (apt_dir / "sources.list.d" / "debian.sources").write_text(SOURCE_IN_DEB822_FORMAT)
     fakes = "mesa_candidate() { echo 22.3.6-1; }; distribution_codename() { echo bookworm; }; "
 
     commands = bash(fakes + "administrator_commands ${VULKAN_PACKAGES[*]}", apt_dir).stdout
@@ -140,13 +141,15 @@ def test_the_administrator_is_told_every_command(apt_dir):
         ("22.3.6-1", "OPENCV", "libgl1 libglib2.0-0"),  # which needs no newer Mesa
     ],
 )
-def test_no_backports_are_asked_for_without_need(apt_dir, mesa, packages, names):
+def test_commands_for_the_administrator_add_no_backports_without_need(
+    apt_dir, mesa, packages, names
+):
     code = f"mesa_candidate() {{ echo {mesa}; }}; "
     code += f"administrator_commands ${{{packages}_PACKAGES[*]}}"
     assert bash(code, apt_dir).stdout == f"apt-get update\napt-get install {names}\n"
 
 
-FAKES = """
+FUNCTIONS_THAT_INSTALL_NOTHING = """
 make_venv() {
     mkdir -p .venv/bin
     printf '#!/bin/sh\n' | tee .venv/bin/python >.venv/bin/roboirg
@@ -168,10 +171,10 @@ def checkout(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def installed(checkout: Path, words: str = "") -> list[str]:
+def extras_installed_by(checkout: Path, words: str = "") -> list[str]:
     """Set the checkout up; return which sets of extras were installed."""
     done = subprocess.run(
-        ["bash", "-c", f"source scripts/setup; {FAKES} main {words}"],
+        ["bash", "-c", f"source scripts/setup; {FUNCTIONS_THAT_INSTALL_NOTHING} main {words}"],
         cwd=checkout,
         capture_output=True,
         text=True,
@@ -180,21 +183,22 @@ def installed(checkout: Path, words: str = "") -> list[str]:
     return [line.partition("installing ")[2] for line in done.stdout.splitlines() if "[" in line]
 
 
-def test_developers_packages_come_when_they_are_asked_for(checkout):
-    assert installed(checkout) == ["[sim,report]"]
-    assert installed(checkout) == []
-    assert installed(checkout, "dev") == ["[sim,report,dev]"]
-    assert installed(checkout, "dev") == []
-    assert installed(checkout) == []  # what developers have is enough
-    assert installed(checkout, "dev") == []
+def test_setup_dev_adds_the_packages_of_developers_once(checkout):
+    """[] is nothing to install: setup was run before with as much or more."""
+    assert extras_installed_by(checkout) == ["[sim,report]"]
+    assert extras_installed_by(checkout) == []
+    assert extras_installed_by(checkout, "dev") == ["[sim,report,dev]"]
+    assert extras_installed_by(checkout, "dev") == []
+    assert extras_installed_by(checkout) == []  # what developers have is enough
+    assert extras_installed_by(checkout, "dev") == []
 
 
-def test_changed_requirements_are_installed_and_no_more(checkout):
-    installed(checkout, "dev")
+def test_setup_installs_again_after_the_requirements_have_changed(checkout):
+    extras_installed_by(checkout, "dev")
     (checkout / "pyproject.toml").write_text("[project]\ndependencies = []")
 
-    assert installed(checkout) == ["[sim,report]"]
-    assert installed(checkout, "dev") == ["[sim,report,dev]"]
+    assert extras_installed_by(checkout) == ["[sim,report]"]
+    assert extras_installed_by(checkout, "dev") == ["[sim,report,dev]"]
 
 
 def test_an_unknown_argument_of_set_up_is_refused():
@@ -203,7 +207,7 @@ def test_an_unknown_argument_of_set_up_is_refused():
     assert "unknown argument 'docs'" in done.stderr
 
 
-def test_every_target_that_checks_or_writes_documents_sets_up_for_developers():
+def test_make_targets_for_developers_run_setup_dev_and_others_run_setup():
     targets = ["lint", "test", "test-slow", "test-all", "docs", "card"]
     for target in [*targets, "demo", "play", "setup"]:
         dry = subprocess.run(

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 
 
 @pytest.fixture(scope="module")
-def site(tmp_path_factory):
+def folder_of_the_site(tmp_path_factory):
     folder = tmp_path_factory.mktemp("site")
     done = subprocess.run(
         [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", folder],
@@ -53,50 +53,52 @@ class Links(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def pages(site):
-    found = {page: Links(page.read_text()) for page in site.rglob("*.html")}
+def links_of_pages(folder_of_the_site):
+    found = {page: Links(page.read_text()) for page in folder_of_the_site.rglob("*.html")}
     return {page: links for page, links in found.items() if page.name != "404.html"}
 
 
-def test_every_page_of_the_docs_is_on_the_site(site, pages):
+def test_every_page_of_the_docs_is_on_the_site(folder_of_the_site, links_of_pages):
     wanted = {page.relative_to(ROOT / "docs").with_suffix(".html") for page in
               (ROOT / "docs").rglob("*") if page.suffix in (".md", ".ipynb")}  # fmt: skip
-    assert wanted < {page.relative_to(site) for page in pages}
+    assert wanted < {page.relative_to(folder_of_the_site) for page in links_of_pages}
     assert (
-        len(pages) == len(wanted) + 5
+        len(links_of_pages) == len(wanted) + 5
     )  # README, CONTRIBUTING, CHANGELOG, published results, command line
 
 
-def test_no_link_is_dead(pages):
+def test_no_link_is_dead(links_of_pages):
     dead = []
-    for page, found in pages.items():
+    for page, found in links_of_pages.items():
         for target in (*found.links, *found.loaded):
             scheme, _, path, _, name = urlsplit(target)
             if scheme:
                 continue
             other = (page.parent / unquote(path)).resolve() if path else page
             if not other.is_file() or (
-                name and other in pages and unquote(name) not in pages[other].names
+                name
+                and other in links_of_pages
+                and unquote(name) not in links_of_pages[other].names
             ):
                 dead.append((page.name, target))
     assert not dead
 
 
-def test_nothing_is_loaded_from_elsewhere(pages):
-    for page, found in pages.items():
+def test_nothing_is_loaded_from_elsewhere(links_of_pages):
+    for page, found in links_of_pages.items():
         assert not [link for link in found.loaded if urlsplit(link).scheme not in ("", "data")], (
             page
         )
 
 
-def test_the_search_knows_pages_notebooks_and_the_reference(site):
-    index = (site / "search" / "search_index.json").read_text()
+def test_the_search_index_has_words_of_pages_notebooks_and_the_reference(folder_of_the_site):
+    index = (folder_of_the_site / "search" / "search_index.json").read_text()
     for words in ("PickXtimes", "Reading results", "ActionChunks"):
         assert words in index
 
 
-def test_the_reference_has_the_public_names(pages):
-    names = set().union(*(found.names for found in pages.values()))
+def test_the_reference_has_the_public_names(links_of_pages):
+    names = set().union(*(found.names for found in links_of_pages.values()))
     wanted = {f"roboirg.{name}" for name in roboirg.__all__ if not name.startswith("_")}
 
     wanted |= {
@@ -108,7 +110,7 @@ def test_the_reference_has_the_public_names(pages):
     assert wanted <= names
 
 
-def test_the_reference_has_every_command(pages):
-    names = set().union(*(found.names for found in pages.values()))
+def test_the_reference_has_every_command(links_of_pages):
+    names = set().union(*(found.names for found in links_of_pages.values()))
     wanted = {f"roboirg {command.words}".strip() for command in count_commands.commands()[1:]}
     assert {command.replace(" ", "-") for command in wanted} <= names

@@ -25,7 +25,7 @@ from roboirg.tasks.splits.splits import (
 )
 
 TASKS = tuple(every_task())
-GAPS = {
+EPISODES_THAT_ROBOMME_CANNOT_BUILD = {
     "VideoPlaceButton": {"VideoPlaceButton/val/15"},
     "VideoPlaceOrder": {
         *(f"VideoPlaceOrder/train/{index}" for index in (7, 38, 75)),
@@ -33,7 +33,7 @@ GAPS = {
     },
 }
 """Episodes that RoboMME cannot build."""
-RANDOM = {
+FINGERPRINTS_OF_RANDOM_EPISODES = {
     "PickXtimes": "6941ffb1f20b",
     "StopCube": "f00cf213c7b4",
     "SwingXtimes": "673140b89afa",
@@ -52,21 +52,21 @@ RANDOM = {
 each_task = pytest.mark.parametrize("task", TASKS)
 
 
-def episodes(task):
+def episodes_of(task):
     return list(split_episodes([task], SPLITS))
 
 
-def slot(episode):
+def place_of(episode):
     return episode.task, episode.split, episode.index
 
 
-def test_every_task_s_splits_are_shipped():
+def test_every_task_has_its_splits_in_the_shipped_file():
     assert tuple(shipped_splits()) == TASKS
 
 
 @each_task
-def test_no_task_s_episodes_have_drifted(task):
-    assert fingerprint(episodes(task)) == shipped_splits()[task].sha256, (
+def test_the_episodes_of_each_task_are_still_those_of_the_shipped_fingerprint(task):
+    assert fingerprint(episodes_of(task)) == shipped_splits()[task].sha256, (
         f"The episodes of {task} are not those for which the splits were built; if that is wanted, "
         f"run: python scripts/build_splits.py --tasks {task} "
         "--out src/roboirg/tasks/splits/splits.json"
@@ -74,28 +74,36 @@ def test_no_task_s_episodes_have_drifted(task):
 
 
 @each_task
-def test_random_episodes_are_what_they_were(task):
+def test_the_first_40_random_episodes_of_each_task_are_what_they_were(task):
     """They are drawn anew: a changed figure of a sampler, such as a region, shows here."""
     drawn = [get_episode(task, "random", index) for index in range(40)]
-    assert fingerprint(drawn)[:12] == RANDOM[task], "new scenes need a new environment version"
+    assert fingerprint(drawn)[:12] == FINGERPRINTS_OF_RANDOM_EPISODES[task], (
+        "new scenes need a new environment version"
+    )
 
 
 @pytest.mark.parametrize("task", all_tasks())
-def test_the_benchmark_s_episodes_are_robomme_s(task):
-    sampled = [episode for episode in episodes(task) if published_episode(*slot(episode)) is None]
-    assert {episode.key for episode in sampled} == GAPS.get(task, set())
-    for episode in episodes(task):
-        found = published_episode(*slot(episode))
+def test_episodes_are_those_published_with_robomme_but_for_the_few_it_cannot_build(task):
+    """RoboMME is the benchmark of whose tasks this one is made."""
+    sampled = [
+        episode for episode in episodes_of(task) if published_episode(*place_of(episode)) is None
+    ]
+    assert {episode.key for episode in sampled} == EPISODES_THAT_ROBOMME_CANNOT_BUILD.get(
+        task, set()
+    )
+    for episode in episodes_of(task):
+        found = published_episode(*place_of(episode))
         if found is not None:
             assert found == (episode.seed, episode.difficulty, episode.scene, episode.goal)
-            assert episode.recorded == is_recorded(*slot(episode))
+            assert episode.recorded == is_recorded(*place_of(episode))
 
 
 @each_task
-def test_sampled_episodes_follow_the_cycle_and_the_rule_of_seeds(task):
+def test_episodes_of_our_own_repeat_the_difficulties_and_have_seeds_by_one_rule(task):
+    """The first seed of an episode's range, or the next one for which a scene can be made."""
     random = [get_episode(task, "random", index) for index in (0, 1, 2, 3, 999_999)]
-    for episode in [*episodes(task), *random]:
-        if published_episode(*slot(episode)):
+    for episode in [*episodes_of(task), *random]:
+        if published_episode(*place_of(episode)):
             continue
         assert episode.difficulty == ("easy", "easy", "medium", "hard")[episode.index % 4]
         first = slot_seed(get_task(task), episode.split, episode.index)
@@ -109,11 +117,12 @@ def test_sampled_episodes_follow_the_cycle_and_the_rule_of_seeds(task):
 
 
 @each_task
-def test_counts_are_of_sampled_episodes_and_stay_below_the_next_one_s_seeds(task):
+def test_seeds_passed_over_are_of_our_own_episodes_and_never_reach_the_next_ones_range(task):
+    """*passed_over* counts the seeds of an episode for which no scene could be made."""
     sampled = {
         f"{episode.split}/{episode.index}"
-        for episode in episodes(task)
-        if published_episode(*slot(episode)) is None
+        for episode in episodes_of(task)
+        if published_episode(*place_of(episode)) is None
     }
     assert set(shipped_splits()[task].passed_over) <= sampled
     assert all(0 < count <= MAX_REJECTED for count in shipped_splits()[task].passed_over.values())
@@ -122,12 +131,12 @@ def test_counts_are_of_sampled_episodes_and_stay_below_the_next_one_s_seeds(task
 
 @each_task
 def test_seeds_are_unique_over_all_splits(task):
-    seeds = [episode.seed for episode in episodes(task)]
+    seeds = [episode.seed for episode in episodes_of(task)]
     assert len(set(seeds)) == len(seeds)
     assert max(seeds) < slot_seed(get_task(task), "random", 0)
 
 
-def test_a_fingerprint_tells_small_changes_but_not_the_last_bits():
+def test_a_fingerprint_of_episodes_changes_with_a_small_turn_but_not_with_rounding():
     episode = get_episode("PickXtimes", "test", 3)
     first, *others = episode.scene.objects
 
@@ -154,7 +163,7 @@ def test_only_plain_data_has_a_fingerprint():
             plain((wrong,))
 
 
-def test_the_file_reads_back_and_has_a_line_for_each_task():
+def test_the_file_of_splits_is_read_back_and_has_a_line_for_each_task():
     splits = {"A": TaskSplits("0f", {"train/3": 2}), "B": TaskSplits("ff", {})}
     text = splits_text(splits)
 
@@ -162,7 +171,7 @@ def test_the_file_reads_back_and_has_a_line_for_each_task():
     assert {task: TaskSplits(**entry) for task, entry in json.loads(text).items()} == splits
 
 
-def test_wrong_names_and_numbers_are_named_with_what_would_be_right():
+def test_an_unknown_task_split_or_episode_is_refused_with_those_that_exist():
     with pytest.raises(UnknownNameError, match=r"no task 'PickXTime'.*PickXtimes.*Did you mean"):
         get_episode("PickXTime", "test", 0)
     with pytest.raises(UnknownNameError, match=r"no split 'dev'.*train, val, test, random"):
@@ -175,7 +184,8 @@ def test_wrong_names_and_numbers_are_named_with_what_would_be_right():
             get_episode("PickXtimes", "test", wrong)
 
 
-def test_a_task_without_shipped_seeds_passes_over_those_without_a_scene(monkeypatch):
+def test_an_episode_of_a_new_task_takes_the_first_seed_for_which_a_scene_can_be_made(monkeypatch):
+    """For the first three seeds there is no room on the table."""
     task = get_task("PickXtimes")
     first = splits.slot_seed(task, "val", 7)
 

@@ -12,7 +12,7 @@ from all_commands import all_commands, make_run, words_of
 
 from roboirg import main as cli
 
-NAMES = {
+WRONG_NAMES = {
     "--tasks": "PickXtime", "--settings": "spatail", "--forms": "implict",
     "--split": "tset", "--episodes": "four", "--policy-seeds": "one",
     "--stages": "9-1", "--distractor": "nutral", "--frame": "robt",
@@ -24,7 +24,7 @@ NAMES = {
 """A value that no command takes, for every option that takes names."""
 
 
-TEXTS = {
+OPTIONS_OF_ANY_TEXT = {
     "--out", "--trajectories", "--operator", "--policy", "--host",
     "--name",
 }  # fmt: skip
@@ -41,8 +41,8 @@ def wrong_words(command, words):
             continue
         if parameter.is_flag:
             yield "a flag with a value", [*words, f"{names[0]}=maybe"]
-        elif names[0] not in TEXTS:
-            bad = NAMES.get(names[0], "many")
+        elif names[0] not in OPTIONS_OF_ANY_TEXT:
+            bad = WRONG_NAMES.get(names[0], "many")
             yield f"{names[0]} {bad}", [*words, names[0], bad]
         if parameter.required:
             yield f"without {names[0]}", [word for word in words if word != names[0]]
@@ -50,7 +50,7 @@ def wrong_words(command, words):
             yield "no value", [*words, names[0]]
 
 
-RIGHT = {
+RIGHT_WORDS_FOR = {
     "fetch-models": ["--wheel", "nowhere"],
     "language check-scenarios": ["nowhere"],
     "language sample": ["--out", "out"],
@@ -68,7 +68,7 @@ RIGHT = {
 def one_of_each_kind():
     """Return a case of every kind, and at least one of every command: its name, and the words."""
     cases = {}
-    right_words = words_of("out", "run") | RIGHT
+    right_words = words_of("out", "run") | RIGHT_WORDS_FOR
     for name, command in all_commands().items():
         for kind, words in wrong_words(command, right_words[name]):
             cases.setdefault(kind, {}).setdefault(name, words)
@@ -88,16 +88,16 @@ CASES = one_of_each_kind()
 
 
 @pytest.fixture(scope="module")
-def home(tmp_path_factory):
+def folder_with_a_run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wrong")
     make_run(folder / "run")
     return folder
 
 
 @pytest.fixture
-def refused(home, monkeypatch, capsys):
+def refused(folder_with_a_run, monkeypatch, capsys):
     """Call a command that ends with exit code 2, and return what it prints."""
-    monkeypatch.chdir(home)
+    monkeypatch.chdir(folder_with_a_run)
     monkeypatch.setattr(sys, "path", list(sys.path))
 
     def call(name, words):
@@ -112,14 +112,16 @@ def refused(home, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(("name", "words"), CASES)
-def test_a_wrong_invocation_is_one_sentence(name, words, home, refused):
-    before = sorted(home.rglob("*"))
+def test_a_wrong_command_line_is_one_sentence_with_exit_code_2_and_writes_nothing(
+    name, words, folder_with_a_run, refused
+):
+    before = sorted(folder_with_a_run.rglob("*"))
     told = refused(name, words)
 
     assert told.out == ""
     assert told.err.startswith("roboirg: ")
     assert told.err.count("\n") == 1
-    assert sorted(home.rglob("*")) == before
+    assert sorted(folder_with_a_run.rglob("*")) == before
 
 
 NO_FOLDERS = "a" * 260, "run/records.jsonl"
@@ -134,5 +136,5 @@ WRITING = [
 
 
 @pytest.mark.parametrize(("name", "words"), WRITING)
-def test_a_place_that_cannot_be_written_is_one_sentence(name, words, refused):
+def test_a_command_whose_output_folder_cannot_be_written_ends_in_one_sentence(name, words, refused):
     assert refused(name, words).err.splitlines()[-1].startswith("roboirg: ")

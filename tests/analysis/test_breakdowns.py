@@ -36,10 +36,10 @@ PLAN = Plan(
     settings=("explicit", "direct", "reasoning", "contextual", "direct-rival"),
     episodes=tuple(range(8)),
 )
-LETTER = Breakdown("letters", "letter", "Made up.")
+BY_LETTERS = Breakdown("letters", "letter", "Made up.")
 
 
-def played(job: Job) -> Record:
+def record_of_job(job: Job) -> Record:
     """The forgetful policy fails in every implicit instruction that says *it*, and in no other."""
     record = make_record(job, "success")
     says_it = any(mention.expression == "it" for mention in record.mentions)
@@ -49,29 +49,31 @@ def played(job: Job) -> Record:
 
 
 @pytest.fixture(scope="module")
-def records() -> Records:
-    return tuple(played(job) for job in PLAN.jobs())
+def records_of_two_policies() -> Records:
+    return tuple(record_of_job(job) for job in PLAN.jobs())
 
 
 @pytest.fixture(scope="module")
-def run(records: Records, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return store(tmp_path_factory.mktemp("runs") / "both", records, PLAN).folder
+def folder_of_two_policies(
+    records_of_two_policies: Records, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    return store(tmp_path_factory.mktemp("runs") / "both", records_of_two_policies, PLAN).folder
 
 
 # Labels
 
 
-def test_a_rival_has_the_kind_of_words_that_single_it_out(records):
+def test_a_rival_is_labeled_with_the_words_that_single_it_out(records_of_two_policies):
     read = record_columns()["rival"].read
-    for record in records:
+    for record in records_of_two_policies:
         reference = record.metadata["rival_reference"]
         assert (reference is not None) == (record.setting == "direct-rival")
         assert read(record) == (f"one of two: {reference}" if reference else None)
 
 
-def test_only_the_command_s_expressions_count(records):
+def test_an_episode_is_labeled_with_the_expressions_of_its_command_alone(records_of_two_policies):
     read = record_columns()["expression"].read
-    contextual = [record for record in records if record.setting == "contextual"]
+    contextual = [record for record in records_of_two_policies if record.setting == "contextual"]
     found = {label for record in contextual for label in read(record)}  # type: ignore[attr-defined]
     said = {mention.expression for record in contextual for mention in record.mentions}
 
@@ -85,17 +87,23 @@ def test_only_the_command_s_expressions_count(records):
 # Numbers
 
 
-def hand_made(*settings: str) -> Frame:
-    """Explicit wins in episodes 0 to 5 of 12, others in 0 to 2; even ones have two labels."""
+def explicit_wins_6_of_12_and_direct_3(*settings: str) -> Frame:
+    """Return the results of these settings. Direct has one more episode, an error.
+
+    Even episodes have the labels "9" and "zebra", odd ones "10 b".
+    """
     results = [*make_results("1" * 6 + "0" * 6), *make_results("1" * 3 + "0" * 9 + "!", "direct")]
     frame = frame_of([result for result in results if result.setting in settings])
     labels = [("10 b",) if episode % 2 else ("9", "zebra") for episode in frame["episode"]]
     return frame.extended({"letters": as_column(labels)})
 
 
-def test_gaps_are_those_of_the_very_same_episodes():
-    """Explicit wins 0, 2, 4 and 1, 3, 5; direct 0, 2 and 1."""
-    rows = break_down(hand_made("explicit", "direct"), LETTER)
+def test_the_gap_of_a_label_is_over_the_episodes_with_that_label():
+    """Of the even episodes ("9", "zebra") explicit wins 0, 2, 4 and direct 0, 2: a gap of -1 of 6.
+
+    Of the odd ones ("10 b") explicit wins 1, 3, 5 and direct 1: -2 of 6.
+    """
+    rows = break_down(explicit_wins_6_of_12_and_direct_3("explicit", "direct"), BY_LETTERS)
     assert [(row.key.label, row.counts.episodes) for row in rows] == [
         ("9", 6),
         ("10 b", 6),
@@ -104,31 +112,34 @@ def test_gaps_are_those_of_the_very_same_episodes():
 
     gaps = [row.gap for row in rows]
     assert [gap and round(gap.value * 6) for gap in gaps] == [-1, -2, -1]
-    # Of one and of two episodes that differ; both by 3 are more than 1.
+    # Tests of 1 and of 2 episodes that differ; corrected for 3 tests, all reach the most, 1.
     assert [gap and gap.p_value for gap in gaps] == [1.0, 0.5, 1.0]
     assert [row.p_holm for row in rows] == [1.0, 1.0, 1.0]
 
 
-def test_a_label_without_explicit_has_no_gap():
-    table = make_breakdown_table(LETTER, hand_made("direct"))
+def test_without_explicit_results_a_label_has_a_rate_and_no_gap():
+    """2 of 6 are won; would find a gap to episodes that were not played."""
+    table = make_breakdown_table(BY_LETTERS, explicit_wins_6_of_12_and_direct_3("direct"))
     assert [entry.text for entry in table.rows[0].entries] == ["6", "33.33", "–", "–", "–"]
     assert "– without explicit on the same episodes." in table.notes
     assert table.notes[-1].startswith("Incomplete: 1 trial without a verdict")
 
 
-def test_a_compared_label_is_the_difference_on_its_episodes():
-    direct = hand_made("direct")
+def test_two_policies_are_compared_on_the_episodes_of_each_label():
+    """The better one wins all 12, so it gains 4 of 6, 5 of 6 and again 4 of 6 episodes."""
+    direct = explicit_wins_6_of_12_and_direct_3("direct")
     better = Frame({
         **direct, "run": as_column([result._replace(policy="better") for result in direct["run"]]),
         "outcome": as_column(["success"] * len(direct["run"])),
     })  # fmt: skip
-    found = compare(better, direct, [LETTER])
+    found = compare(better, direct, [BY_LETTERS])
 
     parts = found.parts["letter"]
 
     assert [(part.key.label, round(part.gap.value * 6)) for part in parts] == [
         ("9", 4), ("10 b", 5), ("zebra", 4),
     ]  # fmt: skip
+    # All n episodes that differ do so to one side, 2 / 2^n; Holm: the rarest times 3, others 2.
     assert [part.p_holm for part in parts] == pytest.approx(
         [2 * 2 / 2**4, 3 * 2 / 2**5, 2 * 2 / 2**4]
     )
@@ -138,14 +149,22 @@ def test_a_compared_label_is_the_difference_on_its_episodes():
 # Commands
 
 
-def test_the_wanted_breakdowns_are_compared(run):
-    sides = call("compare", f"{run}:listener", f"{run}:forgetful", "--by", "pattern,rival")
+def test_compare_prints_the_breakdowns_that_were_asked_for_and_no_other(folder_of_two_policies):
+    sides = call(
+        "compare",
+        f"{folder_of_two_policies}:listener",
+        f"{folder_of_two_policies}:forgetful",
+        "--by",
+        "pattern,rival",
+    )
     assert re.findall(r"^By (.*?):", sides, re.MULTILINE) == ["reasoning pattern", "rival"]
     assert "  direct-rival, one of two: " in sides
 
 
-def test_explicit_alone_has_nothing_to_break_down(records, tmp_path):
-    store(tmp_path, [record for record in records if record.setting == "explicit"])
+def test_results_of_explicit_instructions_alone_cannot_be_broken_down(
+    records_of_two_policies, tmp_path
+):
+    store(tmp_path, [record for record in records_of_two_policies if record.setting == "explicit"])
     with pytest.raises(InvalidValueError, match="need an implicit setting"):
         call("tables", tmp_path, "--by", "slots")
 
@@ -153,9 +172,11 @@ def test_explicit_alone_has_nothing_to_break_down(records, tmp_path):
 # Memory
 
 
-def test_words_are_read_line_by_line(records, tmp_path):
-    """The long parts of records are dropped at once: labels take a small share of the file."""
-    long = replace(records[1], details="x" * 20_000)
+def test_breakdowns_read_a_file_of_records_without_holding_it_in_memory(
+    records_of_two_policies, tmp_path
+):
+    """Of 2,000 records of 20 kB less than a fifth is ever in memory: long parts are dropped."""
+    long = replace(records_of_two_policies[1], details="x" * 20_000)
     store(tmp_path, [replace(long, episode=episode) for episode in range(2000)])
     reads = {name: column.read for name, column in record_columns().items()}
 

@@ -20,18 +20,18 @@ from roboirg.tasks import all_tasks, get_task
 from roboirg.tasks.splits.splits import get_episode
 
 
-def job(task: str, setting: str, episode: int = 2, **fields: object) -> Job:
+def job_in(task: str, setting: str, episode: int = 2, **fields: object) -> Job:
     usual = {"policy": "any", "split": "test", **fields}
     return job_of(task=task, setting=setting, episode=episode, **usual)
 
 
-def version_of(told: Job) -> str:
+def language_version_of(told: Job) -> str:
     return str(instruct_job(told).metadata["language_version"])
 
 
 def job_without_candidates(task, setting):
     """Return a job whose context names no candidates: there the level is a guess among them."""
-    jobs = (job(task, setting, index) for index in range(2, 50))
+    jobs = (job_in(task, setting, index) for index in range(2, 50))
     return next(made for made in jobs if not instruct_job(made).metadata["candidates"])
 
 
@@ -39,8 +39,11 @@ def job_without_candidates(task, setting):
     ("task", "setting"),
     [("PickXtimes", "spatial"), ("VideoUnmask", "direct"), ("BinFill", "reasoning")],
 )
-def test_it_is_what_the_forgetful_listener_comes_to(task, setting):
-    """Its own decisions, with 400 seeds in one episode; only its hands are left out."""
+def test_the_computed_chance_is_the_rate_of_a_policy_that_forgets_and_guesses(task, setting):
+    """The forgetful listener decides 400 times with other seeds; nothing has to be simulated.
+
+    Would find a chance level computed over other goals than those it guesses among.
+    """
     played = job_without_candidates(task, setting)
     episode = get_episode(task, "test", played.episode)
     env = SimpleNamespace(episode=episode, instruction=instruct_job(played))
@@ -61,9 +64,11 @@ def test_it_is_what_the_forgetful_listener_comes_to(task, setting):
     [("PickXtimes", "direct"), ("VideoUnmask", "reasoning"), ("StopCube", "reasoning")],
 )
 @pytest.mark.parametrize("rule", SURFACE_RULES)
-def test_floors_are_what_the_shortcut_listeners_come_to(rule, task, setting):
-    """Their own decisions, with 100 seeds; a goal that the scene lacks is none."""
-    played = job(task, setting, episode=3)
+def test_the_computed_floor_of_a_shortcut_is_the_rate_of_a_policy_that_takes_it(
+    rule, task, setting
+):
+    """A shortcut, such as *always the color named last*, decides 100 times with other seeds."""
+    played = job_in(task, setting, episode=3)
     episode = get_episode(task, "test", 3)
     instruction = instruct_job(played)
     env = SimpleNamespace(episode=episode, instruction=instruction)
@@ -80,19 +85,23 @@ def test_floors_are_what_the_shortcut_listeners_come_to(rule, task, setting):
     ("setting", "form"),
     [("explicit", "implicit"), ("direct", "resolved"), ("contextual", "resolved")],
 )
-def test_commands_that_name_all_leave_nothing_to_chance(task, setting, form):
-    assert floor_level(CHANCE, [job(task, setting, at, form=form) for at in range(4)]) == 1
+def test_a_command_that_names_everything_leaves_nothing_to_guess(task, setting, form):
+    """Explicit commands, and the *resolved* form, in which what they refer to is named."""
+    jobs = [job_in(task, setting, episode, form=form) for episode in range(4)]
+
+    assert floor_level(CHANCE, jobs) == 1
 
 
-def test_who_plays_and_how_often_makes_no_difference():
-    jobs = [job("StopCube", "reasoning", episode) for episode in range(4)]
+def test_the_chance_level_does_not_depend_on_who_plays_or_how_often():
+    """Would find a level weighted by trials; and learned floors of other options or versions."""
+    jobs = [job_in("StopCube", "reasoning", episode) for episode in range(4)]
     again = [msgspec.structs.replace(made, policy="else", policy_seed=3) for made in jobs[:1]]
     assert floor_level(CHANCE, jobs + again * 5) == floor_level(CHANCE, jobs)
     assert floor_level(CHANCE, []) is None
 
     # Learned floors are those of the usual options, in the version that was played.
-    usual = job("PickXtimes", "contextual")
-    short = job("PickXtimes", "contextual", stages=(1, 5))
-    assert floor_level("text-only", [short], version_of(usual)) is None
-    assert floor_level("text-only", [usual], version_of(usual)) is not None
+    usual = job_in("PickXtimes", "contextual")
+    short = job_in("PickXtimes", "contextual", stages=(1, 5))
+    assert floor_level("text-only", [short], language_version_of(usual)) is None
+    assert floor_level("text-only", [usual], language_version_of(usual)) is not None
     assert floor_level("text-only", [usual], "0.9") is None, "never those of another version"

@@ -18,12 +18,15 @@ from roboirg.analysis.tables.run_tables import make_run_tables
 from roboirg.core.episode import ENVIRONMENT_VERSION
 from roboirg.core.policy_ref import unknown_policy
 
-WORDS = "robomme@1a2b3c4d"
+PUBLISHED_WORDS = "robomme@1a2b3c4d"
 TASKS = ("PickXtimes", "StopCube")
 
 
-def play(episodes=range(50), tasks=TASKS[:1], settings=("explicit",), **fields) -> list:
-    usual = {"wordings": WORDS, "environment_version": ENVIRONMENT_VERSION} | fields
+def results_like_the_papers(
+    episodes=range(50), tasks=TASKS[:1], settings=("explicit",), **fields
+) -> list:
+    """Return results as the paper has them: 50 episodes of PickXtimes, 4 of 5 won."""
+    usual = {"wordings": PUBLISHED_WORDS, "environment_version": ENVIRONMENT_VERSION} | fields
     return [
         make_result(
             "failure" if episode % 5 == 0 else "success",
@@ -38,11 +41,11 @@ def play(episodes=range(50), tasks=TASKS[:1], settings=("explicit",), **fields) 
     ]
 
 
-def data_of(*results):
+def run_data_of(*results):
     return RunData(frame_of(*results))
 
 
-def differences(results, planned=()) -> tuple[str, ...] | None:
+def named_differences(results, planned=()) -> tuple[str, ...] | None:
     ((key, cell),) = cells_of(frame_of(results, planned=planned)).items()
     return differences_of(key, cell)
 
@@ -67,62 +70,80 @@ def differences(results, planned=()) -> tuple[str, ...] | None:
         ({"environment_version": 99}, ("environment version 99",)),
     ],
 )
-def test_what_differs_from_robommes_episodes_in_its_words_is_named(fields, expected):
-    assert differences(play(**fields)) == expected
+def test_each_difference_to_how_the_paper_played_is_named(fields, expected):
+    """A rate may stand next to a published one only if episodes, words and limits are the same."""
+    assert named_differences(results_like_the_papers(**fields)) == expected
 
 
-def test_errors_and_unplayed_trials_are_named():
-    several = [*play(), *play(policy_seed=1)]
-    # A trial is played wherever policy and wordings come from.
+def test_errors_and_planned_trials_without_a_result_are_named():
+    """Would find an incomplete rate that stands next to a published one without a sign."""
+    several = [*results_like_the_papers(), *results_like_the_papers(policy_seed=1)]
+    # A planned trial counts as played even if its policy or its words came from another place.
     elsewhere = {"ref": unknown_policy("openpi://other:1"), "wordings_file": "elsewhere.toml"}
     planned = [replace(result.identity, **elsewhere) for result in several]
-    assert differences(several, planned) == ()
+    assert named_differences(several, planned) == ()
 
     third = replace(several[60], outcome="error", error="policy")
     rest = [*several[:60], third, *several[63:]]
-    assert differences(rest, planned) == ("1 error", "2 trials still to be played")
+    assert named_differences(rest, planned) == ("1 error", "2 trials still to be played")
 
 
-def test_other_settings_other_robots_and_other_tasks_are_not_comparable():
-    assert differences(play(settings=("direct",))) == IMPLICIT
-    assert differences(play(tasks=("PutInBox",))) == REAL
-    assert differences(play(tasks=("Outside",))) is None
+def test_implicit_settings_real_robots_and_unknown_tasks_have_their_own_reasons():
+    """PutInBox is a task of the paper's real robot; Outside is in no table of the paper."""
+    assert named_differences(results_like_the_papers(settings=("direct",))) == IMPLICIT
+    assert named_differences(results_like_the_papers(tasks=("PutInBox",))) == REAL
+    assert named_differences(results_like_the_papers(tasks=("Outside",))) is None
 
-    planned = [result.identity for result in play()]
-    assert differences([], planned) is None
+    planned = [result.identity for result in results_like_the_papers()]
+    assert named_differences([], planned) is None
 
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_every_format_marks_the_cells_and_says_what_differs(snapshot, name):
     """Of two tasks, one with too few episodes, in explicit and in a setting of other words."""
-    results = play(settings=("explicit", "direct"))
-    table = make_table("main", data_of(results, play(range(4), TASKS[1:])), published=True)
+    results = results_like_the_papers(settings=("explicit", "direct"))
+    table = make_table(
+        "main", run_data_of(results, results_like_the_papers(range(4), TASKS[1:])), published=True
+    )
 
     ours = [row for row in table.rows if row.source == "ours" or row.name == "MemER"]
 
     assert FORMATS[name].draw(dataclasses.replace(table, rows=tuple(ours))) == snapshot
 
 
-def test_without_published_rates_nothing_is_marked_but_the_best():
-    plain = make_table("main", data_of(play(settings=("explicit", "direct"))))
+def test_a_table_without_published_rates_marks_the_best_rate_alone():
+    """The sign of the best is *; = and ≠ would refer to rates that the table does not show."""
+    plain = make_table(
+        "main", run_data_of(results_like_the_papers(settings=("explicit", "direct")))
+    )
     assert "comparable" not in " ".join(plain.notes)
     assert {entry.signs for row in plain.rows for entry in row.entries} == {"", "*"}
 
 
-def test_differences_are_listed_by_policy_if_they_are_not_the_same():
-    ours = play(wordings=None)
+def test_a_note_names_the_policies_only_where_their_differences_are_not_the_same():
+    ours = results_like_the_papers(wordings=None)
     different = "≠ not comparable with the published rate"
-    same = make_table("main", data_of(ours, play(wordings=None, policy="b")), published=True)
+    same = make_table(
+        "main",
+        run_data_of(ours, results_like_the_papers(wordings=None, policy="b")),
+        published=True,
+    )
     assert f"{different}: our own words." in same.notes
 
-    table = make_table("main", data_of(ours, play(policy="b", max_steps=9)), published=True)
+    table = make_table(
+        "main", run_data_of(ours, results_like_the_papers(policy="b", max_steps=9)), published=True
+    )
     assert f"{different} (listener, max steps 1300, our own words): our own words." in table.notes
 
 
-def test_the_table_of_a_run_marks_its_explicit_column():
+def test_in_the_terminal_only_explicit_rates_are_marked_as_comparable_or_not():
+    """50 episodes in one task (=), and 4 in the other (≠): 40 of 50 and 3 of 4 are won."""
     settings = ("explicit", "direct")
     (table,) = make_run_tables(
-        frame_of(play(settings=settings), play(range(4), TASKS[1:], settings))
+        frame_of(
+            results_like_the_papers(settings=settings),
+            results_like_the_papers(range(4), TASKS[1:], settings),
+        )
     )
 
     assert [str(row.entries[0]) for row in table.rows[:2]] == ["80 =", "75 ≠"]

@@ -14,15 +14,15 @@ GOOD = "listener"
 POOR = "forgetful"
 
 
-def compared(first: list, second: list):
+def comparison_of(first: list, second: list):
     return compare(make_frame([("a", first)]), make_frame([("b", second)]))
 
 
-def text(first: list, second: list) -> str:
-    return "\n".join(sentences(compared(first, second), GOOD, POOR))
+def sentences_of(first: list, second: list) -> str:
+    return "\n".join(sentences(comparison_of(first, second), GOOD, POOR))
 
 
-def case(name: str) -> tuple[list, list]:
+def results_of_case(name: str) -> tuple[list, list]:
     """Return the results of the good policy and of the poor one."""
     settings = ("explicit", "direct", "reasoning", "contextual")
     good, poor = {
@@ -52,28 +52,28 @@ def case(name: str) -> tuple[list, list]:
 
 
 @pytest.mark.parametrize("name", ["better", "open", "tasks", "left out", "interval and p"])
-def test_what_is_said_is_as_stored(snapshot, name):
+def test_the_sentences_of_a_comparison_are_as_stored(snapshot, name):
     """Which is better, what stays open and what it would take, and what is left out."""
-    assert text(*case(name)) == snapshot
+    assert sentences_of(*results_of_case(name)) == snapshot
 
 
-def test_control_arms_are_left_out():
+def test_episodes_without_instruction_do_not_count_in_a_comparison():
+    """The arm *silent* is a control: it would drag down the policy that played it."""
     first = make_results("11")
-    second = make_results("01", policy=POOR)
-
+    second = make_results("01", policy="forgetful")
     silent = make_results("00", arm="silent")
 
-    assert compared([*first, *silent], second) == compared(first, second)
-    assert compared(silent, silent).averages, "unless there is nothing else"
+    assert comparison_of([*first, *silent], second) == comparison_of(first, second)
+    assert comparison_of(silent, silent).averages, "unless there is nothing else"
 
 
 def test_policies_without_a_common_episode_are_refused():
     for changes in ({"task": "BinFill"}, {"setting": "direct"}):
         with pytest.raises(InvalidValueError, match="no episode in common"):
-            compared(make_results("11"), make_results("11", policy=POOR, **changes))
+            comparison_of(make_results("11"), make_results("11", policy=POOR, **changes))
 
 
-def test_a_side_is_one_policy_of_one_version():
+def test_each_side_of_a_comparison_must_be_one_policy_of_one_version():
     results = make_results("11")
     for side, words in (
         ([*results, *make_results("11", policy=POOR)], "name one as RUN:forgetful"),
@@ -81,4 +81,4 @@ def test_a_side_is_one_policy_of_one_version():
         ([], "no results"),
     ):
         with pytest.raises(InvalidValueError, match=words):
-            compared(side, results)
+            comparison_of(side, results)

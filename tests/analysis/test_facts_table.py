@@ -21,7 +21,7 @@ from roboirg.runs.plan.stored_plans import write_plan
 Facts = dict[str, dict[str, str]]
 
 
-def record(episode: int, outcome: str = "success", **fields) -> Record:
+def record_of(episode: int, outcome: str = "success", **fields) -> Record:
     setting = fields.pop("setting", "explicit")
     job = job_of(policy="mine", task="PickXtimes", split="test", episode=episode, setting=setting)
     cause = None if outcome == "success" else "why"
@@ -29,7 +29,7 @@ def record(episode: int, outcome: str = "success", **fields) -> Record:
     return make_record(job, outcome, cause, started_at=start, **fields)
 
 
-def facts(folder: Path, *records: Record) -> Facts:
+def facts_of_run(folder: Path, *records: Record) -> Facts:
     store(folder, records)
     rows = json.loads(call("tables", folder, "--which", "facts", "--format", "json"))
     found: Facts = {}
@@ -38,11 +38,15 @@ def facts(folder: Path, *records: Record) -> Facts:
     return found
 
 
-def test_a_run_has_its_facts(tmp_path):
+def test_the_table_of_facts_says_what_was_planned_played_and_begun_again(tmp_path):
+    """Of five records one is a failed first attempt; three planned trials were not played.
+
+    Would find a repeated episode that counts twice, or an error that vanishes.
+    """
     failed = {"error": "policy", "steps": 50, "calls": 1, "executed": 20}
-    again = record(0, "error", **failed), record(0, attempt=2, steps=30, calls=3, executed=10)
+    again = record_of(0, "error", **failed), record_of(0, attempt=2, steps=30, calls=3, executed=10)
     code = {"code": "0a", "verdict_code": None}
-    later = record(2, "error", error="timeout", **code), record(3, setting="direct")
+    later = record_of(2, "error", error="timeout", **code), record_of(3, setting="direct")
     write_plan(make_plan(["mine=random"], tasks="PickXtimes", settings="direct"), tmp_path)
     expected = {
         "tasks": "PickXtimes",
@@ -60,15 +64,15 @@ def test_a_run_has_its_facts(tmp_path):
         "verdict code": again[0].verdict_code,
     }
 
-    found = facts(tmp_path, *again, *later)
+    found = facts_of_run(tmp_path, *again, *later)
 
     assert found[RUN].items() >= expected.items()
-    # Without the episode that was played again.
+    # 30 steps by 3 calls; the failed first attempt, 50 steps by 1, is left out.
     assert found["mine"]["control steps per call, mean"] == "10.0"
 
 
-SILENT = ("version", "cameras", "trained on", "dtype", "python", "prompts")
-MINE = InferenceFacts(
+UNKNOWN_UNLESS_DECLARED = ("version", "cameras", "trained on", "dtype", "python", "prompts")
+FACTS_OF_A_NETWORK = InferenceFacts(
     python="3.12.1", libraries={"torch": "2.9"}, dtypes=("bfloat16",), devices=("cuda:0",)
 )
 
@@ -80,14 +84,16 @@ MINE = InferenceFacts(
             {},
             {},
             {
-                **dict.fromkeys([*SILENT, "control steps per call, mean"], NOT_REPORTED),
+                **dict.fromkeys(
+                    [*UNKNOWN_UNLESS_DECLARED, "control steps per call, mean"], NOT_REPORTED
+                ),
                 "reads the simulator's state": "no",
             },
         ),
         (
             {
                 "needs": {"cameras": ["front"], "actions": "ee_pose", "lowers_prompt": True},
-                "inference": MINE,
+                "inference": FACTS_OF_A_NETWORK,
                 "steps": 30,
                 "calls": 3,
                 "executed": 16,
@@ -109,7 +115,7 @@ MINE = InferenceFacts(
             },
         ),
         (  # The client's process of a server has libraries, too, but computes nothing.
-            {"inference": MINE},
+            {"inference": FACTS_OF_A_NETWORK},
             {"server": "openpi://host:8000", "dtype": "float16"},
             {"dtype": "float16", "python": NOT_REPORTED, "libraries": NOT_REPORTED},
         ),
@@ -134,14 +140,17 @@ MINE = InferenceFacts(
         ),
     ],
 )
-def test_a_policy_has_what_it_declares_and_its_process_reports(
+def test_the_facts_of_a_policy_are_what_it_declares_and_what_its_process_reports(
     tmp_path, fields, metadata, expected
 ):
-    # In the mean of steps by calls, longer episodes count for more.
+    """What neither says is *not reported*: a guess would look like a fact in a paper."""
+    # A second episode of 10 steps by 1 call: 40 by 4 together.
     short = {**fields, "steps": 10, "calls": 1, "executed": 10} if "steps" in fields else fields
-    both = (record(at, policy_metadata=metadata, **own) for at, own in enumerate((fields, short)))
+    both = (
+        record_of(at, policy_metadata=metadata, **own) for at, own in enumerate((fields, short))
+    )
 
-    found = facts(tmp_path, *both)
+    found = facts_of_run(tmp_path, *both)
 
     assert found["mine"].items() >= expected.items()
     assert found[RUN]["errors, in no rate"] == "0"
@@ -160,8 +169,8 @@ class Network:
         return self._parameters
 
 
-def test_parameters_are_found_below_a_policy(monkeypatch):
-    """In dictionaries, lists and objects; the kind of most numbers comes first."""
+def test_types_and_devices_of_a_network_are_found_wherever_the_policy_keeps_it(monkeypatch):
+    """In dictionaries, lists and objects, also in a circle; that of most parameters comes first."""
     torch = SimpleNamespace(nn=SimpleNamespace(Module=Network))
     monkeypatch.setitem(sys.modules, "torch", torch)
     large = Network(("bfloat16", "cuda:0", 400))

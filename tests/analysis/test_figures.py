@@ -42,12 +42,14 @@ PLAN = Plan(
 
 
 @functools.cache
-def results() -> list[Summary]:
+def results_of_two_policies() -> list[Summary]:
     return [*played(PLAN)]
 
 
-def content(found: list[Summary] | None = None, **options: object) -> RunData:
-    return RunData(make_frame([("run", results() if found is None else found)], **options))  # type: ignore[arg-type]
+def run_data(found: list[Summary] | None = None, **options: object) -> RunData:
+    return RunData(
+        make_frame([("run", results_of_two_policies() if found is None else found)], **options)
+    )  # type: ignore[arg-type]
 
 
 def drawn_texts(figure: Figure) -> list[Text]:
@@ -58,17 +60,17 @@ def drawn_texts(figure: Figure) -> list[Text]:
     return [text for text in found if text.get_visible() and text.get_text()]
 
 
-def words(text: Text) -> str:
+def text_without_line_breaks(text: Text) -> str:
     return " ".join(text.get_text().split())
 
 
-def draw(name: str, found: RunData, *, published: bool = False) -> Figure:
+def drawn_figure(name: str, found: RunData, *, published: bool = False) -> Figure:
     figure = draw_figure(name, found, published=published)
     assert figure is not None
     return figure
 
 
-def dots(figure: Figure) -> dict[tuple[str, str], list[float]]:
+def dot_positions(figure: Figure) -> dict[tuple[str, str], list[float]]:
     """Reference and rate, or the rate alone, by panel and label of the row, in percent."""
     found: dict[tuple[str, str], list[float]] = {}
     for panel in figure.axes:
@@ -76,40 +78,42 @@ def dots(figure: Figure) -> dict[tuple[str, str], list[float]]:
         for line in panel.lines:
             if line.get_marker() == "o":
                 (x,), (y,) = line.get_data()
-                key = panel.get_title(loc="left"), words(labels[y])
+                key = panel.get_title(loc="left"), text_without_line_breaks(labels[y])
                 found.setdefault(key, []).append(float(x))
     return found
 
 
 @pytest.mark.slow
-def test_all_figures_that_apply_are_written_and_are_the_same_again(tmp_path):
+def test_wanted_figures_are_written_byte_for_byte_the_same_from_results_in_any_order(tmp_path):
+    """Would find figures that change from run to run, so that a paper's cannot be made again."""
     paths = write_figures(
-        content(planned=PLAN.jobs()), tmp_path / "a" / "b", ("gaps", "context", "failures")
+        run_data(planned=PLAN.jobs()), tmp_path / "a" / "b", ("gaps", "context", "failures")
     )
-    # Nothing is known about contexts of other lengths.
+    # The third, context, needs results of several context lengths; there are none.
     assert {path.name for path in paths} == {
         f"{name}{ending}"
         for name in ("gaps", "failures")
         for ending in (".png", ".svg", ".pdf", "-dark.png", "-dark.svg")
     }
 
-    turned = content(results()[::-1], planned=PLAN.jobs())
+    turned = run_data(results_of_two_policies()[::-1], planned=PLAN.jobs())
     again = write_figures(turned, tmp_path / "again", ["gaps"])
     for first, second in zip(sorted(paths)[-5:], sorted(again), strict=True):
         assert first.read_bytes() == second.read_bytes(), first.name
 
 
-def test_figures_are_not_written_through_links(tmp_path):
+def test_a_link_with_the_name_of_a_figure_is_replaced_and_its_target_stays(tmp_path):
+    """Would find that drawing overwrites a file elsewhere, to which somebody else's link leads."""
     (tmp_path / "victim").write_text("mine")
     (tmp_path / "gaps.png").symlink_to(tmp_path / "victim")
 
-    write_figures(content(), tmp_path, ["gaps"])
+    write_figures(run_data(), tmp_path, ["gaps"])
 
     assert (tmp_path / "victim").read_text() == "mine"
     assert not (tmp_path / "gaps.png").is_symlink()
 
 
-LIMITS = "Played on the test split, in our own words, with at most 1300 steps."
+CONDITIONS_BELOW_A_FIGURE = "Played on the test split, in our own words, with at most 1300 steps."
 
 
 @pytest.mark.parametrize(
@@ -119,13 +123,15 @@ LIMITS = "Played on the test split, in our own words, with at most 1300 steps."
         ("failures", ["grounding: wrong object", "n = 6", "direct (resolved)"]),
     ],
 )
-def test_figures_say_what_the_records_say(name, shown):
-    texts = [words(drawn) for drawn in drawn_texts(draw(name, content()))]
+def test_a_figure_has_its_labels_its_counts_and_the_conditions_of_its_runs(name, shown):
+    texts = [
+        text_without_line_breaks(drawn) for drawn in drawn_texts(drawn_figure(name, run_data()))
+    ]
     assert {*shown} <= {*texts}
-    assert LIMITS in texts[0]
+    assert CONDITIONS_BELOW_A_FIGURE in texts[0]
 
 
-def widths(panel: Axes) -> dict[str, float]:
+def bar_widths_by_color(panel: Axes) -> dict[str, float]:
     """The length of a panel's bars by color; each part of a bar begins where the last one ends."""
     found: dict[str, float] = {}
     ends: defaultdict[float, float] = defaultdict(float)
@@ -138,15 +144,21 @@ def widths(panel: Axes) -> dict[str, float]:
     return found
 
 
-def test_bars_are_shares_of_what_was_played(monkeypatch):
-    """Also those too short for a number: would catch one that the next part covers."""
+def test_each_part_of_a_bar_is_as_long_as_its_share_of_the_played_episodes(monkeypatch):
+    """Also parts too short for a number; would find one that is covered by the next."""
     monkeypatch.setattr(failures, "MIN_LABELED_PERCENT", 20.0)
-    found = content(planned=PLAN.jobs())
-    failed = [result.attribution.failure for result in results() if result.attribution is not None]
+    found = run_data(planned=PLAN.jobs())
+    failed = [
+        result.attribution.failure
+        for result in results_of_two_policies()
+        if result.attribution is not None
+    ]
 
-    listener, forgetful = (widths(panel) for panel in draw("failures", found).axes)
+    listener, forgetful = (
+        bar_widths_by_color(panel) for panel in drawn_figure("failures", found).axes
+    )
 
-    # Everything failed in the four implicit tellings, nothing in the rest.
+    # The forgetful policy fails everywhere in four of its bars: 4 times 100 %. The other never.
     assert sum(listener.values()) == 0
     assert sum(forgetful.values()) == pytest.approx(400)
     for name, color in failures.COLORS.items():
@@ -154,11 +166,11 @@ def test_bars_are_shares_of_what_was_played(monkeypatch):
     assert len({*failures.COLORS.values()}) == len(FAILURES) + 1
 
 
-def test_gaps_are_those_of_the_summary():
-    """And who lacks a trial is marked, of two policies that played the same otherwise."""
-    found = content(planned=[*PLAN.jobs(), replace(PLAN.jobs()[0], policy_seed=1)])
+def test_drawn_gaps_are_those_of_the_tables_and_a_policy_that_lacks_a_trial_is_marked():
+    """A dot for explicit, one for the implicit setting: their distance is the gap, in points."""
+    found = run_data(planned=[*PLAN.jobs(), replace(PLAN.jobs()[0], policy_seed=1)])
 
-    shown = dots(draw("gaps", found))
+    shown = dot_positions(drawn_figure("gaps", found))
 
     names = {label.partition(",")[0] for _, label in shown}
     assert names == {"listener (privileged) (incomplete)", "forgetful (privileged)"}
@@ -177,16 +189,17 @@ def test_gaps_are_those_of_the_summary():
         (Rate(0.5, 0.75, Interval(-0.375, -0.125)), [37.5, 62.5]),
     ],
 )
-def test_bands_lie_around_their_rates(rate, ends):
-    """The interval of a difference is drawn from the reference, not from the rate."""
+def test_an_interval_is_drawn_around_its_rate(rate, ends):
+    """Of a difference to a reference, 0.75, it is added to the reference: 0.75 - 0.375 = 37.5 %."""
     figure = draw_rates({"direct": ""}, [RateRow("a", {"direct": rate})], WORDS["main"], [])
     assert [*figure.axes[0].lines[0].get_xdata()] == ends
 
 
-def test_published_gaps_are_over_the_tasks_of_their_setting():
+def test_a_published_gap_is_over_the_tasks_that_have_its_setting():
+    """Would find the explicit average of all tasks next to that of fewer tasks in a setting."""
     rows = {(row.model, row.options.setting): row for row in published_rows("main")}
 
-    shown = dots(draw("gaps", content([]), published=True))
+    shown = dot_positions(drawn_figure("gaps", run_data([]), published=True))
 
     assert len(shown) == 4 * len({model for model, _ in rows})
     for (setting, model), (explicit, implicit) in shown.items():
@@ -198,18 +211,18 @@ def test_published_gaps_are_over_the_tasks_of_their_setting():
 
 
 def test_there_is_no_figure_of_gaps_without_results():
-    assert draw_figure("gaps", content([])) is None
+    assert draw_figure("gaps", run_data([])) is None
 
 
-def test_published_rows_stand_apart_and_signs_say_what_cannot_be_compared():
-    """As in a table: one episode of our own next to 150 of the paper's has its n and its ≠."""
+def test_published_rows_stand_below_a_line_and_own_rates_that_differ_have_a_sign():
+    """One episode of ours stands next to 50 times 3 of the paper's: marked ≠, with its n = 1."""
     found = [result for result in like_published("main", "MemER") if result.task == "PickXtimes"]
     first = next(result for result in found if (result.setting, result.episode) == ("direct", 0))
 
-    figure = draw("gaps", content([first]), published=True)
+    figure = drawn_figure("gaps", run_data([first]), published=True)
 
     panel = figure.axes[0]
-    labels = [words(label) for label in panel.get_yticklabels()]
+    labels = [text_without_line_breaks(label) for label in panel.get_yticklabels()]
     assert labels[:2] == ["MemER, n = 1 ≠", "published, n = 50 × 3"]
     assert len(labels) == 2 + len({row.model for row in published_rows("main")})
 
@@ -217,20 +230,25 @@ def test_published_rows_stand_apart_and_signs_say_what_cannot_be_compared():
     own, heading = panel.get_yticks()[:2]
     assert own < line.get_ydata()[0] < heading  # type: ignore[index]
 
-    texts = [words(text) for text in drawn_texts(figure)]
+    texts = [text_without_line_breaks(text) for text in drawn_texts(figure)]
     assert "≠ Implicit settings are not comparable with the published rates" in texts[0]
     assert "PickXtimes" in texts
 
 
-def test_no_sign_stands_where_nothing_published_is_drawn():
+def test_a_figure_without_published_rates_does_not_mention_them():
     found = [result for result in like_published("main", "MemER") if result.task == "PickXtimes"]
-    assert "published" not in words(draw("gaps", content(found)).texts[0])
+    assert "published" not in text_without_line_breaks(
+        drawn_figure("gaps", run_data(found)).texts[0]
+    )
 
 
-def test_the_context_is_compared_with_the_shortest_on_the_same_tasks():
+def test_rates_of_each_context_length_are_drawn_from_those_of_the_shortest():
+    """A context has up to five stages; the shortest has the first and the last, (1, 5)."""
     rates = {(row.model, row.options.stages): row.average for row in published_rows("context")}
 
-    shown = dots(draw("context", content(like_published("context")), published=True))
+    shown = dot_positions(
+        drawn_figure("context", run_data(like_published("context")), published=True)
+    )
 
     assert {title for title, _ in shown} == {"stages 1,2,5", "stages 1,2,3,5", "stages 1,2,3,4,5"}
     for (title, label), (shortest, rate) in shown.items():
@@ -244,7 +262,7 @@ def test_the_context_is_compared_with_the_shortest_on_the_same_tasks():
 def test_there_is_no_figure_of_the_shortest_context_alone():
     found = like_published("context")
     shortest = [result for result in found if result.options.stages == (1, 5)]
-    assert draw_figure("context", content(shortest)) is None
+    assert draw_figure("context", run_data(shortest)) is None
 
 
 POLICIES_WITH_LONG_NAMES = (
@@ -258,13 +276,13 @@ POLICIES_WITH_LONG_NAMES = (
 
 @pytest.mark.parametrize(("name", "count"), [("gaps", 5), ("context", 1), ("failures", 5)])
 def test_no_text_leaves_the_figure_or_lies_on_another(name, count):
-    found = like_published("context") if name == "context" else results()
+    found = like_published("context") if name == "context" else results_of_two_policies()
     played = [result for result in found if result.policy in ("forgetful", "MemER")]
     many = []
     for policy in POLICIES_WITH_LONG_NAMES[:count]:
         many += [replace(result, policy=policy) for result in played]
 
-    figure = draw(name, content(many), published=True)
+    figure = drawn_figure(name, run_data(many), published=True)
 
     texts = drawn_texts(figure)
     assert any("NetWithA" in "".join(text.get_text().split()) for text in texts)
@@ -279,11 +297,15 @@ def test_no_text_leaves_the_figure_or_lies_on_another(name, count):
 
 
 @pytest.mark.parametrize("kept", ["explicit", "direct"])
-def test_rates_without_another_setting_stand_alone(kept):
-    found = content(
-        [result for result in results() if result.setting == kept and result.form == "implicit"]
+def test_results_of_one_setting_are_drawn_as_rates_without_a_gap(kept):
+    found = run_data(
+        [
+            result
+            for result in results_of_two_policies()
+            if result.setting == kept and result.form == "implicit"
+        ]
     )
-    shown = dots(draw("gaps", found))
+    shown = dot_positions(drawn_figure("gaps", found))
     assert {title for title, _ in shown} == {kept}
 
     own = [

@@ -25,7 +25,7 @@ OUTCOMES = ("success", "failure", "error")
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def run_with_wins_losses_and_errors(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Of each task and setting the first episode is won, the next lost; one is an error."""
     folder = tmp_path_factory.mktemp("runs") / "run"
     plan = make_plan("oracle", tasks="PickXtimes,StopCube", settings="all", episodes="4")
@@ -37,8 +37,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return store(folder, found, plan).folder
 
 
-def test_columns_have_their_types_and_lack_what_they_may_lack(run):
-    found = roboirg.results(run)
+def test_each_column_of_the_results_has_the_type_it_declares_and_gaps_only_where_it_may(
+    run_with_wins_losses_and_errors,
+):
+    found = roboirg.results(run_with_wins_losses_and_errors)
 
     declared = {**COLUMNS, **record_columns()}
     assert list(found) == list(declared)
@@ -63,14 +65,19 @@ def test_columns_have_their_types_and_lack_what_they_may_lack(run):
     assert set(found["suite"]) == {"counting"}
 
 
-def test_words_of_all_turns_are_counted(run):
+def test_the_column_words_counts_the_words_of_all_turns_of_an_instruction(
+    run_with_wins_losses_and_errors,
+):
     texts = []
-    for record in iterate_records(run):
+    for record in iterate_records(run_with_wins_losses_and_errors):
         texts += [turn.text for turn in record.instruction]
-    assert roboirg.results(run)["words"].sum() == len(" ".join(texts).split())
+    assert roboirg.results(run_with_wins_losses_and_errors)["words"].sum() == len(
+        " ".join(texts).split()
+    )
 
 
-def test_policies_of_their_own_versions_are_called_by_their_names():
+def test_policies_are_named_without_version_and_ordered_as_planned():
+    """Two policies with a version each need none in their names; would find it added anyway."""
     both = [make_result(policy=name, policy_version=name) for name in "ba"]
     assert list(frame_of(both).names.values()) == ["a", "b"]
     assert list(frame_of(both).names_as_played.values()) == ["b", "a"]
@@ -92,7 +99,8 @@ def test_rows_are_sorted_by_task_then_episode_then_seed():
     assert [*zip(frame["task"], frame["episode"], frame["policy_seed"], strict=True)] == rows
 
 
-def test_what_is_missing_belongs_to_the_version_that_played_first():
+def test_a_planned_episode_without_result_is_missing_for_the_first_version_that_played():
+    """A policy played an episode as version b and one as a; the plan had three."""
     two = [make_result("success", at, policy_version=name) for at, name in enumerate("ba")]
     cells = cells_of(frame_of(two, planned=[make_result("success", 2).identity]))
     missing = {key.policy_run.versions.policy_version: cell.missing for key, cell in cells.items()}
@@ -100,7 +108,7 @@ def test_what_is_missing_belongs_to_the_version_that_played_first():
     assert missing == {"a": 0, "b": 1}
 
 
-PLAYS = st.dictionaries(
+ANY_RESULTS = st.dictionaries(
     st.tuples(
         st.sampled_from(["explicit", "direct"]),
         st.sampled_from(["PickXtimes", "BinFill"]),
@@ -112,9 +120,9 @@ PLAYS = st.dictionaries(
 
 
 @settings(max_examples=25)
-@given(PLAYS, st.randoms(use_true_random=False))
-def test_order_and_runs_of_the_records_make_no_difference(plays, random):
-    """Two runs complete each other, and what neither played is missing."""
+@given(ANY_RESULTS, st.randoms(use_true_random=False))
+def test_shuffled_results_in_two_runs_are_the_same_table_as_one_run_in_order(plays, random):
+    """Two runs of one plan complete each other; what neither played is missing."""
     found = []
     for (setting, task, episode, seed), outcome in plays.items():
         result = make_result(outcome, episode, setting=setting, task=task, policy_seed=seed)
@@ -133,7 +141,8 @@ def test_order_and_runs_of_the_records_make_no_difference(plays, random):
     assert summarize(cells_of(parts)) == summarize(cells_of(whole))
 
 
-def test_the_same_episode_in_two_runs_stays_apart():
+def test_an_episode_played_in_two_runs_counts_in_each_under_a_name_of_its_own():
+    """Won in run a and lost in run b: 1 and 0. Would find a mean of both under one name."""
     both = [make_result(outcome, 0, started_at=outcome) for outcome in OUTCOMES[:2]]
 
     twice = make_frame([("a", both[:1]), ("none", []), ("b", both[1:])])
@@ -142,7 +151,7 @@ def test_the_same_episode_in_two_runs_stays_apart():
     assert [cell.rate for cell in cells_of(twice).values()] == [1, 0]
 
 
-def test_each_row_gets_its_own_value_of_an_added_column():
+def test_an_added_column_has_the_value_of_each_row_although_records_come_in_another_order():
     both = [make_result(outcome, 0, started_at=outcome) for outcome in OUTCOMES[:2]]
     twice = make_frame([("a", both[:1]), ("b", both[1:])])
     reads = {"cause": lambda record: record.outcome, "1": lambda _: 1, "true": lambda _: True}
@@ -153,7 +162,7 @@ def test_each_row_gets_its_own_value_of_an_added_column():
     assert [*map(repr, found["true"])] == ["True"] * 2, "equal values of two kinds are two"
 
 
-def test_a_policy_that_has_not_begun_is_there():
+def test_a_planned_policy_without_a_result_has_a_row_with_its_missing_episode():
     frame = make_frame([], [make_result(policy="late").identity], run_name="mine")
     ((key, cell),) = cells_of(frame).items()
     expected = ("late", Versions(), "mine", 1)
@@ -161,7 +170,7 @@ def test_a_policy_that_has_not_begun_is_there():
     assert (key.policy_run[0], *key.policy_run[2:4], cell.missing) == expected
 
 
-def test_the_page_lists_the_columns():
+def test_the_documentation_lists_every_column_of_the_results():
     page = (Path(__file__).parents[2] / "docs" / "own-tables.md").read_text(encoding="utf-8")
     rows = [
         f"| `{column.name}` | {column.kind} | {column.meaning} | {column.missing or 'never'} |"
@@ -170,8 +179,13 @@ def test_the_page_lists_the_columns():
     assert "\n".join(rows) in page, "\n".join(rows)
 
 
-def test_a_run_is_opened_once_for_all_that_is_wanted_of_it(tmp_path, monkeypatch):
-    """Two spellings of a folder are one run; a folder alone wants all of its policies."""
+def test_a_run_that_is_named_several_times_is_opened_once_with_all_wanted_policies(
+    tmp_path, monkeypatch
+):
+    """A source is FOLDER or FOLDER:POLICY; a folder alone wants all of its policies.
+
+    Two spellings of a path are one folder; of "c:d:e" the folder is "c:d", as that exists.
+    """
     monkeypatch.chdir(tmp_path)
     for name in ("a", "b", "c", "c:d"):
         Path(name).mkdir()

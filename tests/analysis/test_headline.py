@@ -27,7 +27,7 @@ from roboirg.tasks.splits.splits import get_episode
 SETTINGS = ("reasoning", "spatial")
 
 
-def floors(excess):
+def random_policy_floors(excess):
     found = {}
     for name, value in excess.items():
         key = FloorKey(RANDOM, name)
@@ -36,23 +36,26 @@ def floors(excess):
 
 
 @pytest.fixture
-def two_settings(monkeypatch):
+def floors_with_two_settings_near_chance(monkeypatch):
     """Floors of version 1 of the language, which made-up results have."""
-    found = floors({"direct": 0.7, "reasoning": 0.05, "spatial": -0.1})
-    others = floors({"direct": 0.7, "reasoning": 0.7, "spatial": -0.1})
+    found = random_policy_floors({"direct": 0.7, "reasoning": 0.05, "spatial": -0.1})
+    others = random_policy_floors({"direct": 0.7, "reasoning": 0.7, "spatial": -0.1})
     stored = {"1": found, LANGUAGE_VERSION: others}
     monkeypatch.setattr(headline, "measured_floors", stored.get)
 
 
-def enough():
+def results_of_20_episodes_half_won():
     """As many episodes as an interval needs, the outcomes by turns."""
     wins = "01" * 10
     explicit = make_results("1" * 20)
     return [*explicit, *make_results(wins, "reasoning"), *make_results(wins, "spatial")]
 
 
-def by_hand(**fields):
-    """PickXtimes has both settings, StopCube reasoning alone."""
+def results_of_two_tasks(**fields):
+    """Return results in two settings of PickXtimes and in one of StopCube.
+
+    The gap of a setting is its rate minus that of explicit on the same episodes.
+    """
     return [
         *make_results("1110", "explicit", **fields),
         *make_results("1100", "reasoning", **fields),  # 2 of 4: -1/4
@@ -74,8 +77,9 @@ def notes_of(results):
     return list(headline_notes(cells_of(frame), frame.names))
 
 
-def test_the_mean_over_settings_of_the_means_over_their_tasks():
-    found = headline_of(by_hand())
+def test_the_headline_number_is_the_mean_gap_of_the_settings_each_a_mean_over_its_tasks():
+    """Gaps to explicit: reasoning -1/4 and -1/2 in two tasks, spatial -1 in one."""
+    found = headline_of(results_of_two_tasks())
     assert found.gap == pytest.approx(((-1 / 4 - 1 / 2) / 2 + -1) / 2)
     assert (found.episodes, found.is_complete) == (6, True)
     assert found.interval is None, "some resamples of so few episodes lack a setting"
@@ -84,8 +88,11 @@ def test_the_mean_over_settings_of_the_means_over_their_tasks():
     assert headline_of(lost).gap == 0.25  # though nothing was won without implicit reference
 
 
-def test_few_episodes_of_a_setting_that_are_all_lost_have_no_interval():
-    """Some resamples have none of the five, all others have the same gap: its width would be 0."""
+def test_the_headline_has_no_interval_if_resamples_could_only_repeat_the_same_gap():
+    """All episodes are lost, and spatial has 5 of 20: some resamples have none of these.
+
+    The others all have a gap of -1, and an interval of width 0 would look like certainty.
+    """
     lost = [
         *make_results("1" * 20),
         *make_results("0" * 20, "reasoning"),
@@ -94,15 +101,18 @@ def test_few_episodes_of_a_setting_that_are_all_lost_have_no_interval():
     assert (headline_of(lost).gap, headline_of(lost).interval) == (-1, None)
 
 
-def test_settings_share_their_episodes():
-    """Two settings with equal verdicts say no more than one: the interval is as wide."""
-    both, alone = (headline_of(enough(), settings) for settings in (SETTINGS, SETTINGS[1:]))
+def test_a_second_setting_on_the_same_episodes_does_not_narrow_the_interval():
+    """Half of explicit's wins are lost in each setting. Would find episodes drawn independently."""
+    both, alone = (
+        headline_of(results_of_20_episodes_half_won(), settings)
+        for settings in (SETTINGS, SETTINGS[1:])
+    )
     assert (both.gap, both.interval) == (alone.gap, alone.interval)
     assert both.gap == -0.5
 
 
-def test_it_needs_every_setting_and_explicit():
-    results = by_hand()
+def test_there_is_no_headline_without_explicit_or_without_one_of_its_settings():
+    results = results_of_two_tasks()
     for setting in ("spatial", "explicit"):
         assert (
             headline_of([result for result in results if result.options.setting != setting]) is None
@@ -110,33 +120,44 @@ def test_it_needs_every_setting_and_explicit():
     assert headline_of(results, ()) is None
 
 
-def test_it_stands_next_to_every_table_or_why_there_is_none(two_settings):
-    (note,) = notes_of(enough())
+def test_every_table_has_the_headline_below_it_or_the_reason_why_there_is_none(
+    floors_with_two_settings_near_chance,
+):
+    (note,) = notes_of(results_of_20_episodes_half_won())
     assert note.startswith("Headline of listener: −50.0 points to explicit (95 % interval ")
     assert note.endswith("reasoning, spatial; 20 episodes.")
-    assert notes_of(enough()) == [note], "to explicit of the same language"
+    assert notes_of(results_of_20_episodes_half_won()) == [note], "to explicit of the same language"
 
-    frame = frame_of(enough())
+    frame = frame_of(results_of_20_episodes_half_won())
     (run_table,) = make_run_tables(frame)
     assert note in make_table("main", RunData(frame)).notes
     assert note in run_table.notes
     for setting in ("spatial", "explicit"):
         error = make_result("error", 20, options=InstructionOptions(setting))
-        assert notes_of([*enough(), error])[0].endswith("20 episodes, incomplete.")
+        assert notes_of([*results_of_20_episodes_half_won(), error])[0].endswith(
+            "20 episodes, incomplete."
+        )
     for results, reason in (
-        (by_hand(), "6 episodes cannot give it an interval; play more."),
+        (results_of_two_tasks(), "6 episodes cannot give it an interval; play more."),
         (
-            by_hand(language_version="0.9"),
+            results_of_two_tasks(language_version="0.9"),
             "no floors were measured for its language",
         ),
-        (by_hand(wordings="robomme@1a2b3c4d"), "the floors are those of our own words of"),
+        (
+            results_of_two_tasks(wordings="robomme@1a2b3c4d"),
+            "the floors are those of our own words of",
+        ),
     ):
         (note,) = notes_of(results)
         assert note.startswith(f"listener has no headline number: {reason}")
 
 
-def test_settings_count_up_to_five_points_above_chance():
-    found = floors({"direct": 0.0501, "reasoning": 0.05, "spatial": -0.3})
+def test_the_headline_counts_settings_in_which_shortcuts_win_at_most_5_points_over_chance():
+    """Measured here: direct 5.01 points above, reasoning 5, spatial below.
+
+    Parts (another pool of episodes, a single task) do not let direct in.
+    """
+    found = random_policy_floors({"direct": 0.0501, "reasoning": 0.05, "spatial": -0.3})
     parts = [FloorKey(TEST, "direct"), FloorKey(RANDOM, "direct", "StopCube")]
 
     found |= dict.fromkeys(parts, found[RANDOM, "spatial", "", ""])
@@ -144,8 +165,11 @@ def test_settings_count_up_to_five_points_above_chance():
     assert settings_at_chance(found) == ("reasoning", "spatial")
 
 
-def test_floors_are_known_of_every_setting_and_task():
-    """`python scripts/measure_floors.py` measures them anew, after a change of words."""
+def test_rates_of_shortcuts_are_stored_for_every_implicit_setting_and_task():
+    """If it fails after a change of words: `python scripts/measure_floors.py` measures them anew.
+
+    Such a rate, a *floor*, is what a policy reaches without understanding.
+    """
     implicit = {name for name, setting in all_settings().items() if setting.implicit}
     wanted = {FloorKey(RANDOM, name) for name in implicit}
     for task in all_tasks().values():

@@ -20,32 +20,38 @@ from roboirg.runs.job_instruction import PreparedJob
 from roboirg.runs.play.episode_record import audit_record
 
 
-def results(*rows: tuple[str, str], **fields: object) -> list[Summary]:
+def results_of_rows(*rows: tuple[str, str], **fields: object) -> list[Summary]:
     return [
         make_result(outcome, number, prompt_verdict=verdict, **fields)
         for number, (outcome, verdict) in enumerate(rows)
     ]
 
 
-def sample() -> list[Summary]:
+def results_with_cut_prompts() -> list[Summary]:
     contextual = {"setting": "contextual"}
     return [
-        *results(("success", "heard"), ("failure", "heard")),
-        *results(
+        *results_of_rows(("success", "heard"), ("failure", "heard")),
+        *results_of_rows(
             ("failure", "cut"),
             ("failure", "cut"),
             ("success", "heard"),
             ("error", "cut"),
             **contextual,
         ),
-        *results(("failure", "unknown"), ("success", "heard"), task="BinFill", **contextual),
-        *results(("success", "unknown"), policy="other"),
+        *results_of_rows(
+            ("failure", "unknown"), ("success", "heard"), task="BinFill", **contextual
+        ),
+        *results_of_rows(("success", "unknown"), policy="other"),
     ]
 
 
-def test_tables_have_rates_over_what_was_heard_next_to_rates_over_all():
-    """Of all tasks the means over tasks, not over trials: 50–67, 40.00."""
-    data = RunData(frame_of(sample()))
+def test_a_table_has_rates_over_prompts_that_were_read_whole_next_to_rates_over_all():
+    """A prompt longer than the model reads is *cut*; without a tokenizer this is *unknown*.
+
+    Columns: prompts, % cut (0–50 with an unknown one), % success, prompts heard, % success of
+    these. Rates of all tasks are means over tasks: (33.33 + 50) / 2 = 41.67.
+    """
+    data = RunData(frame_of(results_with_cut_prompts()))
     table = make_heard_table(data)
     rows = {(row.group, row.name): [entry.text for entry in row.entries] for row in table.rows}
     assert rows == {
@@ -79,15 +85,17 @@ def long_record(policy: str, tokens: int | None, **fields: object) -> Record:
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Path:
+def run_with_three_prompt_limits(tmp_path: Path) -> Path:
     limits = ("cutting", 64), ("whole", 1000), ("silent", None)
     return store(tmp_path, [long_record(policy, tokens) for policy, tokens in limits]).folder
 
 
 @pytest.mark.browser
-def test_the_page_strikes_out_what_was_cut(open_page, run):
-    call("report", run)
-    with open_page((run / "report.html").as_uri()) as page:
+def test_the_page_strikes_out_the_words_that_the_model_did_not_read(
+    open_page, run_with_three_prompt_limits
+):
+    call("report", run_with_three_prompt_limits)
+    with open_page((run_with_three_prompt_limits / "report.html").as_uri()) as page:
         warnings = " ".join(page.locator(".warning").all_inner_texts())
         assert "cutting did not read every instruction to its end" in warnings
         prompt = r"cut: needs .* the model reads 64 \(counted with some\.model\).* mentions lost"
@@ -104,7 +112,8 @@ def test_the_page_strikes_out_what_was_cut(open_page, run):
         assert found == {"whole": ("", False), "silent": ("", False), "cutting": cut}
 
 
-def test_a_guess_without_a_meaning_stands_next_to_the_rate():
+def test_a_note_counts_the_episodes_in_which_a_policy_had_to_guess_what_was_meant():
+    """One of four. Would find a guess that passes for an understood instruction."""
     known = make_results("111")
     guess = make_result("failure", 3, guessed=True)
     (table,) = make_run_tables(frame_of([*known, guess]))

@@ -25,10 +25,12 @@ DOCUMENT = r"""
 %s
 \end{document}
 """
-LONG = "my_package.policies:NetWithAVeryLongName, 600 steps, frames of the video none (privileged)"
+LONG_POLICY_NAME = (
+    "my_package.policies:NetWithAVeryLongName, 600 steps, frames of the video none (privileged)"
+)
 
 
-def crowded(policies: int, tasks: int) -> Table:
+def table_with_full_entries(policies: int, tasks: int) -> Table:
     """A table of which every entry has all that an entry can have."""
     entry = Entry(
         Decimal("100.00"), change=Decimal("-100.00"), best=True, marks="!…", differences=("split",)
@@ -40,7 +42,7 @@ def crowded(policies: int, tasks: int) -> Table:
         heads=("setting", "policy"),
         columns=(*columns, Column("Avg", averages=("MyVeryOwnTask0",))),
         rows=tuple(
-            Row(setting, f"{LONG} {number}", (entry,) * (tasks + 1))
+            Row(setting, f"{LONG_POLICY_NAME} {number}", (entry,) * (tasks + 1))
             for setting in ("explicit", "direct", "with_rival_and_more")
             for number in range(policies)
         ),
@@ -48,7 +50,7 @@ def crowded(policies: int, tasks: int) -> Table:
     )
 
 
-FACTS = Table(
+TABLE_WITH_A_LONG_TEXT = Table(
     key="facts",
     title="Facts of the run",
     heads=("of", "fact"),
@@ -58,7 +60,7 @@ FACTS = Table(
 
 
 @pytest.fixture(scope="module")
-def text() -> str:
+def latex_of_all_tables() -> str:
     """All tables."""
     like = like_published
     data = RunData(frame_of([*like("main"), *like("real"), *like("context")]))
@@ -66,16 +68,16 @@ def text() -> str:
     tables = [
         make_table("main", RunData(frame_of(perfect)), published=True),
         *(make_table(which, data, published=True) for which in WHICH if which != "other"),
-        crowded(policies=2, tasks=7),
-        crowded(policies=40, tasks=2),
-        FACTS,
+        table_with_full_entries(policies=2, tasks=7),
+        table_with_full_entries(policies=40, tasks=2),
+        TABLE_WITH_A_LONG_TEXT,
     ]
     return "\n\\clearpage\n".join(map(latex, tables))
 
 
-def test_every_name_and_rate_is_there_once():
-    """And the notes below the last of the tables."""
-    table = crowded(policies=30, tasks=20)
+def test_a_table_too_large_for_a_page_is_printed_in_parts_without_losing_a_rate():
+    """90 rows and 21 columns; the notes stand below the last part only."""
+    table = table_with_full_entries(policies=30, tasks=20)
     text = latex(table)
     plain = text.replace(r"\allowbreak{}", "").replace("\\_", "_")
     labels = re.findall(r"\\label\{(.*?)\}", text)
@@ -86,8 +88,8 @@ def test_every_name_and_rate_is_there_once():
     assert plain.count(rate) == len(table.rows) * len(table.columns)
 
     names = [plain.count(f"\n{row.name} &") for row in table.rows]
-    assert set(names) == {9}  # in three settings, and the columns in three parts
-    assert text.count("folder") == 30
+    assert set(names) == {9}  # in 3 settings, times 3 groups of columns
+    assert text.count("folder") == 30  # as often as in its only note
     assert text.rindex(r"\bottomrule") < text.index("folder")
 
 
@@ -99,8 +101,10 @@ def test_every_name_and_rate_is_there_once():
 @pytest.mark.parametrize(
     "document", ["[conference]{IEEEtran}", "{article}", "[twocolumn]{article}"]
 )
-def test_no_box_is_overfull(tmp_path, text, document):
-    (tmp_path / "paper.tex").write_text(DOCUMENT % (document, text), encoding="utf-8")
+def test_no_box_is_overfull(tmp_path, latex_of_all_tables, document):
+    (tmp_path / "paper.tex").write_text(
+        DOCUMENT % (document, latex_of_all_tables), encoding="utf-8"
+    )
     subprocess.run(
         ["pdflatex", "-interaction=nonstopmode", "-halt-on-error", "paper.tex"],
         cwd=tmp_path, check=True, capture_output=True,

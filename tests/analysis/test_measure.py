@@ -23,7 +23,7 @@ from roboirg.stats.intervals import wilson_interval
 
 
 @pytest.fixture(scope="module")
-def played(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+def frame_of_two_policies(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
     """Two policies and tasks, three episodes with two seeds in three settings."""
     folder = tmp_path_factory.mktemp("run")
     plan = make_plan(
@@ -36,10 +36,14 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
 
 @settings(max_examples=8)
 @given(st.data())
-def test_measure_is_what_pandas_gives(played, data):
+def test_rates_counts_and_corrected_tests_are_those_of_pandas_and_statsmodels(
+    frame_of_two_policies, data
+):
     outcomes = st.sampled_from(["success", "failure", "error"])
-    drawn = data.draw(st.lists(outcomes, min_size=len(played), max_size=len(played)))
-    frame = played.assign(outcome=drawn)
+    drawn = data.draw(
+        st.lists(outcomes, min_size=len(frame_of_two_policies), max_size=len(frame_of_two_policies))
+    )
+    frame = frame_of_two_policies.assign(outcome=drawn)
     judged = frame[frame["outcome"] != "error"]
     judged = judged.assign(won=judged["outcome"] == "success")
     by = ["policy", "setting"]
@@ -71,19 +75,25 @@ def check_holm(rows):
         assert [row.p_holm for row in rows] == pytest.approx(list(corrected))
 
 
-def test_rows_of_several_settings_are_pooled_in_any_order(played):
-    """By policy alone an episode has a row for each setting; none gets lost."""
-    rates = played.groupby(["policy", "task"])["success"].mean().groupby("policy").mean()
-    for frame in (played, played[::-1]):
+def test_a_rate_pooled_over_settings_counts_all_of_their_rows_in_any_order(frame_of_two_policies):
+    """By policy alone an episode has a row for each setting. Would find one kept of them."""
+    rates = (
+        frame_of_two_policies.groupby(["policy", "task"])["success"].mean().groupby("policy").mean()
+    )
+    for frame in (frame_of_two_policies, frame_of_two_policies[::-1]):
         for row in roboirg.measure(frame, ["policy"], pool=["instruction_options"]):
             assert float(row.rate or 0) == pytest.approx(rates[row.key[0]])
-            assert row.counts.trials == (played["policy"] == row.key[0]).sum()
+            assert row.counts.trials == (frame_of_two_policies["policy"] == row.key[0]).sum()
 
 
-def test_a_rate_is_over_both_forms_only_if_the_call_names_them(played):
-    """Implicit ones are won, resolved ones lost: 50 % is no success of either."""
-    resolved = played.assign(form="resolved", outcome="failure", instruction_options="resolved")
-    frame = pd.concat([played, resolved])
+def test_implicit_and_resolved_instructions_are_pooled_only_if_the_call_asks_for_it(
+    frame_of_two_policies,
+):
+    """All implicit ones are won, all resolved ones lost: 50 % would be the rate of neither."""
+    resolved = frame_of_two_policies.assign(
+        form="resolved", outcome="failure", instruction_options="resolved"
+    )
+    frame = pd.concat([frame_of_two_policies, resolved])
     with pytest.raises(
         InvalidValueError, match=r"values of form \(implicit, resolved\): add 'form'"
     ):
@@ -110,32 +120,40 @@ def test_a_rate_is_over_both_forms_only_if_the_call_names_them(played):
         ({"by": ["policy", "setting"]}, "Several rows of a group are about"),
     ],
 )
-def test_a_wrong_question_is_one_sentence(played, asked, words):
+def test_a_call_that_asks_for_what_is_not_there_is_refused_with_the_reason(
+    frame_of_two_policies, asked, words
+):
     with pytest.raises(InvalidValueError, match=words):
-        roboirg.measure(pd.concat([played, played]), **asked)
+        roboirg.measure(pd.concat([frame_of_two_policies, frame_of_two_policies]), **asked)
 
 
 @pytest.mark.parametrize("outcome", ["Success", "success ", True, 1, None])
-def test_an_outcome_that_is_none_is_no_failure(played, outcome):
-    frame = played.astype({"outcome": object})
+def test_an_unknown_outcome_is_refused_rather_than_counted_as_a_failure(
+    frame_of_two_policies, outcome
+):
+    frame = frame_of_two_policies.astype({"outcome": object})
     frame.loc[0, "outcome"] = outcome
     with pytest.raises(InvalidValueError, match=f"'outcome' has (no value|{outcome!r};)"):
         roboirg.measure(frame, ["policy", "setting"])
 
 
 @pytest.mark.parametrize("name", ["task", "episode", "policy_seed"])
-def test_a_row_of_no_trial_is_refused(played, name):
+def test_a_row_without_task_episode_or_seed_is_refused(frame_of_two_policies, name):
     with pytest.raises(InvalidValueError, match=f"{name!r} has no value in some row"):
-        roboirg.measure(played.assign(**{name: pd.NA}), ["policy", "setting"])
+        roboirg.measure(frame_of_two_policies.assign(**{name: pd.NA}), ["policy", "setting"])
 
 
-def test_a_column_that_stands_twice_is_refused(played):
-    frame = pd.concat([played, played[["task"]]], axis=1)
+def test_a_column_that_stands_twice_is_refused(frame_of_two_policies):
+    frame = pd.concat([frame_of_two_policies, frame_of_two_policies[["task"]]], axis=1)
     with pytest.raises(InvalidValueError, match="several columns 'task'"):
         roboirg.measure(frame, ["policy", "setting"])
 
 
-def test_averages_are_unweighted_and_suites_stand_by_themselves():
+def test_an_average_weighs_its_tasks_equally_and_a_suite_has_one_of_its_own():
+    """Nine episodes of PickXtimes weigh as much as one of BinFill, which is of the same suite.
+
+    A task without a suite counts among all tasks: 2 of 4 are won there.
+    """
     results = [
         *make_results("1" * 9, task="PickXtimes"),
         *make_results("0", task="BinFill"),
@@ -155,8 +173,11 @@ def test_averages_are_unweighted_and_suites_stand_by_themselves():
     assert list(rates)[-1] == ALL_TASKS
 
 
-def test_gaps_are_corrected_in_three_families_and_forms_compared():
-    """All of 20 are won in explicit, none in direct, 15 in its resolved form."""
+def test_p_values_are_corrected_for_both_forms_and_the_forms_are_compared():
+    """Of 20 explicit wins all, direct none, and its *resolved* form, which names all, 15.
+
+    Would find p-values that ignore that two tests were made.
+    """
     results = [
         *make_results("1" * 20),
         *make_results("0" * 20, "direct"),
@@ -173,7 +194,7 @@ def test_gaps_are_corrected_in_three_families_and_forms_compared():
         (None, None, None)
     ] * 3
     assert explicit[0].interval == wilson_interval(20, 20)
-    # An exact test of 20 episodes that differ, all to one side, next to that of the resolved form.
+    # An exact test of 20 episodes, all to one side, has p = 2 / 2^20; of two tests: times 2.
     assert [summary.p_holm for summary in direct] == pytest.approx([2 * 2 / 2**20] * 3)
     assert [summary.gap.value for summary in direct] == [-1] * 3
     assert direct[0].second_gap.value == -0.75

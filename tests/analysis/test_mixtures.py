@@ -11,7 +11,7 @@ from roboirg.analysis.tables.table_notes import with_mixtures
 from roboirg.core.errors import InvalidValueError
 from roboirg.records.mixing import mixtures
 
-UNFAIR = [
+DIFFERENCES_THAT_FORBID_A_COMPARISON = [
     ({"split": "val"}, "Mixed splits: test, val."),
     ({"wordings": "mine@0a"}, "Mixed words: our own words, the words of mine@0a."),
     ({"max_steps": 9}, "Mixed step limits: 1300, 9."),
@@ -19,8 +19,8 @@ UNFAIR = [
     ({"language_version": "2"}, "Mixed versions of the language: 1, 2."),
     ({"environment_version": 99}, "Mixed versions of the environment: 1, 99."),
 ]
-WORDS = "PickXtimes/test@0a", "PickXtimes/test@1b"
-APART = [
+TWO_DIGESTS_OF_WORDS = "PickXtimes/test@0a", "PickXtimes/test@1b"
+DIFFERENCES_OF_ONE_POLICY = [
     ({"policy_version": "new"}, "Mixed versions of {}: new, unknown."),
     (
         {"policy_version": "new", "server_version": "8"},
@@ -28,7 +28,7 @@ APART = [
     ),
     ({"demonstration_frames": 5}, "Mixed demonstration frames of {}: 5, None."),
 ]
-AVERAGED = [
+DIFFERENCES_THAT_ARE_POOLED = [
     ({"render_device": "H100"}, "Mixed render devices: H100, llvmpipe."),
     ({"verdict_code": "ab"}, "Mixed states of the code that decides verdicts: 0a, ab."),
     ({"package_version": "1"}, "Mixed versions of roboirg: 0, 1."),
@@ -36,10 +36,19 @@ AVERAGED = [
 
 
 @pytest.mark.parametrize("policy", ["listener", "other"])
-@pytest.mark.parametrize(("fields", "sentence"), [*UNFAIR, *APART, *AVERAGED])
-def test_each_difference_is_one_sentence(policy, fields, sentence):
-    """With the same policy or another."""
-    runs = two_runs(policy, fields)
+@pytest.mark.parametrize(
+    ("fields", "sentence"),
+    [
+        *DIFFERENCES_THAT_FORBID_A_COMPARISON,
+        *DIFFERENCES_OF_ONE_POLICY,
+        *DIFFERENCES_THAT_ARE_POOLED,
+    ],
+)
+def test_each_difference_between_two_runs_is_named_in_one_sentence_below_the_table(
+    policy, fields, sentence
+):
+    """Whether the other run is of the same policy or of another one."""
+    runs = two_runs_that_differ_in(policy, fields)
     expected = [sentence.format(policy)]
     if "{}" in sentence and policy == "other":
         expected = []  # of two policies each has its own
@@ -54,7 +63,7 @@ def test_each_difference_is_one_sentence(policy, fields, sentence):
     assert len({row.name for row in table.rows}) == len(table.rows) == len(frame.names)
 
 
-def two_runs(policy, fields):
+def two_runs_that_differ_in(policy, fields):
     """Return results of two runs that differ in some fields, and the second in its policy."""
     usual = {"render_device": "llvmpipe", "verdict_code": "0a"}
     first = [make_result(episode=episode, **usual) for episode in range(2)]
@@ -63,9 +72,10 @@ def two_runs(policy, fields):
     return {"a": [*first, not_rendered], "b": second}
 
 
-@pytest.mark.parametrize("fields", [fields for fields, _ in UNFAIR])
-def test_what_would_be_unfair_is_not_compared(fields):
-    runs = two_runs("other", fields)
+@pytest.mark.parametrize("fields", [fields for fields, _ in DIFFERENCES_THAT_FORBID_A_COMPARISON])
+def test_runs_with_other_splits_words_limits_or_meshes_are_not_compared(fields):
+    """The refusal is the sentence that names the difference. Would find an unfair comparison."""
+    runs = two_runs_that_differ_in("other", fields)
     frame = make_frame([*runs.items()])
     (sentence,) = mixtures([*runs["a"], *runs["b"]])
 
@@ -74,9 +84,11 @@ def test_what_would_be_unfair_is_not_compared(fields):
     assert str(refused.value) == sentence
 
 
-@pytest.mark.parametrize("fields", [fields for fields, _ in (*APART, *AVERAGED)])
-def test_policies_are_compared_over_devices_and_versions(fields):
-    frame = make_frame([*two_runs("other", fields).items()])
+@pytest.mark.parametrize(
+    "fields", [fields for fields, _ in (*DIFFERENCES_OF_ONE_POLICY, *DIFFERENCES_THAT_ARE_POOLED)]
+)
+def test_runs_on_other_devices_or_of_other_policy_versions_are_compared(fields):
+    frame = make_frame([*two_runs_that_differ_in("other", fields).items()])
     compare(frame.where(policy="listener"), frame.where(policy="other"))
 
 
@@ -87,25 +99,32 @@ def test_policies_are_compared_over_devices_and_versions(fields):
         ({"verdict_code": "0a"}, {"verdict_code": None}),
     ],
 )
-def test_other_code_is_no_mixture_if_verdicts_are_decided_alike(fields, other_fields):
-    """Known to be, or of the same version of the package, in earlier records."""
+def test_a_change_of_code_is_not_reported_if_the_code_that_decides_verdicts_is_the_same(
+    fields, other_fields
+):
+    """Known from its digest; or assumed of one package version, in records that lack the digest."""
     assert not mixtures([make_result(code="0", **fields), make_result(code="1", **other_fields)])
 
 
-def test_other_words_are_refused_where_task_and_pool_are_the_same_and_split_no_rows():
-    first, same_task = (make_result(words=words) for words in WORDS)
+def test_results_of_one_task_in_other_words_are_not_compared():
+    """Words are known by a digest for each task. In a table they are pooled, with a note."""
+    first, same_task = (make_result(words=words) for words in TWO_DIGESTS_OF_WORDS)
     other_task = make_result(words="StopCube/test@2c", task="StopCube")
 
     (sentence,) = mixtures([first, other_task, same_task])
 
     with pytest.raises(InvalidValueError, match=sentence[:60]):
         compare(frame_of([first]), frame_of([same_task]))
-    both = [("a", [first, other_task]), ("b", [make_result(words=WORDS[1], episode=1)])]
+    both = [
+        ("a", [first, other_task]),
+        ("b", [make_result(words=TWO_DIGESTS_OF_WORDS[1], episode=1)]),
+    ]
     assert len(make_frame(both).names) == 1
 
 
-def test_words_are_mixed_in_one_task_and_pool_alone():
-    first = make_result(words=WORDS[0])
+def test_words_are_mixed_only_if_they_are_of_the_same_task_and_setting():
+    """Another task, or a setting of another package ("lab"), has words of its own anyway."""
+    first = make_result(words=TWO_DIGESTS_OF_WORDS[0])
     other_task = make_result(words="StopCube/test@2c", task="StopCube")
     own_words = make_result(words="PickXtimes/test/lab@3d", setting="lab")
 
@@ -114,5 +133,5 @@ def test_words_are_mixed_in_one_task_and_pool_alone():
     (sentence,) = mixtures([own_words, make_result(words="PickXtimes/test/lab@4e")])
     assert sentence.startswith("Mixed words of a task and pool: PickXtimes/test/lab@3d, Pick")
 
-    other_words = make_result(words=WORDS[1], wordings="mine@0a")
+    other_words = make_result(words=TWO_DIGESTS_OF_WORDS[1], wordings="mine@0a")
     assert len(mixtures([first, other_words])) == 1, "that alone"

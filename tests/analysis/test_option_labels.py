@@ -9,7 +9,8 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.language.settings import plain_settings, setting_names
 
 
-def test_labels_name_what_differs_from_the_defaults():
+def test_a_label_names_the_options_that_are_not_the_defaults():
+    """In order: setting, form, stages, distractor kind and count, frame of spatial words."""
     options = InstructionOptions("contextual", "resolved", (1, 5), "competing", 3, "camera")
     assert options_label(options) == (
         "contextual (resolved, stages 1,5, competing distractor, 3 distractors, camera frame)"
@@ -18,7 +19,8 @@ def test_labels_name_what_differs_from_the_defaults():
     assert options_label(InstructionOptions("direct", delivery="turns")) == "direct (in turns)"
 
 
-def test_settings_have_the_order_of_the_language_and_unknown_ones_are_last():
+def test_options_are_sorted_by_setting_as_declared_with_unknown_settings_last():
+    """Within a setting *implicit* comes before *resolved*, in which references are spelled out."""
     names = ["zeta", *reversed(setting_names()), "alpha"]
     options = [
         InstructionOptions(name, form) for name in names for form in ("resolved", "implicit")

@@ -38,7 +38,7 @@ PRINTED = Path(__file__).with_name("printed_page.txt")
 
 
 @functools.cache
-def records() -> tuple[Record, ...]:
+def records_of_page() -> tuple[Record, ...]:
     """Those of the plan; the last is an error, and the first scene of a task was filmed."""
     *found, last = played(PLAN)
     filmed = [
@@ -49,7 +49,7 @@ def records() -> tuple[Record, ...]:
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Source:
+def run_with_a_film(tmp_path_factory: pytest.TempPathFactory) -> Source:
     """A run with records and one real film: 100 steps, every 8th of them, and the end."""
     folder = tmp_path_factory.mktemp("run")
     film = VideoWriter(folder / FILM)
@@ -58,14 +58,14 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Source:
     for step in range(0, 101, 8):
         film.add_frame(world, is_demonstration=step < 20)  # type: ignore[arg-type]
     assert film.finish()
-    with EpisodeLog(log_path(folder, records()[0].slug)) as log:
+    with EpisodeLog(log_path(folder, records_of_page()[0].slug)) as log:
         os.write(log.descriptor, LOG)
-    return store(folder, records(), PLAN)
+    return store(folder, records_of_page(), PLAN)
 
 
 @pytest.fixture(scope="module")
-def page_file(run: Source) -> Path:
-    return write_report(run)
+def page_file(run_with_a_film: Source) -> Path:
+    return write_report(run_with_a_film)
 
 
 @pytest.fixture
@@ -74,18 +74,18 @@ def page(open_page: Any, page_file: Path) -> Iterator[Any]:
         yield page
 
 
-def shown(page: Any) -> int:
+def count_shown(page: Any) -> int:
     return int(page.locator("#shown").inner_text().split(" of ")[0].replace(",", ""))
 
 
-def expected(**fields: object) -> int:
-    found = list(records())
+def count_of_records(**fields: object) -> int:
+    found = list(records_of_page())
     for name, value in fields.items():
         found = [record for record in found if getattr(record, name) == value]
     return len(found)
 
 
-def first_row(page: Any, **filters: str) -> Any:
+def opened_first_row(page: Any, **filters: str) -> Any:
     for name, value in filters.items():
         page.select_option(f"#filters [name={name}]", value)
     row = page.locator("#rows > li").first
@@ -98,64 +98,66 @@ def open_breakdowns(page: Any) -> None:
         summary.press("Enter")
 
 
-def focused(page: Any, what: str = "innerText") -> str:
+def focused_element(page: Any, what: str = "innerText") -> str:
     return str(page.evaluate(f"document.activeElement.{what}"))
 
 
 @pytest.mark.slow
-def test_every_filter_filters(page):
-    everything = len(records())
-    assert shown(page) == everything
+def test_each_filter_leaves_the_episodes_that_fit_and_reset_brings_all_back(page):
+    everything = len(records_of_page())
+    assert count_shown(page) == everything
 
     for name, value, count in [
-        ("policy", "forgetful (privileged)", expected(policy="forgetful")),
-        ("task", "any counting", expected(task="StopCube") + expected(task="PickXtimes")),
-        ("form", "resolved", expected(form="resolved")),
+        ("policy", "forgetful (privileged)", count_of_records(policy="forgetful")),
+        ("task", "any counting",
+         count_of_records(task="StopCube") + count_of_records(task="PickXtimes")),
+        ("form", "resolved", count_of_records(form="resolved")),
         ("outcome", "error", 1),
         ("failure", "policy", 1),
     ]:  # fmt: skip
         page.select_option(f"#filters [name={name}]", value)
-        assert shown(page) == count, (name, value)
+        assert count_shown(page) == count, (name, value)
         assert 0 < count < everything
         page.click("#filters button[type=reset]")
-        assert shown(page) == everything
+        assert count_shown(page) == everything
     page.fill("[name=words]", "WRONG  cube")
-    assert shown(page) == expected(outcome="failure")
+    assert count_shown(page) == count_of_records(outcome="failure")
 
     page.fill("[name=words]", "words in no record")
     assert page.locator("#nothing").is_visible()
 
 
 @pytest.mark.slow
-def test_the_address_keeps_filters_pages_and_episodes(page, page_file):
+def test_an_address_of_the_page_leads_to_the_same_filters_page_and_episode(page, page_file):
+    """So that it can be sent to somebody else."""
     page.select_option("#filters [name=task]", "VideoUnmask")
     page.get_by_label("Next page").click()
     assert "page=2" in page.url
     address = page.url
     page.goto("about:blank")
     page.goto(address)
-    assert shown(page) == expected(task="VideoUnmask")
+    assert count_shown(page) == count_of_records(task="VideoUnmask")
     assert "page 2 of" in page.locator("#pager").inner_text()
 
-    row = first_row(page)
+    row = opened_first_row(page)
     key = row.get_attribute("id").removeprefix("e-")
     page.goto("about:blank")
     page.goto(f"{page_file.as_uri()}#?task=StopCube&at={key}")
     # Filters that would hide it are cleared.
-    assert shown(page) == len(records())
+    assert count_shown(page) == len(records_of_page())
     assert page.locator(f"#e-{key} .inside").is_visible()
-    assert focused(page, "closest('li').id") == f"e-{key}"
+    assert focused_element(page, "closest('li').id") == f"e-{key}"
 
 
 @pytest.mark.slow
-def test_the_keyboard_leads_from_cell_to_cell_and_to_its_episodes(page):
+def test_arrow_keys_move_between_cells_of_the_table_and_enter_lists_a_cells_episodes(page):
     tip = page.locator("#tip")
     page.locator(".cell").first.focus()
     page.keyboard.press("ArrowRight")
     tip.wait_for()
 
     assert "listener (privileged), all tasks, direct" in tip.inner_text()
-    assert "points to explicit" in focused(page, "getAttribute('aria-label')")
+    assert "points to explicit" in focused_element(page, "getAttribute('aria-label')")
 
     page.keyboard.press("Escape")
     assert tip.is_hidden()
@@ -165,13 +167,14 @@ def test_the_keyboard_leads_from_cell_to_cell_and_to_its_episodes(page):
     assert "PickXtimes, direct" in tip.inner_text()
 
     page.keyboard.press("Enter")
-    assert shown(page) == 3
+    assert count_shown(page) == 3
     assert page.input_value("#filters [name=task]") == "PickXtimes"
     assert page.input_value("#filters [name=form]") == "implicit"
-    assert focused(page, "id") == "episodes"
+    assert focused_element(page, "id") == "episodes"
 
 
-def test_maps_and_bars_lead_to_episodes_and_follow_difficulty_and_measure(page):
+def test_a_click_on_a_cell_or_a_bar_filters_the_episodes_to_those_that_it_counts(page):
+    """Cells show rate or gap to explicit, of all episodes or of one difficulty."""
     cell = page.locator(".map").nth(1).locator("tr.all .cell").nth(1)
     assert cell.locator("b").inner_text() == "0"
     assert cell.locator("small").inner_text() == "−100"
@@ -191,11 +194,12 @@ def test_maps_and_bars_lead_to_episodes_and_follow_difficulty_and_measure(page):
     bars.locator(".end.grounding").first.click()
     assert page.input_value("#filters [name=failure]") in ("any grounding", "wrong_object")
     assert page.input_value("#filters [name=policy]") == "forgetful (privileged)"
-    assert shown(page) > 0
+    assert count_shown(page) > 0
 
 
-def test_an_expression_and_its_antecedent_light_up_together(page):
-    row = first_row(page, task="PickXtimes", setting="contextual", form="implicit")
+def test_a_word_that_refers_back_and_what_it_refers_to_light_up_together(page):
+    """As *it* and *the red cube*: by mouse and by keyboard, with the same number."""
+    row = opened_first_row(page, task="PickXtimes", setting="contextual", form="implicit")
     anaphor = row.locator("mark.anaphor").last
     keys = anaphor.get_attribute("data-keys")
     antecedent = row.locator(f"mark.antecedent[data-keys='{keys}']")
@@ -214,8 +218,9 @@ def test_an_expression_and_its_antecedent_light_up_together(page):
     assert row.locator("mark.lit").count() == 0
 
 
-def test_the_page_reads_as_stored_and_leads_to_the_same_scene(page):
-    """With every breakdown opened, and an episode that failed; with landmarks and names."""
+def test_the_page_reads_as_stored_to_eyes_and_to_screen_readers(page):
+    """With every breakdown and a failed episode opened. It leads to other tellings of a scene."""
+    # A screen reader needs one heading of the page, no skipped level, and names of all controls.
     assert page.locator("main").count() == page.locator("h1").count() == 1
 
     levels = page.locator("h1,h2,h3,h4").evaluate_all("all => all.map(one => +one.tagName[1])")
@@ -231,21 +236,26 @@ def test_the_page_reads_as_stored_and_leads_to_the_same_scene(page):
     assert len(set(identities)) == len(identities)
 
     open_breakdowns(page)
-    row = first_row(page, policy="forgetful (privileged)", task="PickXtimes", setting="contextual",
-                    form="implicit")  # fmt: skip
+    row = opened_first_row(
+        page,
+        policy="forgetful (privileged)",
+        task="PickXtimes",
+        setting="contextual",
+        form="implicit",
+    )
     assert words(page.locator("main").inner_text()) == PRINTED.read_text("utf-8")
 
     row.locator(".scene-mates .chip", has_text="explicit").first.click()
     # It is hidden by the filters, so they are cleared.
-    assert shown(page) == len(records())
-    assert "explicit" in focused(page)
+    assert count_shown(page) == len(records_of_page())
+    assert "explicit" in focused_element(page)
 
-    row = first_row(page, outcome="error")
+    row = opened_first_row(page, outcome="error")
     row.locator("summary").click()
-    assert row.locator("pre").inner_text() == broken(records()[-1]).details
+    assert row.locator("pre").inner_text() == broken(records_of_page()[-1]).details
 
 
-def test_rows_open_close_and_follow_the_arrow_keys(page):
+def test_enter_opens_and_closes_an_episode_and_an_arrow_key_moves_to_the_next(page):
     buttons = page.locator("#rows h3 button")
     buttons.nth(0).focus()
     page.keyboard.press("Enter")
@@ -256,9 +266,9 @@ def test_rows_open_close_and_follow_the_arrow_keys(page):
     assert page.locator("#rows .detail").count() == 0
 
     page.keyboard.press("ArrowDown")
-    assert focused(page, "closest('li').id") == page.locator("#rows > li").nth(1).get_attribute(
-        "id"
-    )
+    assert focused_element(page, "closest('li').id") == page.locator("#rows > li").nth(
+        1
+    ).get_attribute("id")
 
 
 def wait_until(element: Any, predicate: str) -> None:
@@ -269,10 +279,13 @@ def wait_until(element: Any, predicate: str) -> None:
         element.page.wait_for_timeout(20)
 
 
-def test_a_served_page_seeks_in_the_film_and_has_what_was_printed(open_page, run):
+def test_a_served_page_plays_the_film_from_a_chosen_moment_and_links_what_was_printed(
+    open_page, run_with_a_film
+):
+    """Needs a server that answers parts of a file; would find a film that starts at its begin."""
     with ExitStack() as stack:
-        written = write_report(run, served=True)
-        server = stack.enter_context(run_server(run.folder))
+        written = write_report(run_with_a_film, served=True)
+        server = stack.enter_context(run_server(run_with_a_film.folder))
         address = f"http://127.0.0.1:{server.port}/"
         threading.Thread(target=server.serve_forever).start()
         stack.callback(server.shutdown)
@@ -300,20 +313,21 @@ def test_a_served_page_seeks_in_the_film_and_has_what_was_printed(open_page, run
         assert film.get_attribute("src") == FILM
 
 
-def test_two_policies_are_compared_episode_by_episode(page):
+def test_two_policies_are_compared_on_the_page_episode_by_episode(page):
+    """*left* are episodes that only the left policy won, *right* those that only the right won."""
     page.select_option("#filters [name=outcome]", "failure")  # hidden below: it must not count
     page.get_by_text("two policies", exact=True).click()
-    lost = expected(policy="forgetful", outcome="failure")
-    assert shown(page) == lost
+    lost = count_of_records(policy="forgetful", outcome="failure")
+    assert count_shown(page) == lost
     assert page.locator("#filters [name=outcome]").is_hidden()
     for change, count in [("left", lost), ("right", 0), ("neither", 0), ("error", 1)]:
         page.select_option("#filters [name=change]", change)
-        assert shown(page) == count, change
+        assert count_shown(page) == count, change
 
     page.select_option("#filters [name=left]", "forgetful (privileged)")
     page.select_option("#filters [name=right]", "listener (privileged)")
     page.select_option("#filters [name=change]", "right")
-    assert shown(page) == lost
+    assert count_shown(page) == lost
 
     page.locator(".counts tr", has_text="direct").first.locator(".count").first.click()
     assert page.input_value("#filters [name=setting]") == "direct"
@@ -326,9 +340,11 @@ def test_two_policies_are_compared_episode_by_episode(page):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_it_fits_a_telephone_and_its_texts_can_be_read(open_page, page_file, scheme):
+def test_the_page_fits_a_telephone_and_its_texts_have_enough_contrast(open_page, page_file, scheme):
     with open_page(page_file.as_uri(), color_scheme=scheme) as page:
-        first_row(page, policy="forgetful (privileged)", setting="contextual", form="implicit")
+        opened_first_row(
+            page, policy="forgetful (privileged)", setting="contextual", form="implicit"
+        )
         assert page.evaluate(CONTRASTS) == []
 
         open_breakdowns(page)
@@ -341,30 +357,30 @@ def test_it_fits_a_telephone_and_its_texts_can_be_read(open_page, page_file, sch
         assert page.evaluate(CONTRASTS) == []
 
 
-def test_the_whole_page_is_reached_by_the_tab_key_and_shows_where_one_is(page):
+def test_the_tab_key_reaches_every_section_and_marks_where_it_is(page):
     seen = set()
     for _ in range(60):
         page.keyboard.press("Tab")
-        seen.add(focused(page, "closest('section,header,form,body').id"))
+        seen.add(focused_element(page, "closest('section,header,form,body').id"))
         outline = page.evaluate(
             "(() => { const one = document.activeElement; const at = one.type === 'radio' "
             "? one.nextElementSibling : one; return getComputedStyle(at).outlineWidth; })()"
         )
-        assert outline == "3px", focused(page, "outerHTML")
+        assert outline == "3px", focused_element(page, "outerHTML")
     assert {"overview", "failures", "episodes", "filters", "map-controls"} <= seen
 
 
 @pytest.mark.slow
-def test_ten_thousand_episodes_cost_no_more_than_a_page_of_them(open_page, tmp_path):
+def test_a_page_of_ten_thousand_episodes_draws_no_more_than_40_at_once(open_page, tmp_path):
     # By the page's own counters: how much is drawn, not how long it takes on this machine.
-    some = [replace(record, video=None) for record in records()]
+    some = [replace(record, video=None) for record in records_of_page()]
     many = [
         replace(record, policy_seed=seed)
         for seed in range(-(-10_000 // len(some)))
         for record in some
     ][:10_000]
     with open_page(write_report(store(tmp_path, many)).as_uri()) as page:
-        assert shown(page) == 10_000
+        assert count_shown(page) == 10_000
         elements = "document.querySelectorAll('*').length"
         assert page.evaluate(elements) < MOST_ELEMENTS
         for words in ("cube", "words in no record", ""):

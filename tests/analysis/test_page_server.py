@@ -23,17 +23,17 @@ from roboirg.util.web.app_server import AppServer
 
 pytestmark = pytest.mark.usefixtures("patient_sockets")
 
-FILM = bytes(range(256)) * 1000
+FILM_BYTES = bytes(range(256)) * 1000
 
 
 PLAN = make_plan(("listener",), tasks="PickXtimes", settings="explicit", episodes="2")
 
 
 @pytest.fixture
-def run(tmp_path: Path) -> Path:
+def run_with_a_film_and_a_link(tmp_path: Path) -> Path:
     folder = tmp_path / "run"
     (folder / "videos").mkdir(parents=True)
-    (folder / "videos" / "a b.mp4").write_bytes(FILM)
+    (folder / "videos" / "a b.mp4").write_bytes(FILM_BYTES)
     (tmp_path / "secret").write_text("secret")
     (folder / "link").symlink_to(tmp_path / "secret")
     store(folder, [make_record(PLAN.jobs()[0], "success", steps=9)])
@@ -41,8 +41,8 @@ def run(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def server(run: Path) -> Iterator[AppServer]:
-    with run_server(run) as serving:
+def server(run_with_a_film_and_a_link: Path) -> Iterator[AppServer]:
+    with run_server(run_with_a_film_and_a_link) as serving:
         thread = threading.Thread(target=serving.serve_forever)
         thread.start()
         yield serving
@@ -50,7 +50,7 @@ def server(run: Path) -> Iterator[AppServer]:
         thread.join()
 
 
-def ask(
+def response_and_body(
     server: AppServer, path: str, method: str = "GET", **headers: str
 ) -> tuple[http.client.HTTPResponse, bytes]:
     connection = http.client.HTTPConnection("127.0.0.1", server.port)
@@ -61,17 +61,18 @@ def ask(
     return response, body
 
 
-def test_videos_are_answered_whole_and_in_parts_and_only_read(server):
+def test_a_video_is_served_whole_or_in_parts_and_nothing_can_be_written(server):
+    """A browser asks for a range of bytes to seek; status 206 is a part, 405 a refused method."""
     path = "/videos/a%20b.mp4"
-    response, body = ask(server, path)
-    assert (response.status, body) == (200, FILM)
+    response, body = response_and_body(server, path)
+    assert (response.status, body) == (200, FILM_BYTES)
     assert response.headers["Accept-Ranges"] == "bytes"
 
-    response, body = ask(server, path, Range="bytes=100-")
-    assert (response.status, body) == (206, FILM[100:])
+    response, body = response_and_body(server, path, Range="bytes=100-")
+    assert (response.status, body) == (206, FILM_BYTES[100:])
     assert response.headers["Content-Type"] == "video/mp4"
     for method in ("POST", "PUT", "DELETE"):
-        assert ask(server, "/", method)[0].status == 405
+        assert response_and_body(server, "/", method)[0].status == 405
 
 
 @pytest.mark.parametrize(
@@ -81,7 +82,8 @@ def test_videos_are_answered_whole_and_in_parts_and_only_read(server):
         "//etc/passwd", "/link", "/..%2fsecret", "/videos", "/nothing", "/%00", "/" + "a" * 5000,
     ],
 )  # fmt: skip
-def test_nothing_outside_of_the_run_is_served(server, path):
+def test_no_path_or_link_leads_out_of_the_folder_that_is_served(server, path):
+    """Next to the folder lies a file `secret`, to which a link inside leads."""
     # A raw socket: clients would tidy up the path.
     with socket.create_connection(("127.0.0.1", server.port)) as raw:
         host = f"127.0.0.1:{server.port}"
@@ -92,9 +94,18 @@ def test_nothing_outside_of_the_run_is_served(server, path):
     assert b"root:" not in answer
 
 
-def test_the_command_says_where_and_ends_with_ctrl_c(run, wait_s):
+def test_report_serve_prints_its_address_serves_the_page_and_ends_with_ctrl_c(
+    run_with_a_film_and_a_link, wait_s
+):
     pytest.importorskip("jinja2")
-    command = [sys.executable, "-m", "roboirg", "report", str(run), "--serve"]
+    command = [
+        sys.executable,
+        "-m",
+        "roboirg",
+        "report",
+        str(run_with_a_film_and_a_link),
+        "--serve",
+    ]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},

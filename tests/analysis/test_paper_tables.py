@@ -28,7 +28,8 @@ from roboirg.tasks import all_tasks
 
 
 @given(st.integers(1, 5000).flatmap(lambda n: st.tuples(st.integers(0, n), st.just(n))))
-def test_rates_are_rounded_half_up_once(counts):
+def test_a_rate_is_rounded_half_up_to_two_decimals(counts):
+    """As the paper's; would find 0.125 printed as 0.12, or rounding that is done twice."""
     exact = 100 * Fraction(*counts)
     printed = Fraction(percent(Fraction(*counts)))
     assert Fraction(-1, 200) < printed - exact <= Fraction(1, 200)
@@ -39,10 +40,10 @@ def test_rates_are_rounded_half_up_once(counts):
     assert mean_percent([rate, more := rate + Decimal("0.01")]) == more
 
 
-PRINTED = Path(__file__).with_name("printed_main_table.md")
+STORED_TABLE = Path(__file__).with_name("printed_main_table.md")
 
 
-def entries(table: Table, group: str, name: str | None = None, source: str = "ours"):
+def entries_of_row(table: Table, group: str, name: str | None = None, source: str = "ours"):
     """Return the entries of a row by column."""
     (row,) = [
         row
@@ -52,7 +53,7 @@ def entries(table: Table, group: str, name: str | None = None, source: str = "ou
     return dict(zip((column.name for column in table.columns), row.entries, strict=True))
 
 
-def whole(policy: str = "a", settings=("explicit", "direct"), **fields) -> list:
+def results_of_all_tasks(policy: str = "a", settings=("explicit", "direct"), **fields) -> list:
     """Two episodes of every task that has the setting, the first won."""
     return [
         make_result(outcome, episode, policy=policy, task=name, setting=setting, **fields)
@@ -67,15 +68,19 @@ def table_of(which: str, *results: list, planned=(), **options) -> Table:
     return make_table(which, RunData(frame_of(*results, planned=planned)), **options)
 
 
-def test_what_is_incomplete_is_marked_and_compared_with_nothing():
+def test_a_rate_with_errors_or_missing_episodes_is_marked_and_has_no_change_to_explicit():
     """The good policy wins all of BinFill and of the spatial setting.
 
     The poor one has an error of ButtonUnmask in direct, and an episode of StopCube still to play in
-    explicit; nobody played PickXtimes. What is of other options or tasks is named below.
+    explicit; no policy played PickXtimes. What is of other options or tasks is named below.
     """
     settings = ("explicit", "direct", "spatial")
     good, poor = (
-        [result for result in whole(name, settings, split="val") if result.task != "PickXtimes"]
+        [
+            result
+            for result in results_of_all_tasks(name, settings, split="val")
+            if result.task != "PickXtimes"
+        ]
         for name in ("good", "poor")
     )
     good = [
@@ -103,11 +108,11 @@ def test_what_is_incomplete_is_marked_and_compared_with_nothing():
 
     table = table_of("main", good, poor, planned=planned, floors=(CHANCE,))
 
-    assert get_format("markdown").draw(table) == PRINTED.read_text("utf-8")
+    assert get_format("markdown").draw(table) == STORED_TABLE.read_text("utf-8")
 
 
-def test_each_split_has_floors_of_its_own():
-    """A mean over both would be no chance of either."""
+def test_each_split_has_its_own_row_of_chance():
+    """Chance depends on the scenes of a split; a mean over both would be true of neither."""
     runs = {
         split: make_results("1" * 9, "direct", split=split, task="BinFill")
         for split in ("test", "val")
@@ -116,25 +121,29 @@ def test_each_split_has_floors_of_its_own():
     found = []
 
     for split, run in runs.items():
-        alone = entries(table_of("main", run, floors=(CHANCE,)), "direct", CHANCE, "chance")
-        own = entries(both, "direct", f"{CHANCE}, split {split}", "chance")
+        alone = entries_of_row(table_of("main", run, floors=(CHANCE,)), "direct", CHANCE, "chance")
+        own = entries_of_row(both, "direct", f"{CHANCE}, split {split}", "chance")
         assert own["BinFill"].percent == alone["BinFill"].percent
         found.append(own["BinFill"].percent)
 
     assert found[0] != found[1]
 
 
-def test_only_informative_tables_are_wanted():
+def test_tables_without_a_choice_are_those_for_which_a_run_has_something_to_compare():
+    """As *planner*, for planners next to other policies; *context*, for two context lengths."""
+
     def wanted(*results: list) -> set[str]:
         data = RunData(frame_of(*results))
         return {name for name in WHICH if is_informative(name, data)}
 
-    two = [*whole(), *whole("b")]
-    planners = [with_version(result, "planner + scripted hands") for result in whole()]
-    contextual = whole(settings=("contextual",))
-    short = whole(settings=("contextual",), stages=(1, 5))
+    two = [*results_of_all_tasks(), *results_of_all_tasks("b")]
+    planners = [
+        with_version(result, "planner + scripted hands") for result in results_of_all_tasks()
+    ]
+    contextual = results_of_all_tasks(settings=("contextual",))
+    short = results_of_all_tasks(settings=("contextual",), stages=(1, 5))
 
-    assert wanted(whole(settings=("explicit", "contextual"))) == {"main"}
+    assert wanted(results_of_all_tasks(settings=("explicit", "contextual"))) == {"main"}
     assert wanted(two) == {"main"}
     assert wanted([planners[0], *two]) == {"main", "planner"}
     assert wanted(planners) == {"main"}
@@ -144,7 +153,7 @@ def test_only_informative_tables_are_wanted():
     assert wanted([make_result(arm="silent"), *two]) == {"main"}
 
 
-NAME = "a_package.with_a_long_name.policies:" + "Net" * 40
+LONG_POLICY_NAME = "a_package.with_a_long_name.policies:" + "Net" * 40
 
 
 @pytest.mark.parametrize(
@@ -154,12 +163,14 @@ NAME = "a_package.with_a_long_name.policies:" + "Net" * 40
         ("a", 120, 3),
         ("a", 72, 6),
         ("a", 45, 15),
-        (NAME, 200, None),
-        (NAME, 60, None),
+        (LONG_POLICY_NAME, 200, None),
+        (LONG_POLICY_NAME, 60, None),
     ],
 )
-def test_wide_tables_are_drawn_in_parts_with_every_rate_and_name(name, width, parts):
-    table = table_of("main", whole(name))
+def test_a_table_wider_than_the_terminal_is_drawn_in_parts_without_losing_a_rate_or_name(
+    name, width, parts
+):
+    table = table_of("main", results_of_all_tasks(name))
     texts = []
     for terminal in (True, False):
         console = Console(
@@ -178,9 +189,9 @@ def test_wide_tables_are_drawn_in_parts_with_every_rate_and_name(name, width, pa
     assert "…" not in folded + written
 
 
-def test_csv_has_every_entry_with_its_counts():
+def test_csv_has_a_line_for_each_rate_with_the_counts_behind_it():
     error = make_results("--!", "direct", policy="a", task="BinFill")
-    table = table_of("main", whole(), error)
+    table = table_of("main", results_of_all_tasks(), error)
     lines = list(csv.DictReader(io.StringIO(get_format("csv").draw(table))))
     assert len(lines) == sum(len(row.entries) for row in table.rows)
 
@@ -189,18 +200,19 @@ def test_csv_has_every_entry_with_its_counts():
     assert line.items() >= {"incomplete": "errors", **counts}.items()
 
 
-def test_tasks_outside_the_paper_have_a_table_of_their_own():
+def test_a_task_that_the_paper_lacks_has_a_table_of_its_own_and_is_not_in_the_papers():
     of_task = {"policy": "a", "task": "Outside"}
     outside = [*make_results("1", **of_task), *make_results("1", "direct", **of_task)]
-    table = table_of("other", whole(), outside, published=True)
+    table = table_of("other", results_of_all_tasks(), outside, published=True)
     assert [column.name for column in table.columns] == ["Outside", "Avg"]
-    assert str(entries(table, "direct")["Outside"]) == "100.00 →0.00"
+    assert str(entries_of_row(table, "direct")["Outside"]) == "100.00 →0.00"
 
-    main = table_of("main", whole(), outside)
-    assert main.rows == table_of("main", whole()).rows
+    main = table_of("main", results_of_all_tasks(), outside)
+    assert main.rows == table_of("main", results_of_all_tasks()).rows
 
 
-def test_results_of_the_twin_are_marked_and_kept_apart_from_a_robots():
+def test_results_in_simulation_are_marked_and_kept_apart_from_those_of_a_real_robot():
+    """PutInBox is a task of the real study; its simulated copy is called the twin."""
     table = table_of(
         "real",
         [make_result("success", task="PutInBox", privileged=True)],

@@ -11,13 +11,17 @@ from roboirg.core.instruction_options import InstructionOptions
 from roboirg.core.subgoal_text import UNKNOWN_WORDS
 from roboirg.records.record import Attribution, Job, Record, SubgoalRecord
 
-WRONG = Attribution(kind="grounding", failure="wrong_object", sentence="It took another one.")
+TOOK_THE_WRONG_THING = Attribution(
+    kind="grounding", failure="wrong_object", sentence="It took another one."
+)
 
-UNCLEAR = Attribution(kind="undecided", failure="ambiguous_act", sentence="It closed its fingers.")
+MEANING_OF_THE_ACT_IS_UNCLEAR = Attribution(
+    kind="undecided", failure="ambiguous_act", sentence="It closed its fingers."
+)
 
 
 @pytest.fixture(scope="module")
-def failed() -> Record:
+def failed_record_of_a_planner() -> Record:
     options = InstructionOptions("explicit")
     job = Job(policy="random", task="PickXtimes", split="test", episode=0, options=options)
     record = make_record(job, "failure", "no")
@@ -27,18 +31,25 @@ def failed() -> Record:
 @pytest.mark.parametrize(
     ("verdicts", "attribution", "named"),
     [
-        ("right", WRONG, "wrong thing"),
-        ("wrong_place", UNCLEAR, "wrong place"),
+        ("right", TOOK_THE_WRONG_THING, "wrong thing"),
+        ("wrong_place", MEANING_OF_THE_ACT_IS_UNCLEAR, "wrong place"),
         ("wrong_place wrong_count right", None, "wrong count"),
         ("right", None, "hands"),
     ],
 )
-def test_the_act_that_ended_the_episode_names_the_failure(failed, verdicts, attribution, named):
-    """Or else the last wrong subgoal, as those before it were corrected."""
+def test_a_planners_failure_is_named_by_the_wrong_act_or_else_by_its_last_wrong_subgoal(
+    failed_record_of_a_planner, verdicts, attribution, named
+):
+    """Subgoals are the orders that a planner gave; those before the last one were corrected.
+
+    If all were right, the hands that carried them out failed.
+    """
     said = [
         SubgoalRecord(step=5, text="pick it up", verdict=verdict) for verdict in verdicts.split()
     ]
-    record = replace(failed, steps=9, subgoals=tuple(said), attribution=attribution)
+    record = replace(
+        failed_record_of_a_planner, steps=9, subgoals=tuple(said), attribution=attribution
+    )
 
     assert planner_failure(record) == named
     assert planner_failure(replace(record, policy_metadata={}, subgoals=())) is None
@@ -55,14 +66,22 @@ def test_the_act_that_ended_the_episode_names_the_failure(failed, verdicts, attr
         ("failed", None, 9, "hands"),
     ],
 )
-def test_the_last_subgoal_names_it_when_time_is_up(failed, ended, why, ago, named):
-    """Whatever replies could not be read before it."""
-    steps = failed.environment.max_steps
+def test_an_episode_without_an_end_is_named_by_what_became_of_the_last_subgoal(
+    failed_record_of_a_planner, ended, why, ago, named
+):
+    """`ago` are the steps since then. Replies that could not be read before it do not matter."""
+    steps = failed_record_of_a_planner.environment.max_steps
     said = SubgoalRecord(
         step=steps - ago, text="pick up the cube", verdict="right", ended=ended, why=why
     )
     usage = {"unparsed": 2.0}
 
-    record = replace(failed, steps=steps, subgoals=(said,), attribution=WRONG, usage=usage)
+    record = replace(
+        failed_record_of_a_planner,
+        steps=steps,
+        subgoals=(said,),
+        attribution=TOOK_THE_WRONG_THING,
+        usage=usage,
+    )
 
     assert planner_failure(record) == named

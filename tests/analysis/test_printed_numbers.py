@@ -41,7 +41,7 @@ from roboirg.stats.intervals import TOO_FEW, Interval
 TASKS = ("PickXtimes", "BinFill")
 
 
-class Words(NamedTuple):
+class ResultConditions(NamedTuple):
     """What no rate is over two of, unless it is asked for."""
 
     policy: str
@@ -57,8 +57,8 @@ class Words(NamedTuple):
     environment_version: int
 
 
-WORDS = st.builds(
-    Words,
+ANY_CONDITIONS = st.builds(
+    ResultConditions,
     policy=st.sampled_from(["one", "other"]),
     policy_version=st.sampled_from(["a", "b"]),
     setting=st.sampled_from(["explicit", "direct"]),
@@ -71,20 +71,24 @@ WORDS = st.builds(
     language_version=st.sampled_from(["1", "2"]),
     environment_version=st.sampled_from([1, 2]),
 )
-PLAIN = Words("one", "a", "direct", "implicit", "prompt", "told", None, "test", 40, "1", 1)
+USUAL_CONDITIONS = ResultConditions(
+    "one", "a", "direct", "implicit", "prompt", "told", None, "test", 40, "1", 1
+)
 
 
 @st.composite
-def alike(draw: st.DrawFn) -> list[Words]:
+def conditions_that_nearly_agree(draw: st.DrawFn) -> list[ResultConditions]:
     """Words that differ from others in one or two things, so that they could be taken together."""
-    found = [draw(st.sampled_from([PLAIN, PLAIN._replace(setting="explicit")]))]
-    for other in draw(st.lists(WORDS, min_size=1, max_size=5)):
-        changed = draw(st.lists(st.sampled_from(Words._fields), min_size=1, max_size=2))
+    found = [
+        draw(st.sampled_from([USUAL_CONDITIONS, USUAL_CONDITIONS._replace(setting="explicit")]))
+    ]
+    for other in draw(st.lists(ANY_CONDITIONS, min_size=1, max_size=5)):
+        changed = draw(st.lists(st.sampled_from(ResultConditions._fields), min_size=1, max_size=2))
         found.append(found[-1]._replace(**{name: getattr(other, name) for name in changed}))
     return list(dict.fromkeys(found))
 
 
-def numbers(table: Table, *names: str) -> Iterator[float]:
+def numbers_in_table(table: Table, *names: str) -> Iterator[float]:
     """Yield the numbers of a table in some columns, or in all, without what is behind them."""
     for row in table.rows:
         for column, entry in zip(table.columns, row.entries, strict=True):
@@ -93,14 +97,16 @@ def numbers(table: Table, *names: str) -> Iterator[float]:
                 yield float(word)
 
 
-def rates_of(frame: Frame) -> Iterator[float]:
+def all_rates_of(frame: Frame) -> Iterator[float]:
     """Yield every rate in percent, and every difference of two in points."""
     data = RunData(frame)
     for table in make_run_tables(frame):
-        yield from numbers(table)
-    yield from numbers(make_table("main", data))
-    yield from numbers(make_breakdown_table(BREAKDOWNS["difficulty"], frame), "success", "gap")
-    yield from numbers(make_heard_table(data), "cut, %", "success, all", "success, heard")
+        yield from numbers_in_table(table)
+    yield from numbers_in_table(make_table("main", data))
+    yield from numbers_in_table(
+        make_breakdown_table(BREAKDOWNS["difficulty"], frame), "success", "gap"
+    )
+    yield from numbers_in_table(make_heard_table(data), "cut, %", "success, all", "success, heard")
     tables = {
         make_arm_table: ("first, %", "second, %", "difference"),
         make_forms_table: ("implicit − resolved",),
@@ -108,7 +114,7 @@ def rates_of(frame: Frame) -> Iterator[float]:
     }
     for make, names in tables.items():
         with contextlib.suppress(InvalidValueError):  # nothing to show
-            yield from numbers(make(data), *names)
+            yield from numbers_in_table(make(data), *names)
     for summary in data.summaries.values():
         yield 100 * float(summary.rate or 0)
     for rate in results_of(data).rates().values():
@@ -123,9 +129,13 @@ def results_of(data: RunData) -> Results:
 
 
 @settings(max_examples=60, deadline=None)
-@given(alike(), st.data())
-def test_no_rate_is_over_two_forms_arms_policies_words_or_worlds(told, data):
-    """All episodes of the same words end alike, so that a rate over others too is in between."""
+@given(conditions_that_nearly_agree(), st.data())
+def test_no_printed_rate_mixes_episodes_of_different_conditions(told, data):
+    """Conditions are policy, words, split, step limit and the like.
+
+    Episodes of the same conditions all end alike here: every honest rate is 0 or 100 %, and one
+    that mixes two conditions is in between.
+    """
     places = st.lists(st.tuples(st.sampled_from(TASKS), st.integers(0, 2)), min_size=1, unique=True)
     results = []
     for words in told:
@@ -136,7 +146,7 @@ def test_no_rate_is_over_two_forms_arms_policies_words_or_worlds(told, data):
             results.append(make_result(outcome, episode, task=task, **fields))
     frame = frame_of(results)
 
-    assert {abs(rate) for rate in rates_of(frame)} <= {0, 100}
+    assert {abs(rate) for rate in all_rates_of(frame)} <= {0, 100}
 
     in_full = [words for words in told if words.arm == "told"]
     assert len(results_of(RunData(frame)).rates()) == len(in_full or told), "none hides another one"
@@ -146,8 +156,8 @@ def test_no_rate_is_over_two_forms_arms_policies_words_or_worlds(told, data):
         assert {row.rate for row in roboirg.measure(frame, by)} <= {0, 1}
 
 
-def test_all_tasks_are_one_mean_in_the_terminal_on_the_page_and_in_python():
-    """Nine of ten are won in one task and one of two in the other: 70 %, not ten of twelve."""
+def test_the_rate_over_tasks_is_the_same_in_the_terminal_on_the_page_and_in_python():
+    """9 of 10 episodes of a task and 1 of 2 of another: a mean of 70 %, not 10 of 12."""
     results = [*make_results("0111111111"), *make_results("01", task="BinFill", policy_seed=1)]
     frame = frame_of(results)
     data = RunData(frame)
@@ -155,19 +165,19 @@ def test_all_tasks_are_one_mean_in_the_terminal_on_the_page_and_in_python():
     (table,) = make_run_tables(frame)
     (whole,) = (summary for key, summary in data.summaries.items() if key.scope == ALL_TASKS)
 
-    assert [*numbers(table)][-1] == 70
+    assert [*numbers_in_table(table)][-1] == 70
     assert cell_notes(whole, "")[1].startswith("70 % success, mean of 2 tasks")
     assert results_of(data).rates() == {("listener", "explicit"): 0.7}
 
 
-def intervals(measured: Measured) -> Iterator[Interval | None]:
+def intervals_of(measured: Measured) -> Iterator[Interval | None]:
     yield from (measured.interval, measured.other_interval)
     for gap in (measured.gap, measured.second_gap):
         if gap is not None:
             yield from (gap.interval, gap.retention_interval)
 
 
-TABLES = st.dictionaries(
+ANY_OUTCOMES = st.dictionaries(
     st.tuples(
         st.sampled_from(["listener", "other"]),
         st.sampled_from(["PickXtimes", "BinFill", "VideoUnmask"]),
@@ -184,8 +194,9 @@ TABLES = st.dictionaries(
 
 
 @settings(max_examples=150, deadline=None)
-@given(TABLES)
-def test_an_interval_has_a_width_or_there_is_none(tables):
+@given(ANY_OUTCOMES)
+def test_no_printed_interval_has_a_width_of_zero(tables):
+    """From too few episodes there is none. Would find a rate that looks certain."""
     frame = frame_of_tables(tables)
     data = RunData(frame)
     measured = [*data.summaries.values(), *arm_figures(frame)]
@@ -195,7 +206,7 @@ def test_an_interval_has_a_width_or_there_is_none(tables):
 
     found = []
     for row in measured:
-        found += intervals(row)
+        found += intervals_of(row)
     for run in frame.names:
         headline = measure_headline(data.cells, run, ("direct", "reasoning"))
         found.append(headline and headline.interval)
@@ -206,8 +217,8 @@ def test_an_interval_has_a_width_or_there_is_none(tables):
 
 
 @settings(max_examples=150, deadline=None)
-@given(TABLES)
-def test_where_there_is_no_interval_there_is_a_reason(tables):
+@given(ANY_OUTCOMES)
+def test_a_rate_or_gap_without_an_interval_is_printed_with_the_reason(tables):
     frame = frame_of_tables(tables)
 
     table = make_breakdown_table(BREAKDOWNS["difficulty"], frame)

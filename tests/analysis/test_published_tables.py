@@ -28,11 +28,11 @@ from roboirg.language.settings import settings_of
 from roboirg.stats.rates import mean_percent, percent
 from roboirg.tasks import all_tasks
 
-EMPTY = RunData(frame_of())
+NO_RESULTS = RunData(frame_of())
 FILES = {"main": "main", "planner": "planner", "context": "context", "real": "real_world"}
 
 
-def printed(table: str) -> list[dict[str, str]]:
+def lines_of_stored_file(table: str) -> list[dict[str, str]]:
     """The file as it is, without the loader."""
     path = resources.files("roboirg.analysis") / "published_results" / f"{FILES[table]}.csv"
     return list(csv.DictReader(path.read_text().splitlines()))
@@ -46,7 +46,7 @@ def place(line: dict[str, str]) -> tuple[str, str]:
 
 
 @pytest.fixture(scope="module", params=RATE_TABLES)
-def made(request) -> Table:
+def table_of_results_like_the_papers(request) -> Table:
     results = like_published(request.param)
     return make_table(request.param, RunData(frame_of(results)), published=True)
 
@@ -63,21 +63,24 @@ def rows_of(table: Table, source: str) -> dict[tuple[str, str], dict[str, Entry]
     return found
 
 
-def printed_entries(made, source):
+def printed_entries(table_of_results_like_the_papers, source):
     """Return all that a reader sees of the rows of a source, by place and column."""
     found = {}
-    for at, row in rows_of(made, source).items():
+    for at, row in rows_of(table_of_results_like_the_papers, source).items():
         for name, entry in row.items():
             found[at, name] = (entry.text, entry.marks, entry.change, entry.best)
     return found
 
 
-def test_every_rate_and_average_is_the_published_one(made):
-    """In our rows and in the published ones, which are drawn alike: arrows, dashes, bold."""
-    ours, theirs = (printed_entries(made, source) for source in ("ours", "published"))
+def test_results_with_the_papers_rates_give_the_papers_table(table_of_results_like_the_papers):
+    """Every rate, average, dash and bold entry, in our rows as in the published ones."""
+    ours, theirs = (
+        printed_entries(table_of_results_like_the_papers, source)
+        for source in ("ours", "published")
+    )
     assert ours == theirs
 
-    lines = printed(made.key)
+    lines = lines_of_stored_file(table_of_results_like_the_papers.key)
     assert {place(line) for line in lines} == {at for at, _ in ours}
 
     for line in lines:
@@ -87,16 +90,18 @@ def test_every_rate_and_average_is_the_published_one(made):
         assert (shown, marks) == (expected, ""), line
 
 
-def test_every_change_is_that_of_the_published_rates(made):
-    """Computed anew from the file: floats, no code of the package."""
+def test_each_change_to_explicit_is_the_difference_of_the_published_rates(
+    table_of_results_like_the_papers,
+):
+    """Computed anew from the file, in floats, without code of the package."""
     rates: dict[tuple[str, str], dict[str, float]] = defaultdict(dict)
-    for line in printed(made.key):
+    for line in lines_of_stored_file(table_of_results_like_the_papers.key):
         if line["success_rate_percent"]:
             rates[place(line)][line["task"]] = float(line["success_rate_percent"])
 
-    for at, entries in rows_of(made, "ours").items():
+    for at, entries in rows_of(table_of_results_like_the_papers, "ours").items():
         reference = ("explicit", at[1])
-        if made.key == "context":
+        if table_of_results_like_the_papers.key == "context":
             reference = (at[0], "1,5")
         before = dict(rates[reference])
         # The average of the same tasks, as some settings have not all.
@@ -110,8 +115,8 @@ def test_every_change_is_that_of_the_published_rates(made):
                 assert float(change) == round(rate - before[column], 2), (at, column)
 
 
-def test_published_averages_are_means_of_the_printed_rates():
-    """All rates are multiples of 1/150 (real world: 1/10), rounded half up, without exception."""
+def test_each_published_average_is_the_mean_of_its_rates_and_each_rate_a_count_of_trials():
+    """A rate is k of 150 trials (real world: of 10), rounded half up. Finds typing errors."""
     count = 0
     for table in RATE_TABLES:
         trials = math.prod(TRIALS[table])
@@ -124,8 +129,9 @@ def test_published_averages_are_means_of_the_printed_rates():
     assert count == 255 + 30 + 36 + 20
 
 
-def test_the_coverage_of_this_benchmark_is_read_off_its_tasks():
-    table = make_table("coverage", EMPTY)
+def test_the_table_of_benchmarks_is_the_published_one_and_our_row_is_computed():
+    """*Coverage* lists what each benchmark tests; ours is read off its tasks."""
+    table = make_table("coverage", NO_RESULTS)
     found = [(row.group, row.name, row.cells) for row in table.rows]
     lines = [tuple(line.values()) for line in published_lines("coverage")]
     published = [(kind, name, list(words)) for name, kind, *words in lines]
@@ -136,22 +142,22 @@ def test_the_coverage_of_this_benchmark_is_read_off_its_tasks():
 
 @pytest.mark.parametrize("which", WHICH)
 @pytest.mark.parametrize("name", FORMATS)
-def test_all_can_be_drawn_from_the_published_rows_alone(which, name):
-    text = FORMATS[name].draw(make_table(which, EMPTY, published=True))
+def test_every_table_can_be_drawn_in_every_format_without_own_results(which, name):
+    text = FORMATS[name].draw(make_table(which, NO_RESULTS, published=True))
     assert text.rstrip("\n") + "\n" == text
 
 
-def test_published_tables_fit_this_benchmark():
+def test_the_paper_has_rates_for_exactly_the_tasks_that_have_a_setting_here():
     for row in published_rows("main"):
         has = {task for task, rate in row.rates.items() if rate is not None}
         setting = row.options.setting
         assert has == {name for name, task in all_tasks().items() if setting in settings_of(task)}
 
 
-def test_the_stored_notes_have_intervals_of_their_trials_and_stand_below_the_tables():
-    """Computed anew: no code of the package."""
+def test_notes_below_published_tables_give_the_half_width_of_the_interval_of_a_cell():
+    """Of a rate of 50 %, after Wilson, computed without code of the package."""
     for table, (first, *_) in NOTES.items():
         trials = math.prod(TRIALS[table])
         half = 1.96 * (0.25 / trials + (1.96 / (2 * trials)) ** 2) ** 0.5 / (1 + 1.96**2 / trials)
         assert f"cell's is ±{100 * half:.0f} points." in first
-        assert {*NOTES[table]} <= {*make_table(table, EMPTY, published=True).notes}
+        assert {*NOTES[table]} <= {*make_table(table, NO_RESULTS, published=True).notes}

@@ -32,7 +32,7 @@ from roboirg.runs.play.episode_record import audit_record
 
 pytest.importorskip("jinja2")
 
-PICKS = PLAN.model_copy(update={"tasks": ("PickXtimes",), "forms": ("implicit",)})
+PLAN_OF_ONE_TASK = PLAN.model_copy(update={"tasks": ("PickXtimes",), "forms": ("implicit",)})
 
 
 class Page:
@@ -50,13 +50,13 @@ class Page:
         return str(self.data["strings"][place])
 
 
-def records() -> list[Record]:
+def records_with_an_error_last() -> list[Record]:
     """The last is an error."""
-    *found, last = played(PICKS)
+    *found, last = played(PLAN_OF_ONE_TASK)
     return [*found, broken(last)]
 
 
-def film(folder: Path, name: str = "x") -> str:
+def written_film(folder: Path, name: str = "x") -> str:
     """Write a video into a run, and return its path there."""
     (folder / "videos").mkdir(parents=True, exist_ok=True)
     for suffix in ("mp4", "jpg"):
@@ -64,19 +64,23 @@ def film(folder: Path, name: str = "x") -> str:
     return f"videos/{name}.mp4"
 
 
-def test_nothing_comes_from_outside_and_no_words_end_a_script():
-    text = render(records(), PICKS)
+def test_the_page_loads_nothing_from_elsewhere_and_text_of_records_cannot_end_its_script():
+    """The cause of the last record has "</script>" in it; would find a page open to an attack."""
+    text = render(records_with_an_error_last(), PLAN_OF_ONE_TASK)
     assert not re.search(r"https?:|@import|url\(", text)
     assert "default-src 'none'" in text
     assert "</script><b>" not in text
-    assert broken(records()[0]).cause in Page(text).data["strings"]
+    assert broken(records_with_an_error_last()[0]).cause in Page(text).data["strings"]
     # Nor does the order of the file matter.
-    assert render(records()[::-1], PICKS) == text
+    assert render(records_with_an_error_last()[::-1], PLAN_OF_ONE_TASK) == text
 
 
-def test_mentions_and_the_resolved_form_are_those_of_the_episode():
-    """The resolved form is said again where it was not played, of each goal by itself."""
-    plan = PICKS.model_copy(update={"forms": PLAN.forms, "arms": ("told", "other-goal")})
+def test_an_episode_shows_its_instruction_with_references_spelled_out():
+    """This *resolved* form is made anew if it was not played; mentions are marked where they stand.
+
+    Would find the words of another goal of the same scene.
+    """
+    plan = PLAN_OF_ONE_TASK.model_copy(update={"forms": PLAN.forms, "arms": ("told", "other-goal")})
     found = [record for record in played(plan) if record.setting != "explicit"]
     implicit = [record for record in found if record.form == "implicit"]
     resolved = [record for record in found if record.form == "resolved"]
@@ -93,9 +97,9 @@ def test_mentions_and_the_resolved_form_are_those_of_the_episode():
         assert shown == spans
 
 
-def test_what_is_of_other_versions_or_unknown_is_shown_as_it_is():
+def test_records_of_other_versions_or_unknown_tasks_are_shown_without_what_cannot_be_derived():
     """Another version of the language may have other words, of the environment other stages."""
-    usual = next(record for record in records() if record.setting == "direct")
+    usual = next(record for record in records_with_an_error_last() if record.setting == "direct")
     turn = UtteranceRecord(stage="command", text="Do it.")
     mention = MentionSpan(
         utterance=0, start=3, end=5, role="anaphor", expression="it", slot="x", value=1
@@ -114,8 +118,9 @@ def test_what_is_of_other_versions_or_unknown_is_shown_as_it_is():
     assert page.string(page.details[0]["events"][-1][1]) == "took cube green off target"
 
 
-def test_things_of_one_look_have_numbers_and_what_ends_by_itself_is_not_shown():
-    first, *_ = played(PICKS.model_copy(update={"tasks": ("BinFill",)}))
+def test_events_tell_equal_cubes_apart_by_number_and_leave_out_what_ends_by_itself():
+    """A cube is picked up; that it is then no longer *over the bin* is no event of its own."""
+    first, *_ = played(PLAN_OF_ONE_TASK.model_copy(update={"tasks": ("BinFill",)}))
     event = EventRecord(step=1, kind="picked", subject="cube_red_1")
     over = replace(event, kind="over", place="bin", holds=False)
     page = Page(render([replace(first, events=(event, over))]))
@@ -125,9 +130,9 @@ def test_things_of_one_look_have_numbers_and_what_ends_by_itself_is_not_shown():
     assert acts == ["picked up the red cube (1)"]
 
 
-def test_what_is_amiss_is_said_first():
-    found = records()
-    page = Page(render([*found[:-6], found[-1]], PICKS))
+def test_missing_episodes_errors_and_a_single_policy_are_named_at_the_top_of_the_page():
+    found = records_with_an_error_last()
+    page = Page(render([*found[:-6], found[-1]], PLAN_OF_ONE_TASK))
     assert f"Incomplete: 5 of {len(found)} planned" in page.notes
     assert f"1 of {len(found) - 5} episodes ended in an error (1 policy)" in page.notes
 
@@ -159,7 +164,9 @@ def test_cells_choices_and_details_are_as_stored(snapshot, monkeypatch):
     monkeypatch.setattr(EpisodeDetails, "_index", lambda _, text: text)  # texts, not their numbers
     settings = ("explicit", "contextual")
     own = [
-        record for record in records() if record.policy == "listener" and record.setting in settings
+        record
+        for record in records_with_an_error_last()
+        if record.policy == "listener" and record.setting in settings
     ]
     *others, cut = sorted(own, key=lambda record: (record.episode, record.setting == "contextual"))
     audit_record(cut, PreparedJob(cut.identity), PromptLimit(24, 0, most_tokens, "some.model"))
@@ -196,9 +203,11 @@ def test_cells_choices_and_details_are_as_stored(snapshot, monkeypatch):
         (None, None),
     ],
 )
-def test_a_failed_episode_shows_what_was_named_next_to_what_was_meant(understood, goal):
+def test_a_failed_episode_shows_the_goal_that_the_policy_understood_next_to_the_true_one(
+    understood, goal
+):
     """Of a planner, the last subgoal up to the failure; of an episode that succeeded, nothing."""
-    first = next(record for record in records() if record.attribution)
+    first = next(record for record in records_with_an_error_last() if record.attribution)
     said = tuple(
         SubgoalRecord(step=step, text=text, due="pick it up", verdict="lost")
         for step, text in ((51, "sing"), (60, "dance"), (61, "rest"))  # it failed at step 60
@@ -215,8 +224,9 @@ def test_a_failed_episode_shows_what_was_named_next_to_what_was_meant(understood
         assert texts[details.get("named", -1)] == expected
 
 
-def test_words_that_differ_stand_apart_and_are_named():
-    first = next(record for record in records() if record.setting == "direct")
+def test_the_same_policy_with_other_words_is_shown_as_another_with_a_warning():
+    """ "mine@1a" are words of another file; spelled-out references exist in our own words only."""
+    first = next(record for record in records_with_an_error_last() if record.setting == "direct")
     page = Page(render([first, first.with_options(wordings="mine@1a")]))
     assert "Mixed words: our own words, the words of mine@1a." in page.notes
     assert page.data["matrix"]["policies"] == [
@@ -230,10 +240,12 @@ def test_words_that_differ_stand_apart_and_are_named():
     assert "in the words of mine@1a" in page.string(theirs["conditions"])
 
 
-def test_a_pair_is_of_one_scene_told_alike_under_equal_conditions():
-    """A number of two that lacks seed, form, arm or split; a value of a filter that is not ours."""
+def test_two_policies_are_paired_on_a_scene_only_with_equal_words_seed_and_split():
+    """Two results agree in all, four differ in seed, arm, form or split: one pair, four alone."""
     first, theirs = (
-        record for record in records() if (record.setting, record.episode) == ("direct", 0)
+        record
+        for record in records_with_an_error_last()
+        if (record.setting, record.episode) == ("direct", 0)
     )
     others = [
         replace(first, policy_seed=1), replace(first, arm="silent"),
@@ -250,9 +262,10 @@ def test_a_pair_is_of_one_scene_told_alike_under_equal_conditions():
     assert len(page.data["comparisons"]) == 3, "of the three policy runs that were told"
 
 
-def test_videos_are_in_the_page_or_next_to_it(tmp_path, monkeypatch):
-    first, second, *_ = records()
-    filmed = replace(first, video=film(tmp_path, "a-b"))
+def test_small_videos_are_stored_in_the_page_and_large_ones_are_linked(tmp_path, monkeypatch):
+    """The film has 4 bytes, its picture 4: 8 fit, 7 do not. A lost film has its reason."""
+    first, second, *_ = records_with_an_error_last()
+    filmed = replace(first, video=written_film(tmp_path, "a-b"))
     lost = replace(second, video="videos/gone.mp4", video_error="no room")
     run = store(tmp_path, [filmed, lost])
     monkeypatch.setattr(report, "MAX_EMBEDDED_BYTES", 8)
@@ -282,12 +295,16 @@ def test_videos_are_in_the_page_or_next_to_it(tmp_path, monkeypatch):
     assert "plays them from the folder" not in packed.text
 
 
-def test_two_runs_are_held_against_each_other(tmp_path):
+def test_a_page_of_two_runs_compares_their_policies_and_finds_the_videos_of_both(tmp_path):
     theirs = tmp_path / "our theirs"
-    found = records()
+    found = records_with_an_error_last()
     runs = (
-        store(tmp_path / "ours", found, PICKS),
-        store(theirs, [replace(found[0], video=film(theirs), code="0"), *found[1:-4]], PICKS),
+        store(tmp_path / "ours", found, PLAN_OF_ONE_TASK),
+        store(
+            theirs,
+            [replace(found[0], video=written_film(theirs), code="0"), *found[1:-4]],
+            PLAN_OF_ONE_TASK,
+        ),
     )
     with EpisodeLog(log_path(theirs, found[0].slug)) as log:
         os.write(log.descriptor, b"words")

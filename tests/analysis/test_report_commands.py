@@ -25,19 +25,21 @@ def write_run(folder: Path, policies: tuple[str, ...], device: str | None = None
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory) -> Path:
+def run_of_two_policies(tmp_path_factory) -> Path:
     return write_run(tmp_path_factory.mktemp("runs") / "folder-run", ("listener", "forgetful"))
 
 
 @pytest.fixture(scope="module")
-def pack(run: Path) -> Path:
-    pack_run(run, path := run.parent / "shipped.roboirg.zip")
+def pack_of_the_run(run_of_two_policies: Path) -> Path:
+    pack_run(run_of_two_policies, path := run_of_two_policies.parent / "shipped.roboirg.zip")
     return path
 
 
-def test_tables_are_written(run, tmp_path):
+def test_tables_out_writes_a_file_for_each_table_into_a_new_folder(run_of_two_policies, tmp_path):
     out = tmp_path / "new" / "tables"
-    printed = call("tables", run, "--format", "latex", "--out", out, "--published").split()
+    printed = call(
+        "tables", run_of_two_policies, "--format", "latex", "--out", out, "--published"
+    ).split()
     names = ["coverage.tex", "main.tex", "planner.tex", "context.tex", "real.tex"]
     assert sorted(printed) == sorted(map(str, out.iterdir())) == sorted(str(out / n) for n in names)
 
@@ -46,10 +48,10 @@ def test_tables_are_written(run, tmp_path):
     assert "coverage,ours" in call("tables", "--which", "coverage", "--format", "csv")
 
 
-def test_several_tables_are_one_document_for_programs(run):
-    """Pandas reads all rows of both tables and every number of them."""
+def test_several_tables_in_json_or_csv_are_one_document_that_pandas_reads(run_of_two_policies):
+    """Would find two documents one after the other, of which a reader takes the first."""
     pandas = pytest.importorskip("pandas")
-    words = ("tables", run, "--by", "difficulty,slots", "--format")
+    words = ("tables", run_of_two_policies, "--by", "difficulty,slots", "--format")
     rows = pandas.read_json(io.StringIO(call(*words, "json")))
     lines = pandas.read_csv(io.StringIO(call(*words, "csv")), na_values="–")
 
@@ -60,26 +62,54 @@ def test_several_tables_are_one_document_for_programs(run):
     assert len(rows) == len(lines) / 5, "of each row five columns"
 
 
-def test_a_pack_is_read_like_the_folder_it_was_made_of(run, pack, tmp_path):
+def test_commands_print_the_same_of_a_packed_run_as_of_its_folder(
+    run_of_two_policies, pack_of_the_run, tmp_path
+):
     for words in (
         ("tables", "--format", "csv"),
         ("tables", "--by", "difficulty", "--format", "json"),
         ("tables", "--which", "facts", "--format", "markdown"),
         ("tables", "--which", "failures", "--format", "markdown"),
     ):
-        assert call(*words, pack) == call(*words, run).replace(str(run), str(pack))
+        assert call(*words, pack_of_the_run) == call(*words, run_of_two_policies).replace(
+            str(run_of_two_policies), str(pack_of_the_run)
+        )
 
-    sides = call("compare", f"{pack}:listener", f"{run}:forgetful", "--by", "difficulty")
-    assert sides == call("compare", f"{run}:listener", f"{pack}:forgetful", "--by", "difficulty")
+    sides = call(
+        "compare",
+        f"{pack_of_the_run}:listener",
+        f"{run_of_two_policies}:forgetful",
+        "--by",
+        "difficulty",
+    )
+    assert sides == call(
+        "compare",
+        f"{run_of_two_policies}:listener",
+        f"{pack_of_the_run}:forgetful",
+        "--by",
+        "difficulty",
+    )
     assert "direct: listener (privileged) is better, +100.0 points" in sides
 
-    drawn = call("figures", pack, "--published", "--which", "gaps", "--out", tmp_path).splitlines()
+    drawn = call(
+        "figures", pack_of_the_run, "--published", "--which", "gaps", "--out", tmp_path
+    ).splitlines()
     assert [Path(path).name for path in drawn][:2] == ["gaps.png", "gaps.svg"]
 
 
-def test_a_page_is_written_next_to_a_pack_or_where_it_is_wanted(run, pack, tmp_path):
-    pages = [run / "report.html", pack.parent / "shipped.html", tmp_path / "page.html"]
-    for words in ((run,), (pack,), (f"{pack}:listener", "--against", run, "--out", pages[2])):
+def test_report_writes_the_page_into_the_run_next_to_a_pack_or_to_out(
+    run_of_two_policies, pack_of_the_run, tmp_path
+):
+    pages = [
+        run_of_two_policies / "report.html",
+        pack_of_the_run.parent / "shipped.html",
+        tmp_path / "page.html",
+    ]
+    for words in (
+        (run_of_two_policies,),
+        (pack_of_the_run,),
+        (f"{pack_of_the_run}:listener", "--against", run_of_two_policies, "--out", pages[2]),
+    ):
         call("report", *words)
 
     folder, packed, both = (page.read_text("utf-8") for page in pages)
@@ -88,20 +118,33 @@ def test_a_page_is_written_next_to_a_pack_or_where_it_is_wanted(run, pack, tmp_p
     assert "<title>shipped:listener against folder-run" in both
 
 
-def test_policies_are_chosen_where_a_run_is_named(run, pack):
+def test_run_colon_policy_shows_the_results_of_that_policy_alone(
+    run_of_two_policies, pack_of_the_run
+):
     csv = ("--which", "main", "--format", "csv")
-    whole = call("tables", run, *csv)
+    whole = call("tables", run_of_two_policies, *csv)
     (head, *rows) = whole.splitlines()
-    one = call("tables", f"{run}:forgetful", *csv)
+    one = call("tables", f"{run_of_two_policies}:forgetful", *csv)
 
     assert one.splitlines() == [head, *(row for row in rows if "forgetful" in row)]
-    assert call("tables", f"{run}:forgetful", f"{run}:listener", run, *csv) == whole
+    assert (
+        call(
+            "tables",
+            f"{run_of_two_policies}:forgetful",
+            f"{run_of_two_policies}:listener",
+            run_of_two_policies,
+            *csv,
+        )
+        == whole
+    )
 
-    other = call("tables", f"{run}:forgetful", f"{pack}:listener", *csv)
+    other = call("tables", f"{run_of_two_policies}:forgetful", f"{pack_of_the_run}:listener", *csv)
     assert sorted(other.splitlines()) == sorted(whole.splitlines())
 
 
-def test_mixed_render_devices_are_named(run, tmp_path):
+def test_every_command_warns_of_runs_that_were_rendered_on_different_devices(
+    run_of_two_policies, tmp_path
+):
     devices = ("llvmpipe", "NVIDIA H100")
     runs = [
         write_run(tmp_path / name, (name,), device=device)
@@ -117,7 +160,7 @@ def test_mixed_render_devices_are_named(run, tmp_path):
         ("report", merged),
     ):
         assert "Mixed render devices: NVIDIA H100, llvmpipe. Their pictures" in call(*words)
-    assert "Mixed" not in call("tables", runs[0], run)
+    assert "Mixed" not in call("tables", runs[0], run_of_two_policies)
 
 
 @pytest.mark.parametrize(
@@ -152,9 +195,15 @@ def test_mixed_render_devices_are_named(run, tmp_path):
         ("report RUN --serve --against RUN", "--serve shows one run"),
     ],
 )
-def test_what_cannot_be_shown_is_one_sentence(run, tmp_path, words, says):
+def test_a_command_that_has_nothing_to_show_is_refused_with_the_reason(
+    run_of_two_policies, tmp_path, words, says
+):
     (tmp_path / "file").write_text("")
-    places = {"RUN": str(run), "EMPTY": str(tmp_path), "FILE": str(tmp_path / "file")}
+    places = {
+        "RUN": str(run_of_two_policies),
+        "EMPTY": str(tmp_path),
+        "FILE": str(tmp_path / "file"),
+    }
     for name, place in places.items():
         words = re.sub(rf"\b{name}\b", place, words)
 

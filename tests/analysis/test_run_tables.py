@@ -35,7 +35,7 @@ def printed(frame: Frame, width: int = 100) -> str:
     return console.file.getvalue()  # type: ignore[attr-defined,no-any-return]
 
 
-PRINTED = """\
+STORED_OUTPUT = """\
 listener
 ┏━━━━━━━━━━━━━┳━━━━━━━━━━┳━━━━━━━━━━━━━━━━┳━━━━━━━━━━━━━━━━━━━┓
 ┃ task        ┃ explicit ┃         direct ┃ direct (resolved) ┃
@@ -61,26 +61,26 @@ listener: 8 episodes without success
   VideoUnmask test/1 explicit: LONG
   VideoUnmask test/1 direct: LONG
 """  # noqa: E501, W291
-LONG = "picked up the green cube [1]; expected: pick up the red cube for the first time"
+LONG_CAUSE = "picked up the green cube [1]; expected: pick up the red cube for the first time"
 
 
-def test_rates_gaps_what_is_incomplete_and_failures_are_printed():
-    """Gaps are on episodes that both have, also with other seeds; of all tasks the means over them.
+def test_a_finished_run_prints_its_rates_gaps_missing_episodes_and_failures():
+    """Letters are episodes: 1 won, 0 lost, ! an error. Direct wins 1 of 3 and 0 of 2 in two tasks.
 
-    Direct wins 1 of 3 and 0 of 2, explicit 3 of 3 and 0 of 2; its 20 % of trials are no mean.
+    Their mean is 17 %, a gap of -33 to explicit on the same episodes. Would find 20 %, 1 of 5.
     """
     frame = frame_of(
         play("1111"),
-        play("100!", "direct", cause=LONG),
-        play("0", "direct", form="resolved", policy_seed=2, cause=LONG),
-        play("00", task="VideoUnmask", cause=LONG),
-        play("00", "direct", task="VideoUnmask", cause=LONG),
+        play("100!", "direct", cause=LONG_CAUSE),
+        play("0", "direct", form="resolved", policy_seed=2, cause=LONG_CAUSE),
+        play("00", task="VideoUnmask", cause=LONG_CAUSE),
+        play("00", "direct", task="VideoUnmask", cause=LONG_CAUSE),
         planned=[result.identity for result in play("111111", "direct")],
     )
-    assert printed(frame) == PRINTED.replace("LONG", LONG)
+    assert printed(frame) == STORED_OUTPUT.replace("LONG", LONG_CAUSE)
 
 
-WRONG = [
+ONE_FAILURE_OF_EACH_KIND = [
     Attribution(kind=kind, failure=failure, step=1, sentence="So.")
     for kind, failure in (
         ("grounding", "wrong_count"),
@@ -89,17 +89,35 @@ WRONG = [
     )
 ]
 """A failure of each kind."""
-MIXED = frame_of(
+FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL = frame_of(
     play("110100!111", prompt_verdict="heard", difficulty="hard"),
-    play("10001!1001", "direct", prompt_verdict="cut", attribution=WRONG[0], difficulty="hard"),
+    play(
+        "10001!1001",
+        "direct",
+        prompt_verdict="cut",
+        attribution=ONE_FAILURE_OF_EACH_KIND[0],
+        difficulty="hard",
+    ),
     play("0110111111", "direct", form="resolved", prompt_verdict="heard"),
     play("1011", task="BinFill", prompt_verdict="heard"),
-    play("0010", "direct", task="BinFill", prompt_verdict="unknown", attribution=WRONG[1]),
+    play(
+        "0010",
+        "direct",
+        task="BinFill",
+        prompt_verdict="unknown",
+        attribution=ONE_FAILURE_OF_EACH_KIND[1],
+    ),
     play("0110", "direct", task="BinFill", form="resolved", prompt_verdict="cut"),
-    play("0001", "direct", task="VideoUnmask", prompt_verdict="heard", attribution=WRONG[1]),
+    play(
+        "0001",
+        "direct",
+        task="VideoUnmask",
+        prompt_verdict="heard",
+        attribution=ONE_FAILURE_OF_EACH_KIND[1],
+    ),
     play("0111", "direct", task="VideoUnmask", form="resolved", prompt_verdict="heard"),
-    play("0", policy="other", attribution=WRONG[1]),
-    play("0", "direct", policy="other", attribution=WRONG[1]),
+    play("0", policy="other", attribution=ONE_FAILURE_OF_EACH_KIND[1]),
+    play("0", "direct", policy="other", attribution=ONE_FAILURE_OF_EACH_KIND[1]),
 )
 """Other numbers of everything in every cell."""
 
@@ -113,12 +131,17 @@ MIXED = frame_of(
 )
 def test_other_tables_are_as_stored(snapshot, name, kind):
     """Numbers of one row, column, form or outcome in place of another."""
-    assert get_format(kind).draw(diagnostic_tables()[name].make(RunData(MIXED))) == snapshot
+    assert (
+        get_format(kind).draw(
+            diagnostic_tables()[name].make(RunData(FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL))
+        )
+        == snapshot
+    )
 
 
-def ended(kinds: str, setting: str) -> list[Summary]:
+def results_that_ended(kinds: str, setting: str) -> list[Summary]:
     """Return a success, a failure of a kind, or one without attribution for each letter."""
-    wrong: dict[str, Attribution] = dict(zip("gxu", WRONG, strict=True))
+    wrong: dict[str, Attribution] = dict(zip("gxu", ONE_FAILURE_OF_EACH_KIND, strict=True))
     return [
         make_result(
             "success" if letter == "s" else "error" if letter == "!" else "failure", episode,
@@ -138,11 +161,16 @@ def ended(kinds: str, setting: str) -> list[Summary]:
         ("ssssssssss", "sssssssssg", "90 10 0 0", "−10 +10 ±0 ±0", "100 –"),
     ],
 )
-def test_all_episodes_end_in_one_of_four_ways_and_gaps_are_sums_of_changes(
+def test_success_and_three_kinds_of_failure_add_up_to_100_and_their_changes_to_0(
     explicit, direct, rates, changes, shares
 ):
-    """Of the same episodes: in the fourth case, the errors leave eight that both have."""
-    data = RunData(frame_of(ended(explicit, "explicit"), ended(direct, "direct")))
+    """A letter is how an episode ended: s success, g grounding, x execution, u or - undecided.
+
+    Changes are over the same episodes: in the fourth case, errors (!) leave eight of ten.
+    """
+    data = RunData(
+        frame_of(results_that_ended(explicit, "explicit"), results_that_ended(direct, "direct"))
+    )
     entries = make_failure_table(data).rows[1].entries
     assert [f"{entry.percent:.0f}" for entry in entries[2:6]] == rates.split()
 
@@ -151,7 +179,8 @@ def test_all_episodes_end_in_one_of_four_ways_and_gaps_are_sums_of_changes(
     assert [entry.text for entry in entries[10:]] == shares.split()
 
 
-def test_a_failure_with_a_name_of_another_version_is_not_attributed():
+def test_a_failure_whose_name_this_version_does_not_know_counts_as_not_attributed():
+    """A record of another version calls it "renamed"; would find it lost, or a crash."""
     other = Attribution(kind="execution", failure="renamed", sentence="So.")
     data = RunData(frame_of(play("10", attribution=other)))
 
@@ -161,11 +190,12 @@ def test_a_failure_with_a_name_of_another_version_is_not_attributed():
 
 
 def test_the_breakdown_by_difficulty_is_as_stored(snapshot):
-    table = make_breakdown_table(BREAKDOWNS["difficulty"], MIXED)
+    table = make_breakdown_table(BREAKDOWNS["difficulty"], FRAME_WITH_OTHER_NUMBERS_IN_EVERY_CELL)
     assert get_format("markdown").draw(table) == snapshot
 
 
-def test_the_legend_explains_only_what_occurs_and_many_failures_are_counted():
+def test_the_first_ten_failures_are_listed_and_the_others_counted():
+    """And the legend explains only what the table has: here, privileged policies."""
     text = printed(frame_of(play("0" * 13, privileged=True, cause="late")))
     assert "success rate in %; privileged policies and scripted hands use the simulator's" in text
 
@@ -178,12 +208,13 @@ def test_the_legend_explains_only_what_occurs_and_many_failures_are_counted():
     assert failure_text(silent) == "PickXtimes test/0 explicit (silent): late"
 
 
-def test_rates_have_their_colors():
+def test_a_rate_is_green_from_75_percent_and_red_below_50():
+    """3 of 4, 2 of 3 and 1 of 3 are won."""
     tables = [make_run_tables(frame_of(play(outcomes)))[0] for outcomes in ("1110", "110", "100")]
     assert [table.rows[0].entries[0].style for table in tables] == ["green", "yellow", "red"]
 
 
-def test_policies_and_conditions_have_tables_of_their_own_in_the_order_of_the_plan():
+def test_each_policy_split_step_limit_and_robot_has_a_table_in_the_order_of_the_plan():
     results = [
         *play("1"), *play("1", split="val"), *play("1", max_steps=200),
         *play("1", policy="random", privileged=True), *play("1", robot="Panda"),
@@ -203,6 +234,7 @@ def test_policies_and_conditions_have_tables_of_their_own_in_the_order_of_the_pl
         ]
 
 
-def test_points_have_a_sign():
+def test_a_gap_is_printed_in_points_with_its_sign():
+    """-0.5 is −50 points. What rounds to zero is ±0, with no sign of its own."""
     assert [points(gap) for gap in (-0.5, 0.25, 0.0, -0.001)] == ["−50", "+25", "±0", "±0"]
     assert [points(gap, 1) for gap in (-0.5, 0.0004, 0.0006)] == ["−50.0", "±0.0", "+0.1"]

@@ -35,7 +35,7 @@ class Still:
 
 
 @pytest.fixture
-def unplayed(monkeypatch: pytest.MonkeyPatch) -> None:
+def episodes_decided_by_setting(monkeypatch: pytest.MonkeyPatch) -> None:
     """Episodes are decided by their setting."""
 
     def play(job: Job) -> Record:
@@ -46,13 +46,19 @@ def unplayed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(python_run, "episode_runner", lambda plan, folder: play)
 
 
-QUICK = {"tasks": "PickXtimes", "episodes": 3, "workers": 0, "progress": False}
+THREE_EPISODES = {"tasks": "PickXtimes", "episodes": 3, "workers": 0, "progress": False}
 
 
-def test_results_are_those_of_the_records(unplayed, tmp_path):
+def test_evaluate_returns_the_rates_tables_and_comparisons_of_its_records(
+    episodes_decided_by_setting, tmp_path
+):
+    """Nothing is played: the listener wins all, the forgetful policy explicit episodes alone.
+
+    Two policies, three episodes, three tellings (explicit has no resolved form).
+    """
     results = roboirg.evaluate(
         ["listener", "forgetful"], settings=("explicit", "direct"), forms=["implicit", "resolved"],
-        out=tmp_path, **QUICK,
+        out=tmp_path, **THREE_EPISODES,
     )  # fmt: skip
     assert results.records == read_records(tmp_path)
     assert (len(results.records), results.errors, results.missing) == (2 * 3 * 3, 0, 0)
@@ -70,15 +76,22 @@ def test_results_are_those_of_the_records(unplayed, tmp_path):
     with pytest.raises(UnknownNameError):
         results.compare("listener", "nobody")
 
+    # Of a run that lost its last two records, these are missing.
     *lines, _, _ = (tmp_path / RECORDS_FILE).read_text().splitlines(keepends=True)
     (tmp_path / RECORDS_FILE).write_text("".join(lines))
     cut = Results(tmp_path)
     assert (len(cut.frame), cut.errors, cut.missing) == (2 * 3 * 3 - 2, 0, 2)
 
 
-def test_results_have_figures_and_a_page(unplayed, tmp_path):
+def test_results_of_evaluate_are_drawn_saved_and_written_as_a_page(
+    episodes_decided_by_setting, tmp_path
+):
     results = roboirg.evaluate(
-        "listener", settings="explicit,direct", forms="implicit,resolved", out=tmp_path, **QUICK
+        "listener",
+        settings="explicit,direct",
+        forms="implicit,resolved",
+        out=tmp_path,
+        **THREE_EPISODES,
     )
     assert results.plot("gaps")._repr_png_().startswith(b"\x89PNG")
     assert results.report().read_text().startswith("<!doctype html>")
@@ -89,20 +102,27 @@ def test_results_have_figures_and_a_page(unplayed, tmp_path):
         results.plot("context")
 
 
-def test_the_same_folder_resumes_and_none_makes_a_new_one(unplayed, tmp_path, monkeypatch):
+def test_evaluate_goes_on_in_the_folder_it_is_given_and_else_makes_a_new_one(
+    episodes_decided_by_setting, tmp_path, monkeypatch
+):
+    """Three episodes in explicit, then in all five settings: 15 records, none twice."""
     monkeypatch.chdir(tmp_path)
     for settings in ("explicit", "all"):
-        roboirg.evaluate("oracle", settings=settings, out="kept", **QUICK)
+        roboirg.evaluate("oracle", settings=settings, out="kept", **THREE_EPISODES)
     assert len(read_records(tmp_path / "kept")) == 3 * 5
 
-    first, second = (roboirg.evaluate("oracle", settings="explicit", **QUICK) for _ in range(2))
+    first, second = (
+        roboirg.evaluate("oracle", settings="explicit", **THREE_EPISODES) for _ in range(2)
+    )
     assert first.folder.parent == second.folder.parent == tmp_path / "runs"
     assert first.folder != second.folder
 
 
-def test_classes_and_objects_play_in_this_process(unplayed, tmp_path, capsys):
+def test_a_policy_given_as_class_or_object_plays_in_this_process_with_a_warning(
+    episodes_decided_by_setting, tmp_path, capsys
+):
     given = Still(reach=0.5)
-    options = {**QUICK, "out": tmp_path, "progress": True}
+    options = {**THREE_EPISODES, "out": tmp_path, "progress": True}
     results = roboirg.evaluate({"mine": given, "class": Still}, **options)
     assert read_plan(tmp_path).hosting.policy_process == "shared"
     assert {record.policy for record in results.records} == {"mine", "class"}
@@ -115,29 +135,32 @@ def test_classes_and_objects_play_in_this_process(unplayed, tmp_path, capsys):
         (object(), {}, "has no method"),
     ):
         with pytest.raises(InvalidValueError, match=words):
-            roboirg.evaluate(policy, out=tmp_path, **{**QUICK, **options})
+            roboirg.evaluate(policy, out=tmp_path, **{**THREE_EPISODES, **options})
 
 
-class Insider(Still):
+class StillWithAttach(Still):
     def attach(self, env) -> None:
         pass
 
 
-@pytest.mark.parametrize("policy", [Insider(), f"{__name__}:Insider"])
-def test_privilege_is_declared(unplayed, tmp_path, policy):
-    options = {**QUICK, "out": tmp_path, "policy_process": "shared"}
+@pytest.mark.parametrize("policy", [StillWithAttach(), f"{__name__}:StillWithAttach"])
+def test_a_policy_that_takes_the_world_must_be_declared_privileged(
+    episodes_decided_by_setting, tmp_path, policy
+):
+    """It has a method attach(env). Would find a policy that knows the goal without a mark."""
+    options = {**THREE_EPISODES, "out": tmp_path, "policy_process": "shared"}
     with pytest.raises(InvalidValueError, match=r"has attach\(\).*roboirg\.Privileged\(policy\)"):
         roboirg.evaluate(policy, **options)
 
     both = [roboirg.Privileged(policy), Still()]
     results = roboirg.evaluate(both, **options)
     assert {(record.policy.split(":")[-1], record.privileged) for record in results.records} == {
-        ("Insider", True), ("Still", False),
+        ("StillWithAttach", True), ("Still", False),
     }  # fmt: skip
 
 
-def test_what_can_be_imported_has_a_spec_as_on_the_command_line(monkeypatch):
-    """No other process finds what a script defines, although it is there under its name."""
+def test_a_class_that_can_be_imported_gets_its_own_process_and_others_stay_in_this_one(monkeypatch):
+    """Objects, classes made in a function and those of the script (`__main__`) stay here."""
     from roboirg.policies.builtin.random_policy import RandomPolicy
     from roboirg.policies.by_name.finding import policy_of
 
@@ -148,7 +171,9 @@ def test_what_can_be_imported_has_a_spec_as_on_the_command_line(monkeypatch):
     assert [policy_of(policy).place for policy in given] == ["own", "python", "python", "python"]
 
 
-def test_options_are_those_of_a_plan(unplayed, tmp_path):
+def test_evaluate_takes_the_options_of_a_plan_and_refuses_others_with_the_nearest_name(
+    episodes_decided_by_setting, tmp_path
+):
     plan = python_run.python_plan(
         "oracle", tasks=["PickXtimes"], settings="contextual", episodes=[2],
         policy_seeds=(7, 42), stages=[(1, 5), (1, 2, 5)], max_steps=600, wordings=None,
@@ -156,20 +181,20 @@ def test_options_are_those_of_a_plan(unplayed, tmp_path):
     assert (plan.episodes, plan.policy_seeds, plan.environment.max_steps) == ((2,), (7, 42), 600)
     assert plan.stages == ((1, 5), (1, 2, 5))
     with pytest.raises(UnknownNameError, match="PickXtimes"):
-        roboirg.evaluate("oracle", **{**QUICK, "tasks": "PickXtime"})
+        roboirg.evaluate("oracle", **{**THREE_EPISODES, "tasks": "PickXtime"})
     with pytest.raises(UnknownNameError, match=r"max_stps.*mean 'max_steps'"):
-        roboirg.evaluate("oracle", max_stps=3, **QUICK)
+        roboirg.evaluate("oracle", max_stps=3, **THREE_EPISODES)
     for workers in ("2", True, 2.0, 10**22):
         with pytest.raises(InvalidValueError, match=f"workers is {workers!r}; it must be a whole"):
-            roboirg.evaluate("oracle", **{**QUICK, "workers": workers})
+            roboirg.evaluate("oracle", **{**THREE_EPISODES, "workers": workers})
 
 
 @pytest.mark.parametrize("name", [5, b"runs", True, "", " ", "runs/\0"])
-def test_a_folder_that_is_none_is_refused_and_nothing_is_written(
-    unplayed, tmp_path, monkeypatch, name
+def test_an_output_folder_that_is_no_path_is_refused_and_nothing_is_written(
+    episodes_decided_by_setting, tmp_path, monkeypatch, name
 ):
     monkeypatch.chdir(tmp_path)
-    for use in (lambda name: roboirg.evaluate("oracle", out=name, **QUICK), Results):
+    for use in (lambda name: roboirg.evaluate("oracle", out=name, **THREE_EPISODES), Results):
         with pytest.raises(InvalidValueError, match=r"The run's folder is .*; it must be a path"):
             use(name)
     with pytest.raises(InvalidValueError, match="The run's folder is ''; it must be a path"):
@@ -177,8 +202,10 @@ def test_a_folder_that_is_none_is_refused_and_nothing_is_written(
     assert not list(tmp_path.iterdir())
 
 
-def test_without_pandas_the_rest_works(unplayed, tmp_path, monkeypatch):
-    results = roboirg.evaluate("oracle", out=tmp_path, **QUICK)
+def test_without_pandas_results_lack_only_their_frame(
+    episodes_decided_by_setting, tmp_path, monkeypatch
+):
+    results = roboirg.evaluate("oracle", out=tmp_path, **THREE_EPISODES)
     monkeypatch.setitem(sys.modules, "pandas", None)
 
     with pytest.raises(MissingDependencyError, match="needs pandas"):
@@ -188,7 +215,8 @@ def test_without_pandas_the_rest_works(unplayed, tmp_path, monkeypatch):
 
 
 @pytest.mark.sim
-def test_an_object_plays_its_episodes_itself(tmp_path):
+def test_a_policy_object_hears_the_instructions_of_its_episodes(tmp_path):
+    """In simulation. The first instruction is made up, to open the policy before the run."""
     given = Still()
     results = roboirg.evaluate(
         given, tasks="PickXtimes", settings="explicit,direct", episodes=1, max_steps=32,

@@ -15,11 +15,10 @@ from roboirg.runs.plan.plan_file import named_plans
 
 APPLICATIONS = sorted(path.parent.name for path in (layout.PACKAGE / "apps").glob("*/__init__.py"))
 
-RUN = "\nfrom roboirg.main import main; sys.argv[0] = 'roboirg'; main()"
-"""Behind `WALK`: the command of the process's arguments."""
-LEARN = "roboirg_learn"
+RUN_COMMAND = "\nfrom roboirg.main import main; sys.argv[0] = 'roboirg'; main()"
+"""Behind `PRINT_COMMANDS`: the command of the process's arguments."""
 
-WALK = """
+PRINT_COMMANDS = """
 left_out = ""
 import importlib.metadata, json, sys
 all_entry_points = importlib.metadata.entry_points
@@ -54,40 +53,51 @@ print(json.dumps([{name: sorted(own) for name, own in commands.items()}, sorted(
 
 
 @pytest.fixture(scope="module")
-def everything():
+def all_commands_and_kinds():
     """The commands and kinds with all applications."""
     # In a process of its own: the program replaces a function of Python's.
-    walked = subprocess.run([sys.executable, "-c", WALK], capture_output=True, check=True)
+    walked = subprocess.run([sys.executable, "-c", PRINT_COMMANDS], capture_output=True, check=True)
     commands, kinds = json.loads(walked.stdout)
     return commands, set(kinds)
 
 
-def test_without_what_learns_its_commands_kinds_and_plans_go_and_nothing_else(everything):
-    shown = f"{WALK}\nfrom roboirg.runs.plan.plan_file import named_plans\nprint(named_plans())"
-    without = shown.replace('left_out = ""', f"left_out = {LEARN!r}", 1)
+def test_without_the_package_that_learns_only_its_commands_kinds_and_plans_are_gone(
+    all_commands_and_kinds,
+):
+    """The package is hidden from a process, which prints what is left; both lists are compared."""
+    print_plans = "from roboirg.runs.plan.plan_file import named_plans\nprint(named_plans())"
+    shown = f"{PRINT_COMMANDS}\n{print_plans}"
+    without = shown.replace('left_out = ""', "left_out = 'roboirg_learn'", 1)
     walked, plans = subprocess.run(
         [sys.executable, "-c", without], capture_output=True, text=True, check=True
     ).stdout.splitlines()
     commands, kinds = json.loads(walked)
     learns = {"learn", "learn listener", "learn policy", "learn reader"}
 
-    assert everything[0].keys() - commands.keys() == learns
-    assert everything[1] - set(kinds) == {"learned", "trained"} == everything[1]
+    assert all_commands_and_kinds[0].keys() - commands.keys() == learns
+    assert (
+        all_commands_and_kinds[1] - set(kinds)
+        == {"learned", "trained"}
+        == all_commands_and_kinds[1]
+    )
     assert set(named_plans()) - set(ast.literal_eval(plans)) == {"paper-small"}
 
 
 @pytest.mark.sim
 @pytest.mark.parametrize("application", slow_but(["show"], APPLICATIONS))
-def test_without_an_application_the_rest_works(application, everything, tmp_path):
-    all_commands, all_kinds = everything
+def test_without_the_folder_of_an_application_the_program_runs_and_lacks_only_its_commands(
+    application, all_commands_and_kinds, tmp_path
+):
+    all_commands, all_kinds = all_commands_and_kinds
     shutil.copytree(layout.PACKAGE, tmp_path / "roboirg")
     shutil.rmtree(tmp_path / "roboirg" / "apps" / application)
     words = "run --policy random --tasks StopCube --settings explicit --episodes 1"
     words += f" --max-steps 5 --workers 0 --out {tmp_path / 'run'}"
 
     played = subprocess.run(
-        [sys.executable, "-c", WALK + RUN, *words.split()], capture_output=True, text=True,
-        check=False, env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        [sys.executable, "-c", PRINT_COMMANDS + RUN_COMMAND, *words.split()],
+        capture_output=True, text=True, check=False,
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
     )  # fmt: skip
 
     assert played.returncode == 0, played.stderr

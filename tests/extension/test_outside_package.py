@@ -41,14 +41,14 @@ LAB = ROOT / "docs" / "add-package.md"
 SETTING_PAGE = ROOT / "docs" / "add-setting.md"
 WITH_SETTING = "PickXtimes"
 """A task of the benchmark to which the recipe's setting applies."""
-NAMES = """\
+PRINT_NAMES = """\
 from roboirg_outside.protocol import PROTOCOL
 from roboirg_outside.setting import SETTING
 from roboirg_outside.task import TASK
 import json
 print(json.dumps([TASK.name, SETTING.name, PROTOCOL.name]))
 """
-UNCHANGED = """\
+CHECK_EPISODES_AND_WORDS = """\
 import sys
 sys.path[:0] = [{language!r}]
 import test_golden
@@ -73,7 +73,7 @@ def recipe(page: str, heading: str, kind: str = "python") -> str:
 
 
 @pytest.fixture(scope="module")
-def outside(tmp_path_factory):
+def python_with_the_packages(tmp_path_factory):
     """Install the recipes as a package into an environment of its own; yield its Python."""
     folder = tmp_path_factory.mktemp("outside")
     package = folder / "project" / "roboirg_outside"
@@ -107,17 +107,19 @@ def outside(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def names(outside):
-    return json.loads(subprocess.run([outside, "-c", NAMES], check=True, stdout=-1).stdout)
+def names_of_additions(python_with_the_packages):
+    return json.loads(
+        subprocess.run([python_with_the_packages, "-c", PRINT_NAMES], check=True, stdout=-1).stdout
+    )
 
 
 @pytest.fixture(scope="module")
-def roboirg(outside, tmp_path_factory):
+def roboirg(python_with_the_packages, tmp_path_factory):
     """Run a command in that environment and return what it prints."""
     folder = tmp_path_factory.mktemp("work")
 
     def run(*words: str) -> str:
-        command = [str(outside), "-m", "roboirg", *words]
+        command = [str(python_with_the_packages), "-m", "roboirg", *words]
         env = {**os.environ, "COLUMNS": "200", "ROBOIRG_CACHE": str(folder / "cache")}
         done = subprocess.run(
             command, cwd=folder, env=env, capture_output=True, text=True, check=False
@@ -129,8 +131,10 @@ def roboirg(outside, tmp_path_factory):
     return run
 
 
-def test_commands_list_what_the_package_adds(roboirg, names):
-    task, setting, protocol = names
+def test_commands_list_the_task_setting_and_protocol_of_an_installed_package(
+    roboirg, names_of_additions
+):
+    task, setting, protocol = names_of_additions
     listed = {line.split()[0]: line for line in roboirg("tasks").splitlines()}
     assert "explicit" in listed[task]
     assert setting in listed[WITH_SETTING]
@@ -138,8 +142,10 @@ def test_commands_list_what_the_package_adds(roboirg, names):
 
 
 @pytest.mark.sim
-def test_an_episode_of_each_is_played_and_shown(roboirg, names):
-    task, setting, *_ = names
+def test_an_episode_of_the_packages_task_and_setting_is_played_and_shown(
+    roboirg, names_of_additions
+):
+    task, setting, *_ = names_of_additions
     roboirg(
         "run", "--policy", "listener", "--tasks", f"{task},{WITH_SETTING}", "--settings", "all",
         "--episodes", "1", "--out", "played",
@@ -170,7 +176,11 @@ def test_the_package_of_the_page_adds_a_task_a_setting_a_kind_a_command_and_a_pl
     assert {record["error"] for record in records} == {None}
 
 
-def test_the_other_episodes_and_words_have_not_changed(outside, names):
-    _, added, _ = names
-    script = UNCHANGED.format(language=str(ROOT / "tests" / "language"), added=(added, "lab"))
-    subprocess.run([outside, "-c", script], check=True)
+def test_an_installed_package_does_not_change_the_benchmarks_own_episodes_and_words(
+    python_with_the_packages, names_of_additions
+):
+    _, added, _ = names_of_additions
+    script = CHECK_EPISODES_AND_WORDS.format(
+        language=str(ROOT / "tests" / "language"), added=(added, "lab")
+    )
+    subprocess.run([python_with_the_packages, "-c", script], check=True)

@@ -24,7 +24,7 @@ finite = st.floats(-1e6, 1e6)
 
 
 @st.composite
-def logs(draw: st.DrawFn) -> ActionLog:
+def any_action_logs(draw: st.DrawFn) -> ActionLog:
     # Nothing may be executed of the last answer.
     lengths = draw(st.lists(st.integers(1, 5), max_size=6)) + draw(st.sampled_from([[], [0]]))
     rows = draw(arrays(np.float64, (sum(lengths), 8), elements=finite))
@@ -36,8 +36,9 @@ def logs(draw: st.DrawFn) -> ActionLog:
 
 
 @settings(max_examples=25)
-@given(log=logs())
-def test_what_is_written_is_read(log, tmp_path_factory):
+@given(log=any_action_logs())
+def test_an_action_log_is_read_back_as_it_was_written(log, tmp_path_factory):
+    """A log has all executed actions, the calls at which they begin, and the end state."""
     folder = tmp_path_factory.mktemp("run")
     digest = write_actions(log, folder)
     assert write_actions(log, folder) == digest
@@ -50,20 +51,21 @@ def test_what_is_written_is_read(log, tmp_path_factory):
     assert len(log.requests) == 0 or len(read.chunks()) == len(log.requests)
 
 
-def a_log(rows: int = 4) -> ActionLog:
+def action_log_of(rows: int = 4) -> ActionLog:
     numbers = np.linspace(0.1, 1.7, rows * 8).reshape(rows, 8)
     return ActionLog("joint_angle", numbers, np.array([0], np.int32), np.zeros(3))
 
 
-def test_a_file_in_place_of_the_folder_is_one_sentence(tmp_path):
+def test_actions_that_cannot_be_written_are_reported_in_one_sentence(tmp_path):
     (tmp_path / "actions").touch()
     with pytest.raises(InvalidValueError, match=r"Cannot write .*\.npz: Not a directory\."):
-        write_actions(a_log(), tmp_path)
+        write_actions(action_log_of(), tmp_path)
 
 
-def test_a_changed_file_is_refused(tmp_path):
-    digest = write_actions(a_log(), tmp_path)
-    other = write_actions(a_log(5), tmp_path)
+def test_a_log_whose_file_was_replaced_by_another_is_refused(tmp_path):
+    """A file is named by the digest of its content, and a record by that name refers to it."""
+    digest = write_actions(action_log_of(), tmp_path)
+    other = write_actions(action_log_of(5), tmp_path)
     action_path(tmp_path, digest).write_bytes(action_path(tmp_path, other).read_bytes())
 
     with pytest.raises(StoreError, match="does not have the content"):
@@ -71,17 +73,17 @@ def test_a_changed_file_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("digest", ["", "../../etc/passwd", "A" * 64, "0" * 63, "0" * 64 + "\n"])
-def test_what_is_no_digest_names_no_file(tmp_path, digest):
+def test_a_name_that_is_no_digest_leads_to_no_file(tmp_path, digest):
     with pytest.raises(StoreError, match="not a digest"):
         action_path(tmp_path, digest)
 
 
-def test_a_missing_file_is_named(tmp_path):
+def test_a_missing_action_log_is_reported_with_its_path(tmp_path):
     with pytest.raises(StoreError, match=f"/actions/00/{'0' * 64}.* are missing"):
         read_actions(tmp_path, "0" * 64)
 
 
-GOOD = {
+ARRAYS_OF_A_GOOD_LOG = {
     "space": np.array("joint_angle"),
     "rows": np.zeros((4, 8)),
     "requests": np.array([0, 2]),
@@ -90,10 +92,10 @@ GOOD = {
 EMPTY_ZIP = b"PK\x05\x06" + bytes(18)
 
 
-def npz(**changes: np.ndarray) -> bytes:
+def good_log_except(**changes: np.ndarray) -> bytes:
     """Return the content of a good log, but for some arrays."""
     file = io.BytesIO()
-    np.savez_compressed(file, **GOOD | changes)  # type: ignore[arg-type]
+    np.savez_compressed(file, **ARRAYS_OF_A_GOOD_LOG | changes)  # type: ignore[arg-type]
     return file.getvalue()
 
 
@@ -103,16 +105,16 @@ def npz(**changes: np.ndarray) -> bytes:
         b"",
         b"no zip",
         EMPTY_ZIP,
-        npz(space=np.array("teleport")),
-        npz(rows=np.zeros((4, 7))),
-        npz(rows=np.full((4, 8), np.nan)),
-        npz(requests=np.array([0, 3, 2])),
-        npz(requests=np.array([1, 2])),
-        npz(requests=np.array([0, 9])),
-        npz(rows=np.zeros((400_000, 8))),
+        good_log_except(space=np.array("teleport")),
+        good_log_except(rows=np.zeros((4, 7))),
+        good_log_except(rows=np.full((4, 8), np.nan)),
+        good_log_except(requests=np.array([0, 3, 2])),
+        good_log_except(requests=np.array([1, 2])),
+        good_log_except(requests=np.array([0, 9])),
+        good_log_except(rows=np.zeros((400_000, 8))),
     ],
 )
-def test_what_is_no_log_is_refused(tmp_path, content):
+def test_a_file_that_is_no_valid_action_log_is_refused(tmp_path, content):
     path = action_path(tmp_path, "0" * 64)
     path.parent.mkdir(parents=True)
     path.write_bytes(content)
@@ -121,14 +123,16 @@ def test_what_is_no_log_is_refused(tmp_path, content):
         read_actions(tmp_path, "0" * 64)
 
 
-def test_what_is_pickled_in_a_file_does_not_run(tmp_path):
+def test_code_pickled_into_an_action_log_is_not_run(tmp_path):
+    """The object would make a folder `evil` when it is read."""
+
     class Evil:
         def __reduce__(self) -> tuple[object, ...]:
             return os.mkdir, (str(tmp_path / "evil"),)
 
     path = action_path(tmp_path, "0" * 64)
     path.parent.mkdir(parents=True)
-    path.write_bytes(npz(requests=np.array([Evil()], dtype=object)))
+    path.write_bytes(good_log_except(requests=np.array([Evil()], dtype=object)))
 
     with pytest.raises(StoreError, match="is not an action log"):
         read_actions(tmp_path, "0" * 64)

@@ -14,7 +14,7 @@ import pytest
 from roboirg.records.episode_log import EpisodeLog, log_path, logged_output, logged_slugs
 
 LONG_WAIT_S = 300.0
-PRINTS = """
+PROGRAM_THAT_PRINTS = """
 import ctypes, logging, os, subprocess, sys, warnings
 from pathlib import Path
 from roboirg.records.episode_log import logged_output
@@ -32,7 +32,7 @@ with logged_output(Path(sys.argv[1])):
     os.write(2, b"\\xff not text\\n")
 print("after")
 """
-FLOODS = """
+PROGRAM_THAT_PRINTS_TOO_MUCH = """
 import sys
 from pathlib import Path
 from roboirg.records.episode_log import logged_output
@@ -42,7 +42,7 @@ with logged_output(Path(sys.argv[1]), 10_000):
         print(f"line {number}")
     print("last words")
 """
-DIES = """
+PROGRAM_THAT_IS_KILLED = """
 import os, signal, sys
 from pathlib import Path
 from roboirg.records.episode_log import logged_output
@@ -50,7 +50,7 @@ with logged_output(Path(sys.argv[1])):
     print("my last words")
     os.kill(os.getpid(), signal.SIGKILL)
 """
-CLOSES = """
+PROGRAM_THAT_CLOSES_ITS_OUTPUT = """
 import os, sys
 from pathlib import Path
 from roboirg.records.episode_log import logged_output
@@ -62,7 +62,7 @@ print("after")
 """
 
 
-def run(code: str, path: Path) -> subprocess.CompletedProcess[bytes]:
+def finished_program(code: str, path: Path) -> subprocess.CompletedProcess[bytes]:
     return subprocess.run(
         [sys.executable, "-c", code, str(path)],
         capture_output=True,
@@ -72,7 +72,7 @@ def run(code: str, path: Path) -> subprocess.CompletedProcess[bytes]:
 
 
 def test_all_ways_to_print_end_in_the_log_and_not_on_the_terminal(tmp_path):
-    done = run(PRINTS, tmp_path / "logs" / "a.txt")
+    done = finished_program(PROGRAM_THAT_PRINTS, tmp_path / "logs" / "a.txt")
     assert (done.returncode, done.stdout, done.stderr) == (0, b"before\nafter\n", b"")
 
     printed = (tmp_path / "logs" / "a.txt").read_bytes()
@@ -83,8 +83,8 @@ def test_all_ways_to_print_end_in_the_log_and_not_on_the_terminal(tmp_path):
     assert b"after" not in printed
 
 
-def test_a_flood_is_cut_in_the_middle(tmp_path):
-    assert run(FLOODS, tmp_path / "a.txt").returncode == 0
+def test_a_log_that_would_be_too_long_keeps_its_begin_and_its_end(tmp_path):
+    assert finished_program(PROGRAM_THAT_PRINTS_TOO_MUCH, tmp_path / "a.txt").returncode == 0
 
     text = (tmp_path / "a.txt").read_text()
     assert len(text) <= 10_000
@@ -93,18 +93,21 @@ def test_a_flood_is_cut_in_the_middle(tmp_path):
     assert text.count("\n[roboirg: the middle of this log is left out]\n") == 1
 
 
-def test_what_a_killed_process_printed_is_there(tmp_path):
-    assert run(DIES, tmp_path / "a.txt").returncode == -signal.SIGKILL
+def test_the_last_words_of_a_killed_process_are_in_its_log(tmp_path):
+    assert (
+        finished_program(PROGRAM_THAT_IS_KILLED, tmp_path / "a.txt").returncode == -signal.SIGKILL
+    )
     assert (tmp_path / "a.txt").read_text() == "my last words\n"
 
 
-def test_closed_descriptors_do_not_matter(tmp_path):
-    done = run(CLOSES, tmp_path / "a.txt")
+def test_a_policy_that_closes_its_output_does_not_silence_what_comes_after_it(tmp_path):
+    done = finished_program(PROGRAM_THAT_CLOSES_ITS_OUTPUT, tmp_path / "a.txt")
     assert (done.returncode, done.stdout) == (0, b"after\n")
     assert (tmp_path / "a.txt").read_text() == "hello\n"
 
 
-def test_the_size_is_bounded_while_the_episode_goes_on(tmp_path):
+def test_a_log_never_grows_over_its_limit_although_a_million_bytes_are_printed(tmp_path):
+    """The limit is 1,000 bytes, also while the episode is still going on."""
     with EpisodeLog(tmp_path / "a.txt", 1_000) as log:
         os.write(log.descriptor, b"x" * 1_000_000)
         deadline = time.monotonic() + LONG_WAIT_S
@@ -127,13 +130,13 @@ def test_an_episode_that_prints_nothing_has_no_log(tmp_path):
     with EpisodeLog(log_path(tmp_path, "loud")) as log:
         os.write(log.descriptor, b"words")
     assert logged_slugs(tmp_path) == {"loud"}
-    # Played again, it prints nothing.
+    # The same episode is played again and prints nothing: the old log is gone.
     with EpisodeLog(log_path(tmp_path, "loud")):
         assert logged_slugs(tmp_path) == frozenset()
     assert logged_slugs(tmp_path) == frozenset()
 
 
-def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path):
+def test_a_log_that_cannot_be_written_is_reported_in_one_sentence(tmp_path):
     (tmp_path / "logs").write_text("a file")
     with pytest.raises(Exception, match=r"^Cannot write the log .*a\.txt: "):
         EpisodeLog(log_path(tmp_path, "a"))

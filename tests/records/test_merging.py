@@ -19,11 +19,12 @@ from roboirg.records.run_files import PLAN_FILE, earlier_plans
 from roboirg.records.store import read_records
 
 
-def some(count: int = 4) -> list[Record]:
+def played_records(count: int = 4) -> list[Record]:
     return [FakePlay()(job) for job in small_plan(count).jobs()]
 
 
-def test_two_halves_make_the_whole(tmp_path):
+def test_merging_two_parts_of_a_run_gives_the_whole_without_duplicates(tmp_path):
+    """Of 8 records the parts have the first 5 and the last 5, so 2 twice."""
     whole = tmp_path / "whole"
     fake_run(whole)
     records = read_records(whole)
@@ -41,16 +42,16 @@ def test_two_halves_make_the_whole(tmp_path):
     assert plan.read_bytes() == (whole / PLAN_FILE).read_bytes()
 
 
-LOST = {"outcome": "error", "error": "connection", "server_version": None}
+WITHOUT_CONNECTION = {"outcome": "error", "error": "connection", "server_version": None}
 
 
-def test_a_verdict_beats_an_error(tmp_path):
-    won, unplayed, *_ = some()
+def test_merging_keeps_a_verdict_rather_than_an_error_and_the_first_of_two_errors(tmp_path):
+    won, unplayed, *_ = played_records()
     connection = replace(unplayed, outcome="error", error="connection", cause="connection: refused")
     sources = [
-        fill(tmp_path / "a", replace(won, **LOST), connection),
+        fill(tmp_path / "a", replace(won, **WITHOUT_CONNECTION), connection),
         fill(tmp_path / "b", won, replace(connection, cause="connection: lost")),
-        fill(tmp_path / "c", replace(won, **LOST)),
+        fill(tmp_path / "c", replace(won, **WITHOUT_CONNECTION)),
     ]
 
     merged = merge_runs(sources, tmp_path / "out")
@@ -59,8 +60,8 @@ def test_a_verdict_beats_an_error(tmp_path):
     assert (merged.added, merged.duplicates, merged.conflicts) == (2, 3, ())
 
 
-def test_of_two_verdicts_the_first_is_kept_and_the_other_a_conflict(tmp_path):
-    record = some()[1]
+def test_merging_keeps_the_first_of_two_verdicts_and_reports_the_other_as_a_conflict(tmp_path):
+    record = played_records()[1]
     fell = replace(record, outcome="failure", cause="it fell")
     won = replace(record, outcome="success", cause=None)
 
@@ -71,9 +72,9 @@ def test_of_two_verdicts_the_first_is_kept_and_the_other_a_conflict(tmp_path):
     assert (identity_key(conflict), conflict.outcome) == (identity_key(record), "success")
 
 
-def test_only_what_was_told_can_be_of_mixed_code(tmp_path):
-    """Another policy has versions of its own, another split seeds of its own."""
-    first, second, third, *_ = (replace(record, server_version="8") for record in some())
+def test_merging_warns_of_verdicts_by_other_code_but_not_in_episodes_without_instruction(tmp_path):
+    """The silent one is of another policy and split, whose versions and seeds may differ."""
+    first, second, third, *_ = (replace(record, server_version="8") for record in played_records())
     second = replace(second, verdict_code="old")
     elsewhere = {"arm": "silent", "verdict_code": "older", "split": "val", "episode": 0, "seed": 5}
     silent = replace(with_version(third, "old"), policy="other", server_version="9", **elsewhere)
@@ -89,7 +90,7 @@ def test_only_what_was_told_can_be_of_mixed_code(tmp_path):
 
 
 def test_videos_actions_and_logs_are_copied_with_the_records_that_are_kept(tmp_path):
-    first, second, *_ = some()
+    first, second, *_ = played_records()
     filmed = replace(first, video="videos/x.mp4", action_log="ab" * 32)
     gone = replace(second, video="videos/gone.mp4")
     error = replace(filmed, outcome="error", error="connection")
@@ -131,8 +132,9 @@ def test_videos_actions_and_logs_are_copied_with_the_records_that_are_kept(tmp_p
         ("seed", 5, "PickXtimes test 0 whose seed is 5"),
     ],
 )
-def test_versions_are_not_mixed(tmp_path, field, value, words):
-    record = replace(some()[0], words="PickXtimes/test@1b")
+def test_runs_of_other_words_servers_or_scenes_are_not_merged(tmp_path, field, value, words):
+    """Neither into a new folder nor into one of them; nothing is written."""
+    record = replace(played_records()[0], words="PickXtimes/test@1b")
     odd = replace(record, **{field: value})
     one = fill(tmp_path / "a", record)
     other = fill(tmp_path / "b", odd)
@@ -144,14 +146,14 @@ def test_versions_are_not_mixed(tmp_path, field, value, words):
 
 
 def test_a_run_is_not_merged_into_itself(tmp_path):
-    folder = fill(tmp_path / "a", *some())
+    folder = fill(tmp_path / "a", *played_records())
     with pytest.raises(InvalidValueError, match="is one of the runs"):
         merge_runs([folder], tmp_path / "b/../a")
 
 
 def test_runs_with_two_wording_files_can_be_merged(tmp_path):
     """Their words differ, as they should."""
-    usual = some()[0]
+    usual = played_records()[0]
     records = []
     for name in ("0a", "1b"):
         options = dataclasses.replace(usual.options, wordings=f"mine@{name}")

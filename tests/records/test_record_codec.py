@@ -22,7 +22,7 @@ from roboirg.records.store import (
 )
 
 
-def write(folder: Path, *lines: bytes) -> Path:
+def folder_with_lines(folder: Path, *lines: bytes) -> Path:
     (folder / RECORDS_FILE).write_bytes(b"".join(lines))
     return folder
 
@@ -30,7 +30,7 @@ def write(folder: Path, *lines: bytes) -> Path:
 def test_a_damaged_line_loses_only_its_episode_and_is_reported(tmp_path, caplog):
     fake_run(tmp_path)
     lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
-    write(tmp_path, *lines[:2], lines[2][:40] + b"\x00\xff\n", *lines[3:])
+    folder_with_lines(tmp_path, *lines[:2], lines[2][:40] + b"\x00\xff\n", *lines[3:])
     with RecordStore(tmp_path) as store:
         assert (len(store.stored), store.torn) == (7, b"")
 
@@ -47,10 +47,11 @@ def test_a_damaged_line_loses_only_its_episode_and_is_reported(tmp_path, caplog)
     assert tuple(index.records(index.newest)) == records
 
 
-def test_an_unfinished_line_is_reported_to_readers(tmp_path, caplog):
+def test_a_last_line_that_was_cut_off_is_reported_and_the_next_run_repairs_it(tmp_path, caplog):
+    """Of 8 records the last was cut after 40 bytes."""
     fake_run(tmp_path)
     lines = (tmp_path / RECORDS_FILE).read_bytes().splitlines(keepends=True)
-    write(tmp_path, *lines[:-1], lines[-1][:40])
+    folder_with_lines(tmp_path, *lines[:-1], lines[-1][:40])
     run = StoredRun(tmp_path, read_summary)
 
     assert len(run.newest) == 7
@@ -64,7 +65,8 @@ def test_an_unfinished_line_is_reported_to_readers(tmp_path, caplog):
     StoredRun(tmp_path, read_summary).file.refuse_damage()
 
 
-def test_results_are_records_without_the_course(tmp_path):
+def test_results_have_the_fields_of_records_without_what_happened_in_the_episode(tmp_path):
+    """They are read faster; would find a field that differs."""
     fake_run(tmp_path)
     records = read_records(tmp_path)
 
@@ -76,7 +78,8 @@ def test_results_are_records_without_the_course(tmp_path):
         assert (result.slug, result.options) == (record.slug, record.options)
 
 
-def test_the_index_knows_a_job_by_all_its_fields():
+def test_episodes_are_the_same_only_if_all_options_agree_wherever_policy_and_words_lie():
+    """A run skips what it has played; would find an option that this comparison forgets."""
     job = small_plan().jobs()[0]
     not_counted = {"ref", "wordings_file"}
     assert len(identity_key(job)) == len(set(Job.__struct_fields__) - not_counted)

@@ -40,8 +40,8 @@ from roboirg.util.atomic_write import locked, write_atomically
 
 
 @pytest.mark.parametrize("field", Versions._fields[1:])
-def test_each_version_that_differs_is_refused_in_one_sentence(field: str) -> None:
-    """What a policy is has tests of its own; an unknown version is no other one."""
+def test_a_run_is_refused_if_any_of_its_versions_differs_unless_it_is_unknown(field: str) -> None:
+    """As those of the language, the environment and the server."""
     first = Versions(**{field: "a"})
     words = f"^x whose {field.replace('_', ' ')} is a, but now it is b; choose another --out.$"
     with pytest.raises(StoreError, match=words):
@@ -50,24 +50,25 @@ def test_each_version_that_differs_is_refused_in_one_sentence(field: str) -> Non
 
 
 @functools.cache
-def some_records() -> tuple[Record, ...]:
+def eight_records() -> tuple[Record, ...]:
     return tuple(fake_record(job) for job in small_plan().jobs())
 
 
 @given(st.data())
 @settings(max_examples=40, deadline=None)
-def test_a_file_cut_anywhere_loses_only_the_line_that_was_cut(data):
+def test_a_file_of_records_cut_anywhere_loses_only_the_line_that_was_cut(data):
+    """As by a crash. What is left of that line is kept in a file of its own."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        path = fill(folder, *some_records()) / RECORDS_FILE
+        path = fill(folder, *eight_records()) / RECORDS_FILE
         whole = path.read_bytes()
         ends = [place for place, byte in enumerate(whole) if byte == ord("\n")]
         cut = data.draw(st.integers(0, len(whole)) | st.sampled_from(ends))
         path.write_bytes(whole[:cut])
         # A record is there as soon as its last brace is; its newline may be missing.
         count = sum(end <= cut for end in ends)
-        complete = some_records()[:count]
-        last = some_records()[-1]
+        complete = eight_records()[:count]
+        last = eight_records()[-1]
 
         assert tuple(iterate_records(folder)) == complete
         with RecordStore(folder) as store:
@@ -83,7 +84,7 @@ def test_a_file_cut_anywhere_loses_only_the_line_that_was_cut(data):
             assert (folder / TORN_FILE).read_bytes() == torn + b"\n"
 
 
-def test_every_torn_line_is_kept(tmp_path):
+def test_unfinished_lines_of_several_crashes_are_all_kept_in_a_file_of_their_own(tmp_path):
     for torn in (b'{"policy": "a', b'{"policy": "b'):
         with (tmp_path / RECORDS_FILE).open("ab") as file:
             file.write(torn)
@@ -92,7 +93,7 @@ def test_every_torn_line_is_kept(tmp_path):
     assert (tmp_path / RECORDS_FILE).read_bytes() == b""
 
 
-def test_a_second_writer_is_told_who_writes(tmp_path):
+def test_a_second_run_in_the_same_folder_is_refused_with_the_process_of_the_first(tmp_path):
     (tmp_path / LOCK_FILE).write_text("12345678901234\n")  # of an earlier one, which was killed
     with (
         RecordStore(tmp_path),
@@ -110,7 +111,9 @@ def test_a_second_writer_is_told_who_writes(tmp_path):
         lambda folder: lock_server([Endpoint("h", 1)], wait=0, folder=folder),
     ],
 )
-def test_a_file_system_without_locks_is_named(tmp_path, take):
+def test_a_file_system_without_locks_is_reported_with_the_advice_to_use_a_local_disk(
+    tmp_path, take
+):
     with (
         patch("fcntl.flock", side_effect=OSError(errno.ENOLCK, "No locks available")),
         pytest.raises(RoboIRGError, match=r"Cannot lock .*lock \(No locks .* local disk\.$"),
@@ -118,8 +121,8 @@ def test_a_file_system_without_locks_is_named(tmp_path, take):
         take(tmp_path)
 
 
-def test_another_schema_version_is_refused_and_nothing_changes(tmp_path):
-    whole = (fill(tmp_path, *some_records()) / RECORDS_FILE).read_bytes()
+def test_records_of_a_newer_format_are_refused_and_stay_as_they_are(tmp_path):
+    whole = (fill(tmp_path, *eight_records()) / RECORDS_FILE).read_bytes()
     newer = whole.replace(b'"schema_version":1', b'"schema_version":7', 1)
     (tmp_path / RECORDS_FILE).write_bytes(newer)
     with pytest.raises(StoreError, match=r"line 1 has schema version 7, .* reads only version 1;"):
@@ -138,7 +141,7 @@ def test_another_schema_version_is_refused_and_nothing_changes(tmp_path):
         (b"[]", "line 1 has schema version None"),
     ],
 )
-def test_a_line_that_is_no_record_is_told_with_its_number(tmp_path, line, sentence):
+def test_a_line_that_is_no_record_is_reported_with_its_number(tmp_path, line, sentence):
     (tmp_path / RECORDS_FILE).write_bytes(line + b"\n")
     for read in (read_records, read_results, read_index):
         with pytest.raises(StoreError, match=sentence):
@@ -151,36 +154,36 @@ def test_a_line_that_is_no_record_is_told_with_its_number(tmp_path, line, senten
      {"usage": {"cost_usd": math.inf}}, {"environment": EnvironmentOptions(max_steps=10**22)}],
     ids=str,
 )  # fmt: skip
-def test_what_could_not_be_read_again_is_not_written(tmp_path, fields):
-    record = replace(some_records()[0], **fields)
+def test_a_record_with_a_number_that_could_not_be_read_back_is_not_written(tmp_path, fields):
+    record = replace(eight_records()[0], **fields)
     with RecordStore(tmp_path) as store, pytest.raises(StoreError, match=r"is not a record"):
         store.append(record)
     assert (tmp_path / RECORDS_FILE).read_bytes() == b""
 
 
-def test_the_newest_record_of_a_job_wins(tmp_path):
-    first, *others = some_records()
+def test_of_two_records_of_an_episode_the_newer_is_read(tmp_path):
+    first, *others = eight_records()
     newer = replace(first, steps=1234)
 
     fill(tmp_path, first, *others, newer)
 
-    assert read_records(tmp_path) == (newer, *others)  # in the place of the first
+    assert read_records(tmp_path) == (newer, *others)  # where the older one stood
 
 
-def test_no_records_is_one_sentence(tmp_path):
+def test_a_folder_without_records_is_reported_in_one_sentence(tmp_path):
     with pytest.raises(StoreError, match="There are no records in"):
         read_records(tmp_path / "nowhere")
 
 
-def test_atomic_writing_replaces_and_leaves_no_part(tmp_path):
+def test_atomic_writing_replaces_a_file_and_leaves_no_temporary_one(tmp_path):
     for text in ("one", "two"):
         write_atomically(tmp_path / "x.txt", text)
     assert [path.name for path in tmp_path.iterdir()] == ["x.txt"]
     assert (tmp_path / "x.txt").read_text() == "two"
 
 
-def test_a_full_disk_is_one_sentence_and_costs_no_record(tmp_path):
-    first = fill(tmp_path / "whole", *some_records()[:3]) / RECORDS_FILE
+def test_a_full_disk_ends_the_run_in_one_sentence_and_loses_no_earlier_record(tmp_path):
+    first = fill(tmp_path / "whole", *eight_records()[:3]) / RECORDS_FILE
     # The kernel takes a part of the fourth record and refuses the rest, as a full disk does.
     limit = first.stat().st_size + 100
     folder = tmp_path / "run"
@@ -225,9 +228,9 @@ def test_a_folder_of_a_run_may_be_a_link(tmp_path):
     (tmp_path / "disk").mkdir()
     (tmp_path / "run").symlink_to(tmp_path / "disk")
 
-    fill(tmp_path / "run", *some_records())
+    fill(tmp_path / "run", *eight_records())
 
-    assert read_records(tmp_path / "disk") == some_records()
+    assert read_records(tmp_path / "disk") == eight_records()
 
 
 def test_a_lock_that_is_a_link_is_refused(tmp_path):

@@ -55,7 +55,7 @@ class Searcher(Hostile):
                 with contextlib.suppress(RuntimeError, ReferenceError):
                     texts |= {value for value in values if issubclass(type(value), str)}
         self.metadata = {
-            "world": "PaperWorld" in types,
+            "world": "FakeWorld" in types,
             "job": "Job" in types,
             "goal": any(NEEDLE[::-1] in text for text in texts),
         }

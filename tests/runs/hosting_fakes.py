@@ -1,4 +1,4 @@
-"""Worlds of paper for hosted policies, with secrets, and the run that the kill tests disturb."""
+"""Worlds without a simulator for hosted policies, with secrets, and the run that is killed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LENGTH = 24
 WHISPER = "the goal is the cube with the token {} of seed 8675309"
 
 
-class PaperWorld:
+class FakeWorld:
     """Ends after `LENGTH` steps; its events tell the policy's actions, and the verdict too."""
 
     render_device = "none"
@@ -73,8 +73,8 @@ class PaperWorld:
 
 
 @dataclass(frozen=True)
-class PaperRunner(EpisodeRunner):
-    """Plays in worlds of paper.
+class FakeWorldRunner(EpisodeRunner):
+    """Plays in worlds without a simulator.
 
     Attributes:
         seconds: how long a chunk takes.
@@ -88,7 +88,7 @@ class PaperRunner(EpisodeRunner):
         if self.notes is not None:
             (self.notes / f"worker-{os.getpid()}").touch()
         kept = rollout.make_env
-        rollout.make_env = lambda prepared, _needs: PaperWorld(prepared.job, self.seconds)
+        rollout.make_env = lambda prepared, _needs: FakeWorld(prepared.job, self.seconds)
         try:
             return EpisodeRunner.__call__(self, job)
         finally:
@@ -96,7 +96,7 @@ class PaperRunner(EpisodeRunner):
 
 
 @dataclass(frozen=True)
-class PatientRunner(PaperRunner):
+class PatientRunner(FakeWorldRunner):
     """Plays when as many worlds as wanted have come.
 
     Attributes:
@@ -189,7 +189,7 @@ class Picky(BatchedDice):
         return [rng.standard_normal((4, 8)) for rng, _ in states]
 
 
-def paper_plan(policy: str, episodes: int = 8, seeds: int = 1, **options: Any) -> Plan:
+def fake_world_plan(policy: str, episodes: int = 8, seeds: int = 1, **options: Any) -> Plan:
     return Plan(
         policies=(f"{Path(__file__).stem}:{policy}" if policy.isidentifier() else policy,),
         tasks=("PickXtimes",),
@@ -200,8 +200,8 @@ def paper_plan(policy: str, episodes: int = 8, seeds: int = 1, **options: Any) -
     )
 
 
-def paper_runner(plan: Plan, folder: Path, seconds: float = 0.0) -> PaperRunner:
-    return PaperRunner(
+def fake_world_runner(plan: Plan, folder: Path, seconds: float = 0.0) -> FakeWorldRunner:
+    return FakeWorldRunner(
         folder,
         policy_timeout_s=plan.hosting.policy_timeout_s,
         hosting=plan.hosting.settings,
@@ -210,7 +210,7 @@ def paper_runner(plan: Plan, folder: Path, seconds: float = 0.0) -> PaperRunner:
     )
 
 
-KILLED_PLAN = paper_plan("BatchedDice", 25, policy_timeout_s=60.0)
+KILLED_PLAN = fake_world_plan("BatchedDice", 25, policy_timeout_s=60.0)
 
 if __name__ == "__main__":
     out = Path(sys.argv[1])
@@ -218,4 +218,4 @@ if __name__ == "__main__":
     # As if it had been opened, which would take most of the time between two kills.
     opened = {"policies": (dataclasses.replace(KILLED_PLAN.policies[0], version="1"),)}
     plan = KILLED_PLAN.model_copy(update=opened)
-    run_plan(plan, out, paper_runner(plan, out, 0.02), LocalProcesses(3))
+    run_plan(plan, out, fake_world_runner(plan, out, 0.02), LocalProcesses(3))

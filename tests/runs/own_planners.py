@@ -8,7 +8,7 @@ import numpy as np
 from roboirg.core.observations import PICTURE_SIZE
 
 
-class Pointer:
+class StaysThenPicksUp:
     """Names two subgoals of a form, and then the second again."""
 
     cameras = ("front",)
@@ -41,14 +41,14 @@ class Pointer:
         }
 
 
-class Insider(Pointer):
+class AsksForTheWorld(StaysThenPicksUp):
     """Asks for the world."""
 
     def attach(self, env):
         self.env = env
 
 
-class Quitter(Pointer):
+class EndsItsProcess(StaysThenPicksUp):
     """Ends its process."""
 
     def plan(self, observation, step):

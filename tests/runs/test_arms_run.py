@@ -19,23 +19,27 @@ from roboirg.runs.plan.stored_plans import write_plan
 from roboirg.runs.run.executor import InProcess
 from roboirg.runs.run.runner import run_plan
 
-ARMS = "told,other-goal,silent,silent-empty,scrambled,paraphrase:3,again"
+ALL_ARMS = "told,other-goal,silent,silent-empty,scrambled,paraphrase:3,again"
 
 
-def plan_of(arms: str = ARMS, **changes: object) -> Plan:
+def plan_with_arms(arms: str = ALL_ARMS, **changes: object) -> Plan:
     fields = {"tasks": "PickXtimes,VideoRepick", "settings": "direct", "episodes": "3", **changes}
     return make_plan(["oracle"], arms=arms, **fields)  # type: ignore[arg-type]
 
 
-def play(plan: Plan, folder: Path) -> Path:
+def folder_of_fake_run(plan: Plan, folder: Path) -> Path:
     folder.mkdir(exist_ok=True)
     write_plan(plan, folder)
     fake_run(folder, plan)
     return folder
 
 
-def test_what_has_no_other_goal_is_left_out_and_counted():
-    plan = plan_of()
+def test_a_scene_without_a_second_goal_lacks_the_arm_other_goal_and_is_counted_as_left_out():
+    """An arm is a way to tell an episode: as it is, with another goal, in silence, ...
+
+    VideoRepick has no other goal, nor have scenes of PickXtimes with a single cube.
+    """
+    plan = plan_with_arms()
     jobs = plan.jobs()
     assert len({identity_key(job) for job in jobs}) == len(jobs)
     assert len({job.slug for job in jobs}) == len(jobs)
@@ -43,15 +47,16 @@ def test_what_has_no_other_goal_is_left_out_and_counted():
     repick = [job.arm for job in jobs if job.task == "VideoRepick" and job.episode == 0]
     assert "other-goal" not in repick
     assert set(repick) == set(plan.arms) - {"other-goal"}
-    # None in VideoRepick, nor in the scenes of PickXtimes that have one cube.
+    # Three episodes of VideoRepick, and two of PickXtimes.
     assert plan.left_out(jobs) == {"other-goal": 5}
-    assert plan_of("told").left_out(plan_of("told").jobs()) == {}
+    assert plan_with_arms("told").left_out(plan_with_arms("told").jobs()) == {}
 
-    explicit = plan_of("told,paraphrase:2", settings="explicit")
+    explicit = plan_with_arms("told,paraphrase:2", settings="explicit")
     assert explicit.left_out(explicit.jobs()) == {"paraphrase-2": 6}
 
 
-def test_arms_of_the_command_line_and_of_plan_files(tmp_path):
+def test_arms_are_read_from_plan_files_and_from_the_command_line(tmp_path):
+    """paraphrase:2 stands for two arms. Unknown arms are refused; left out ones are counted."""
     path = tmp_path / "arms.yaml"
     path.write_text("policies: oracle\ntasks: StopCube\narms: [told, paraphrase:2, again]\n")
     fields = read_plan_file(str(path))
@@ -60,9 +65,9 @@ def test_arms_of_the_command_line_and_of_plan_files(tmp_path):
     assert made.arms == ("told", "paraphrase-1", "paraphrase-2", "again")
     assert make_plan(["oracle"], tasks="StopCube").arms == ("told",)
     with pytest.raises(UnknownNameError, match="'silend'; known"):
-        plan_of("told,silend")
+        plan_with_arms("told,silend")
     with pytest.raises(InvalidValueError, match="arm"):
-        plan_of(",")
+        plan_with_arms(",")
 
     printed = call(
         "run", "--policy", "oracle", "--tasks", "VideoRepick", "--arms", "told,other-goal",
@@ -72,7 +77,11 @@ def test_arms_of_the_command_line_and_of_plan_files(tmp_path):
 
 
 @pytest.mark.sim
-def test_runs_with_arms_are_verified_and_forged_goals_are_found(tmp_path):
+def test_verifying_a_run_plays_other_goals_again_and_finds_a_forged_record(tmp_path):
+    """The listener does what it hears; `habit` does the original goal, whatever it hears.
+
+    In a record of `habit` *original: success* is replaced by *failure*.
+    """
     from roboirg.apps.leaderboard.run_verification import verify_run
     from roboirg.runs.play.rollout import EpisodeRunner
 

@@ -24,17 +24,21 @@ def job_of(spec: str) -> Job:
               options=InstructionOptions("explicit"))  # fmt: skip
 
 
-def play(spec: str) -> Record:
+def record_of_episode(spec: str) -> Record:
     with HostPool(HostSettings()) as pool, pool.connect() as line:
         return EpisodeRunner(Path(), hosts=line).play_once(job_of(spec))[0]
 
 
 @pytest.mark.sim
-def test_it_sees_pictures_and_words_only():
-    spec = "planner:own_planners:Pointer"
+def test_a_users_planner_runs_in_a_process_without_the_world_and_gets_pictures_and_words():
+    """A planner names subgoals, which scripted hands carry out; these do know the world.
+
+    This one names *remain static* and then *pick up the container*, which hands refuse five times.
+    """
+    spec = "planner:own_planners:StaysThenPicksUp"
     assert read_policy(spec).is_hosted
 
-    result = play(spec)
+    result = record_of_episode(spec)
     assert result.outcome == "failure", result.cause
     assert [(subgoal.text, subgoal.ended) for subgoal in result.subgoals] == [
         ("remain static for 5 steps", "done"),
@@ -43,9 +47,9 @@ def test_it_sees_pictures_and_words_only():
 
     spent = result.usage
     assert spent["process"] != os.getpid()
-    # Each end is told once, the last one never.
+    # It learns how each subgoal ended, but for the last: one that was done, four refused.
     assert (spent["refused"], spent["named"], spent["ends"]) == (5, 0, 1 + 4)
-    assert spent["pictures"] == 1 + 5  # one where it named the first, and five refusals
+    assert spent["pictures"] == 1 + 5  # one where it named the first, five before refusals
     assert result.policy_metadata["planner"] == {"world": False}
 
     # The whole is marked as it acts by the simulator's state, and described alike beforehand.
@@ -55,34 +59,38 @@ def test_it_sees_pictures_and_words_only():
 
 
 @pytest.mark.sim
-def test_what_it_breaks_ends_its_own_episode():
-    result = play("planner:own_planners:Quitter")
+def test_a_planner_that_ends_its_process_loses_its_own_episode_as_an_error_of_the_policy():
+    result = record_of_episode("planner:own_planners:EndsItsProcess")
     assert (result.outcome, result.error) == ("error", "policy")
 
 
 @pytest.mark.sim
-def test_one_that_is_declared_runs_next_to_the_world():
-    spec = "privileged:planner:own_planners:Insider"
+def test_a_planner_that_needs_the_world_runs_next_to_it_only_if_declared_privileged():
+    """It has a method attach(env). Would find one that reads the goal without being marked."""
+    spec = "privileged:planner:own_planners:AsksForTheWorld"
     assert not read_policy(spec).is_hosted
-    assert play(spec).usage["process"] == os.getpid()
+    assert record_of_episode(spec).usage["process"] == os.getpid()
 
-    # So does any in a run whose policies share the worker's process.
-    shared = EpisodeRunner(Path()).play_once(job_of("planner:own_planners:Pointer"))[0]
+    # In a run whose policies share the worker's process, every planner runs there.
+    shared = EpisodeRunner(Path()).play_once(job_of("planner:own_planners:StaysThenPicksUp"))[0]
     assert (shared.usage["process"], len(shared.subgoals)) == (os.getpid(), 2)
     assert shared.policy_version == "mine-1 + scripted hands"
     with pytest.raises(InvalidValueError, match="has attach"):
-        make_policy("planner:own_planners:Insider", 0)
+        make_policy("planner:own_planners:AsksForTheWorld", 0)
 
 
 @pytest.mark.parametrize(
     ("spec", "words"),
     [
-        ("planner:own_planners:Insider", "has attach()"),
+        ("planner:own_planners:AsksForTheWorld", "has attach()"),
         ("planner:own_planners:Nothing", "has no class 'Nothing'"),
         ("planner:own_planners:NoPlanner", "class NoPlanner has no method plan()"),
-        ("planner:own_planners:Pointer?keep=2", "no option of planner:own_planners:Pointer"),
+        (
+            "planner:own_planners:StaysThenPicksUp?keep=2",
+            "no option of planner:own_planners:StaysThenPicksUp",
+        ),
     ],
 )
-def test_wrong_ones_are_one_sentence(spec, words):
+def test_a_planner_that_cannot_be_used_is_refused_with_the_reason(spec, words):
     with pytest.raises(InvalidValueError, match=re.escape(words)):
         open_policy(read_policy(spec))

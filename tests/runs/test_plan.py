@@ -35,7 +35,8 @@ from roboirg.tasks.splits.splits import get_episode
 from roboirg.util.csv_text import csv_lines
 
 
-def test_a_number_is_the_first_episodes_and_a_list_is_a_list():
+def test_episodes_are_given_as_a_count_a_list_ranges_or_all():
+    """4 is the first four; 7 with a comma is a list of one. *train* has 100 episodes."""
     assert parse_episodes("4", "test", ()) == (0, 1, 2, 3)
     assert parse_episodes("0,3,5-9", "test", ()) == (0, 3, 5, 6, 7, 8, 9)
     assert parse_episodes("7,", "test", ()) == (7,)
@@ -50,14 +51,15 @@ def test_a_number_is_the_first_episodes_and_a_list_is_a_list():
         "0-999999999", "9" * 5000, "0," + "9" * 5000, "a" * 5000,
     ],
 )  # fmt: skip
-def test_what_is_no_list_is_one_sentence(text):
+def test_a_text_that_is_no_list_of_episodes_is_refused_in_one_short_sentence(text):
     with pytest.raises(InvalidValueError) as caught:
         parse_episodes(text, "test", ())
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 200
 
 
-def test_difficulties_select_the_episodes_that_have_them_in_every_task():
+def test_a_difficulty_selects_the_episodes_that_have_it_in_every_task():
+    """In the split *test* every fourth is hard: 3, 7, ...; in *val* tasks differ in part."""
     tasks = tuple(all_tasks())
     hard = parse_episodes("hard", "test", tasks)
     assert hard == tuple(range(3, 50, 4))
@@ -84,19 +86,20 @@ def test_difficulties_select_the_episodes_that_have_them_in_every_task():
         (parse_numbers, ("policy seed", "0-999999999"), "1,000,000,000 numbers; at most 10,000"),
     ],
 )
-def test_sentences_about_numbers_say_what_would_be_right(parse, given, words):
+def test_a_refused_list_of_numbers_comes_with_what_to_write_instead(parse, given, words):
     with pytest.raises(InvalidValueError, match=words):
         parse(*given)
 
 
 @pytest.mark.parametrize("text", ["all", "ALL", "all,explicit", "direct, All"])
-def test_all_means_all_wherever_it_stands(text):
+def test_the_word_all_in_a_list_stands_for_everything_in_any_case(text):
     assert make_plan(["random"], settings=text, episodes="1").settings == ("all",)
     words = text.replace("explicit", "BinFill").replace("direct", "StopCube")
     assert make_plan(["random"], tasks=words, episodes="1").tasks == tuple(all_tasks())
 
 
-def test_tasks_beside_the_benchmark_are_asked_for_by_name_or_suite():
+def test_tasks_of_the_real_study_are_played_only_if_named_by_task_or_suite():
+    """PutInBox and PickByCount are the suite *real*; *all* are the benchmark's tasks alone."""
     real = ("PutInBox", "PickByCount")
     assert make_plan(["random"], tasks="PickByCount,Real", episodes="1").tasks == real[::-1]
 
@@ -106,7 +109,8 @@ def test_tasks_beside_the_benchmark_are_asked_for_by_name_or_suite():
         make_plan(["random"], tasks="all,reall")
 
 
-def test_all_settings_are_those_that_each_episode_can_be_told_in():
+def test_a_plan_plays_each_episode_in_every_setting_that_can_express_it_explicit_last():
+    """A setting is a way to put an instruction; not every scene can be told in each."""
     jobs = make_plan(["random"], episodes="6").jobs()
     for task in all_tasks():
         for episode in range(6):
@@ -116,7 +120,8 @@ def test_all_settings_are_those_that_each_episode_can_be_told_in():
             assert played == [*implicit, told]  # explicit comes last
 
 
-def test_the_same_words_are_one_job():
+def test_options_that_leave_the_words_as_they_are_add_no_episode():
+    """Explicit has one form only, stages count in contextual, a frame in spatial instructions."""
     plan = make_plan(["random"], forms="implicit,resolved", stages="1,5", frame="camera")
     jobs = plan.jobs()
 
@@ -127,7 +132,8 @@ def test_the_same_words_are_one_job():
         assert (job.options.frame == "camera") == (job.setting == "spatial")
 
 
-def test_turns_are_other_jobs_where_there_is_more_than_one_utterance():
+def test_an_instruction_in_turns_is_another_episode_unless_it_has_one_utterance():
+    """Utterances come at once, as a prompt, or one by one. Explicit ones have only one."""
     prompt, turns = (
         make_plan(["random"], delivery=delivery).jobs() for delivery in ("prompt", "turns")
     )
@@ -140,7 +146,8 @@ def test_turns_are_other_jobs_where_there_is_more_than_one_utterance():
         assert other.options.delivery == ("prompt" if same_job else "turns")
 
 
-def test_every_setting_is_the_harder_ones_too():
+def test_settings_every_adds_the_harder_settings_that_all_leaves_out():
+    """*direct-rival* is harder: a second thing fits the words but for one property."""
     assert make_plan(["random"], settings="all,direct-rival").settings == ("all", "direct-rival")
     for text in ("every", "direct, Every", "all,every"):
         plan = make_plan(["random"], tasks="StopCube,BinFill", settings=text, episodes="0-3")
@@ -153,7 +160,8 @@ def test_every_setting_is_the_harder_ones_too():
     assert "direct-rival" in told
 
 
-def test_settings_in_turns_are_played_in_both_ways():
+def test_a_setting_in_turns_is_added_to_its_usual_delivery():
+    """Two episodes of *direct* in turns, next to those at once; explicit has nothing to add."""
     options = {"tasks": "StopCube", "episodes": "2", "settings": "explicit,direct,reasoning"}
     usual = make_plan(["random"], **options).jobs()
     both = make_plan(["random"], in_turns="direct", **options).jobs()
@@ -166,7 +174,8 @@ def test_settings_in_turns_are_played_in_both_ways():
         make_plan(["random"], in_turns="explicit", **options)
 
 
-def test_episodes_without_a_rival_are_left_out():
+def test_an_episode_that_lacks_what_a_setting_needs_is_left_out_and_none_at_all_is_refused():
+    """*direct-rival* needs a second thing that nearly fits the words."""
     options = {"tasks": "BinFill", "settings": "explicit,direct-rival", "episodes": "0-7"}
     jobs = make_plan(["random"], **options).checked().jobs()
 
@@ -180,8 +189,8 @@ def test_episodes_without_a_rival_are_left_out():
         make_plan(["random"], tasks="StopCube", settings="spatial").checked()
 
 
-def test_jobs_are_ordered_and_named_uniquely():
-    """As given, but what leaves the goal implicit comes first in each scene."""
+def test_episodes_are_played_in_the_given_order_with_explicit_words_last_in_each_scene():
+    """So that no policy hears a scene's goal in plain words before it had to work it out."""
     jobs = make_plan(
         ["random", "oracle"], tasks="VideoUnmask,BinFill", episodes="3,0", policy_seeds="2,0",
         forms="resolved,implicit",
@@ -236,7 +245,7 @@ def test_jobs_are_ordered_and_named_uniquely():
          r"max_steps is 9, but stands in environment, too"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_played_is_told_up_front(options, sentence):
+def test_a_plan_with_an_impossible_option_is_refused_with_the_reason(options, sentence):
     with pytest.raises(InvalidValueError, match=sentence):
         make_plan(["random"], **options)
 
@@ -247,13 +256,13 @@ def test_what_cannot_be_played_is_told_up_front(options, sentence):
      "devices", "policy_env", "retry_on"],
 )  # fmt: skip
 @pytest.mark.parametrize("given", [{"1-5": 3}, {1: 3}, {}], ids=str)
-def test_a_mapping_is_no_list(name, given):
-    """Its keys would be taken, and its values lost."""
+def test_a_mapping_where_a_list_belongs_is_refused(name, given):
+    """As a list, its keys would be taken, and its values lost."""
     with pytest.raises(InvalidValueError, match=r"\{.*\} is not a valid .*; write a list"):
         make_plan(["random"], **{name: given})
 
 
-def test_numbers_of_numpy_are_numbers():
+def test_a_plan_takes_numbers_and_arrays_of_numpy():
     options = {"tasks": "PickXtimes", "settings": "explicit"}
     plan = make_plan("random", episodes=np.int64(2), max_steps=np.int32(60), **options)
 
@@ -261,7 +270,7 @@ def test_numbers_of_numpy_are_numbers():
     assert make_plan("random", episodes=np.arange(1, 3), **options).episodes == (1, 2)
 
 
-NUMBERS = st.integers(-(10**25), 10**25) | st.integers(-2, 200) | st.floats() | st.booleans()
+ANY_NUMBERS = st.integers(-(10**25), 10**25) | st.integers(-2, 200) | st.floats() | st.booleans()
 
 
 @given(
@@ -270,14 +279,14 @@ NUMBERS = st.integers(-(10**25), 10**25) | st.integers(-2, 200) | st.floats() | 
             "max_steps", "observe_every", "demonstration_frames", "policy_seeds", "tries", "batch",
             "policy_timeout_s", "episode_timeout_s", "max_cost", "devices", "distractors",
         ]),
-        NUMBERS | NUMBERS.map(str),
+        ANY_NUMBERS | ANY_NUMBERS.map(str),
         min_size=1,
         max_size=3,
     )
 )  # fmt: skip
 @example({"max_steps": 10**9, "policy_seeds": 10**18 - 1, "max_cost": 1e308})
 @settings(deadline=None)
-def test_whatever_numbers_a_plan_takes_are_stored_and_read_again(numbers):
+def test_a_plan_with_any_numbers_is_refused_or_read_back_as_it_was_written(numbers):
     usual = {"tasks": "PickXtimes", "settings": "explicit", "episodes": 1}
     try:
         plan = make_plan("random", **usual, **numbers)
@@ -291,14 +300,14 @@ def test_whatever_numbers_a_plan_takes_are_stored_and_read_again(numbers):
         assert list(read_records(fill(folder, *stored))) == stored
 
 
-def test_addresses_keep_their_commas():
+def test_commas_separate_policies_but_not_the_servers_of_one_policy():
     specs = ["random,oracle", "mme-vla://a:8001,b:8001?history=no", "random"]
     assert parse_policies(specs) == ("random", "oracle", "mme-vla://a:8001,b:8001?history=no")
     with pytest.raises(InvalidValueError, match="No policy was given"):
         parse_policies([])
 
 
-def test_a_policy_may_have_a_name_of_its_own():
+def test_name_equals_spec_gives_a_policy_a_name_that_must_be_its_alone():
     address = "mme-vla://localhost:8001?history=no"
     plan = make_plan([f"pi0.5={address}", "oracle"], tasks="StopCube", episodes="1")
 
@@ -312,7 +321,7 @@ def test_a_policy_may_have_a_name_of_its_own():
         make_plan(["mine=listner"])
 
 
-def test_names_follow_one_rule_in_plans_and_records():
+def test_a_policy_name_that_a_shell_or_a_spreadsheet_would_execute_is_refused():
     for policy in ("-x=oracle", "=cmd|' /C calc'!A0"):
         with pytest.raises(InvalidValueError, match="name"):
             make_plan(policy, tasks="PickXtimes", episodes="1")
@@ -323,7 +332,8 @@ def test_names_follow_one_rule_in_plans_and_records():
     ["", " ", "NA", "<NA>", "n/a", "#N/A N/A", "null", "nan", "None", "007", "7.0", "1,000", ".5",
      "1e5", "2.5E-3", "inf", "True", "1.#IND"],
 )  # fmt: skip
-def test_what_tables_would_be_read_back_without_is_no_name(name, tmp_path):
+def test_a_policy_name_that_pandas_would_read_as_missing_or_a_number_is_refused(name, tmp_path):
+    """By plans, and by files of records that come from elsewhere."""
     with pytest.raises(InvalidValueError, match=f"Policy '{name}' has no valid name for records"):
         make_plan([replace(read_policy("random"), name=name)], tasks="PickXtimes", episodes="1")
 
@@ -333,7 +343,7 @@ def test_what_tables_would_be_read_back_without_is_no_name(name, tmp_path):
         fill(tmp_path, stranger)
 
 
-def test_names_with_a_letter_are_read_back_as_they_are():
+def test_a_policy_name_that_only_resembles_a_number_is_allowed_and_read_back_from_csv():
     names = ("e1", "7b", "na1", "pi0.5", "nan-net", "3d", "1e5x")
     plan = make_plan([f"{name}=random" for name in names], tasks="PickXtimes", episodes="1")
     assert tuple(policy.name for policy in plan.policies) == names
@@ -343,7 +353,7 @@ def test_names_with_a_letter_are_read_back_as_they_are():
 
 
 @pytest.mark.parametrize("content", ["{", "words", "[]"])
-def test_a_plan_that_cannot_be_read_is_reported(content, tmp_path, caplog):
+def test_a_broken_plan_file_in_a_run_is_reported_and_counts_as_no_plan(content, tmp_path, caplog):
     (tmp_path / PLAN_FILE).write_text(content)
     assert (read_plan(tmp_path), read_plan(tmp_path / "nowhere")) == (None, None)
     assert caplog.messages == [
@@ -351,7 +361,8 @@ def test_a_plan_that_cannot_be_read_is_reported(content, tmp_path, caplog):
     ]
 
 
-def test_a_name_next_to_all_is_added_and_tasks_may_lack_it():
+def test_a_setting_named_next_to_all_is_added_for_the_tasks_that_have_it():
+    """*grounded* asks where a thing is; StopCube has no such setting."""
     plan = make_plan(
         ["random"], tasks="StopCube,VideoUnmask", settings="grounded,All", episodes="2"
     )

@@ -8,10 +8,10 @@ from roboirg.runs.run.plan_counts import cell_sizes, least_calls
 from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 
-MODEL = "model=x&base_url=http://localhost:1/v1"
+MODEL_SERVER = "model=x&base_url=http://localhost:1/v1"
 
 
-def test_cells_are_counted_by_policy_task_setting_and_form():
+def test_a_dry_run_counts_episodes_by_policy_task_setting_and_form():
     plan = make_plan(
         ["random"], tasks="PickXtimes,StopCube", forms="implicit,resolved", episodes="3"
     )
@@ -25,14 +25,18 @@ def test_cells_are_counted_by_policy_task_setting_and_form():
     assert total == len(plan.jobs())
 
 
-def test_a_listener_asks_once_an_episode_and_a_planner_once_a_subgoal():
+def test_a_dry_run_counts_the_least_calls_of_a_model_that_each_policy_makes():
+    """A planner asks a model at least once for each subgoal, a listener once an episode.
+
+    Policies without a model, with one elsewhere or of unknown code are not counted.
+    """
     tasks = "PickXtimes,VideoUnmask"
     plan = make_plan(["random"], tasks=tasks, settings="explicit", episodes="3")
     specs = {
-        "plans": f"planner:stateless?{MODEL}",
+        "plans": f"planner:stateless?{MODEL_SERVER}",
         "paper's": "system:GroundSG-QwenVL?server=localhost:1",
-        "other hands": f"planner:qwen?{MODEL}&hands=not_there:Hands",
-        "listens": f"vlm-listener:openai?{MODEL}&pictures=no",
+        "other hands": f"planner:qwen?{MODEL_SERVER}&hands=not_there:Hands",
+        "listens": f"vlm-listener:openai?{MODEL_SERVER}&pictures=no",
         "knows": "planner:oracle",
         "own": "privileged:planner:not_there:Planner",
         "served": "openpi://localhost:1",

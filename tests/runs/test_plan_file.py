@@ -18,35 +18,38 @@ from roboirg.runs.plan.plan_sections import WorkerNeeds
 from roboirg.runs.plan.stored_plans import write_plan
 from roboirg.tasks import all_tasks
 
-PINNED = ("challenge", "paper", "paper-context", "paper-small", "standard")
+NAMED_PLANS_TESTED_ELSEWHERE = ("challenge", "paper", "paper-context", "paper-small", "standard")
 """Named plans with a test of their own, or of the package that brings them."""
 
 
-def write(folder: Path, text: str) -> str:
+def path_of_plan_file(folder: Path, text: str) -> str:
     path = folder / "plan.yaml"
     path.write_text(text)
     return str(path)
 
 
-def test_robommes_plan_needs_its_words():
+def test_the_plan_robomme_asks_for_the_words_of_robomme_which_are_not_in_this_package():
     options = read_plan_file("robomme")
     with pytest.raises(InvalidValueError, match=r"import-robomme PATH --out .* --wordings"):
         make_plan(["random"], **options)
 
 
-@pytest.mark.parametrize("name", sorted({*named_plans()} - {"robomme", *PINNED}))
+@pytest.mark.parametrize(
+    "name", sorted({*named_plans()} - {"robomme", *NAMED_PLANS_TESTED_ELSEWHERE})
+)
 def test_every_other_named_plan_can_be_played(name):
     assert make_plan(**{"policies": ["random"], **read_plan_file(name)}).jobs()
 
 
-def test_the_challenge_has_its_own_limit():
+def test_the_plan_challenge_plays_ten_explicit_episodes_a_task_with_1500_steps():
     plan = make_plan(["random"], **read_plan_file("challenge"))
     assert (plan.environment.max_steps, len(plan.episodes), plan.split) == (1500, 10, "test")
     assert {job.setting for job in plan.jobs()} == {"explicit"}
     assert len(plan.jobs()) == 10 * len(all_tasks())
 
 
-def test_the_papers_protocol_is_the_papers():
+def test_the_plan_paper_is_the_protocol_of_the_paper():
+    """50 episodes, three policy seeds, all tasks and settings, implicit and resolved."""
     plan = make_plan(["random"], **read_plan_file("paper"))
     assert plan.tasks == tuple(all_tasks())
     assert (plan.settings, plan.forms) == (("all",), ("implicit", "resolved"))
@@ -55,12 +58,12 @@ def test_the_papers_protocol_is_the_papers():
     assert plan.environment.max_steps == 1300
 
     told = {(job.task, job.setting, job.form) for job in plan.jobs()}
-    # 40 implicit variants and their resolved forms, and the explicit setting once.
+    # 40 pairs of task and implicit setting, in two forms, and 11 tasks in explicit.
     assert len(told) == 40 + 40 + 11
 
     context = make_plan(["random"], **read_plan_file("paper-context"))
     assert {job.options.stages for job in context.jobs()} == set(STAGE_SETS)
-    assert len(context.jobs()) == 3 * 4 * 50 * 3
+    assert len(context.jobs()) == 3 * 4 * 50 * 3  # tasks, stages, episodes, policy seeds
 
 
 def test_the_standard_protocol_plays_every_task_in_fifty_episodes():
@@ -105,9 +108,9 @@ def test_the_standard_protocol_has_every_setting_and_direct_in_turns():
         ("cluster: {labels: {spot: yes}}", {"cluster": {"labels": {"spot": "yes"}}}),
     ],
 )  # fmt: skip
-def test_values_are_those_that_would_be_typed(tmp_path, text, typed):
+def test_a_value_in_a_plan_file_means_what_it_means_on_the_command_line(tmp_path, text, typed):
     few: dict[str, Any] = {"policies": "random", "tasks": "PickXtimes"}
-    read = read_plan_file(write(tmp_path, text))
+    read = read_plan_file(path_of_plan_file(tmp_path, text))
     assert make_plan(**few | read) == make_plan(**few | typed)
 
 
@@ -123,9 +126,9 @@ def test_values_are_those_that_would_be_typed(tmp_path, text, typed):
         ("tasks: all\nsplit: val\ntasks:\n  - real", r"line 3 has the key 'tasks' again"),
     ],
 )
-def test_what_is_no_plan_is_one_sentence(tmp_path, text, sentence):
+def test_a_file_that_is_no_plan_is_refused_in_one_sentence(tmp_path, text, sentence):
     with pytest.raises(InvalidValueError, match=sentence) as caught:
-        read_plan_file(write(tmp_path, text))
+        read_plan_file(path_of_plan_file(tmp_path, text))
     assert "\n" not in str(caught.value)
 
 
@@ -137,14 +140,15 @@ def test_what_is_no_plan_is_one_sentence(tmp_path, text, sentence):
         "tasks:", "tasks:\n  - ", "max_steps: !!int '010'", "training: {seed:}",
     ],
 )  # fmt: skip
-def test_what_yaml_takes_for_something_else_than_it_looks_is_refused(tmp_path, text):
+def test_a_value_that_yaml_reads_otherwise_than_it_looks_is_refused_with_its_line(tmp_path, text):
+    """As 010, which is 8, 1:30, which is 90, and 2026-01-31, which is a date."""
     with pytest.raises(InvalidValueError, match=r"line \d ") as caught:
-        read_plan_file(write(tmp_path, text), "training")
+        read_plan_file(path_of_plan_file(tmp_path, text), "training")
     assert "\n" not in str(caught.value)
 
 
-def test_what_is_typed_replaces_the_option_in_a_section_of_the_file(tmp_path):
-    path = write(tmp_path, "environment: {max_steps: 100, meshes: light}\nepisodes: 1")
+def test_an_option_on_the_command_line_replaces_that_of_the_plan_file(tmp_path):
+    path = path_of_plan_file(tmp_path, "environment: {max_steps: 100, meshes: light}\nepisodes: 1")
     typed = {"policies": ["random"], "max_steps": "200", "max_cost": "0.5"}
     plan = run_commands._plan(path, typed, ())
 
@@ -153,7 +157,7 @@ def test_what_is_typed_replaces_the_option_in_a_section_of_the_file(tmp_path):
     assert (options.max_steps, options.meshes, plan.models.max_cost) == (200, "light", 0.5)
 
 
-def test_an_unknown_plan_is_told_with_the_nearest():
+def test_an_unknown_plan_name_is_refused_with_the_nearest_and_a_missing_file_as_unreadable():
     with pytest.raises(UnknownNameError, match="Did you mean 'paper-context'"):
         read_plan_file("paper-contxt")
     with pytest.raises(InvalidValueError, match="cannot be read"):
@@ -172,11 +176,11 @@ def test_an_unknown_plan_is_told_with_the_nearest():
         {"wordings": "train", "split": "random", "episodes": "5,99999", "max_steps": 60},
     ],
 )
-def test_a_plan_and_its_files_are_the_same_plan(tmp_path, options):
-    """Both as YAML and as the plan.json that a run writes."""
+def test_a_plan_is_the_same_after_it_was_written_and_read_again(tmp_path, options):
+    """As YAML, and as the plan.json that a run writes."""
     plan = make_plan(["random", "mine=oracle"], **{"tasks": "PickXtimes", **options})
     write_plan(plan, tmp_path)
-    typed = write(tmp_path, yaml.safe_dump(plan.model_dump(mode="json")))
+    typed = path_of_plan_file(tmp_path, yaml.safe_dump(plan.model_dump(mode="json")))
     for path in (typed, str(tmp_path / "plan.json")):
         found = read_plan_file(path)
         again = make_plan(found.pop("policies"), **found)
@@ -184,9 +188,10 @@ def test_a_plan_and_its_files_are_the_same_plan(tmp_path, options):
         assert again.fingerprint == plan.fingerprint
 
 
-def test_workers_are_placed_only_where_their_labels_are():
+def test_a_machine_takes_as_many_workers_as_its_label_and_scarcest_resource_allow():
+    """A worker needs 1.5 processors, a quarter of a GPU and 2 GB on a machine of rack b."""
     needs = WorkerNeeds(cpus=1.5, gpus=0.25, memory_gb=2.0, labels={"rack": "b"})
-    usual = {"CPU": 9.0, "GPU": 1.0, "memory": 7e9}  # for 6, 4 and 3
+    usual = {"CPU": 9.0, "GPU": 1.0, "memory": 7e9}  # enough for 6, for 4 and for 3 workers
 
     for rack, changes, slots in (
         ("a", {}, 0),

@@ -20,7 +20,7 @@ from typing import Any
 import hosting_fakes
 import numpy as np
 import pytest
-from hosting_fakes import PaperRunner, paper_plan, paper_runner
+from hosting_fakes import FakeWorldRunner, fake_world_plan, fake_world_runner
 from run_fakes import changed, comparable, is_alive, worker_pids
 from selection import slow_but
 
@@ -44,12 +44,12 @@ from roboirg.util.process_guard import descendants
 
 Write = Callable[[str, str], str]
 Host = Callable[[str, str], HostedPolicy]
-KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "8"))
-PLAYERS = tuple(f"hosting_fakes:{name}" for name in ("Dice", "BatchedDice", "Picky"))
+NUMBER_OF_KILLS = int(os.environ.get("ROBOIRG_TEST_KILLS", "8"))
+THREE_POLICIES = tuple(f"hosting_fakes:{name}" for name in ("Dice", "BatchedDice", "Picky"))
 
 
 @pytest.fixture
-def pool() -> Iterator[HostPool]:
+def host_pool_of_test() -> Iterator[HostPool]:
     with HostPool(HostSettings()) as opened:
         yield opened
 
@@ -69,14 +69,16 @@ def write_policy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Write:
 
 
 @pytest.fixture
-def host(pool: HostPool, write_policy: Write) -> Host:
+def begun_policy(host_pool_of_test: HostPool, write_policy: Write) -> Host:
     """Return what writes a policy and begins an episode of it in a process of its own."""
-    return lambda name, text: HostedPolicy(pool.connect(), read_policy(write_policy(name, text)), 0)
+    return lambda name, text: HostedPolicy(
+        host_pool_of_test.connect(), read_policy(write_policy(name, text)), 0
+    )
 
 
-def play(plan: Plan, folder: Path, executor: Executor) -> dict[Job, dict[str, Any]]:
+def records_by_job(plan: Plan, folder: Path, executor: Executor) -> dict[Job, dict[str, Any]]:
     folder.mkdir(exist_ok=True)
-    run_plan(plan, folder, paper_runner(plan, folder), executor)
+    run_plan(plan, folder, fake_world_runner(plan, folder), executor)
     return {record.identity: comparable(record) for record in read_records(folder)}
 
 
@@ -91,7 +93,8 @@ def relayed(call: Call) -> Call:
         return receive_call(theirs)
 
 
-def test_arrays_of_every_kind_travel_through_the_supervisor():
+def test_arrays_of_every_kind_arrive_unchanged_over_two_sockets_and_can_be_written_to():
+    """Between the world's process and the policy's stands a third: two sockets."""
     value = {
         "history": [{"a": np.arange(6, dtype=np.int16).reshape(2, 3)}, {"a": np.float32(2.5)}],
         "none": np.zeros((0, 256, 256, 3), np.uint8),
@@ -105,13 +108,16 @@ def test_arrays_of_every_kind_travel_through_the_supervisor():
     found["turned"][0, 0] = 7.0  # a policy may write into what it gets
 
 
-@pytest.mark.parametrize("value", [object(), np.array([object()]), {"world": PaperRunner}])
-def test_nothing_but_plain_data_and_arrays_is_sent(value):
+@pytest.mark.parametrize("value", [object(), np.array([object()]), {"world": FakeWorldRunner}])
+def test_objects_are_not_sent_to_the_process_of_a_policy(value):
+    """Only plain data and arrays are: an object could carry the goal, or code."""
     with pytest.raises(TypeError):
         send(socket.socket(), Call("act", value=value))
 
 
-def test_a_hosted_policy_gets_what_a_policy_gets(pool, write_policy):
+def test_a_policy_in_its_own_process_gets_and_gives_what_it_would_next_to_the_world(
+    host_pool_of_test, write_policy
+):
     spec = write_policy(
         "curious",
         """
@@ -139,7 +145,7 @@ class It:
         return {"calls": 2, "cost": float("nan")}
 """,
     )
-    policy = HostedPolicy(pool.connect(), read_policy(spec), 5)
+    policy = HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 5)
     assert PolicyNeeds.of(policy) == PolicyNeeds(observe_every=4, depth=True, prompt_tokens=7)
 
     frames = np.random.default_rng(0).integers(0, 255, (30, 256, 256, 3), np.uint8)
@@ -165,7 +171,9 @@ class It:
     policy.close()
 
 
-def test_pictures_of_a_video_are_drawn_when_they_are_read_and_then_sent_at_once(pool, write_policy):
+def test_pictures_of_a_video_are_drawn_only_for_a_policy_that_reads_them(
+    host_pool_of_test, write_policy
+):
     spec = write_policy(
         "choosy",
         """
@@ -193,7 +201,7 @@ class It:
         video = Video(front_rgb=np.zeros((2, 4, 4, 3), np.uint8), joint_positions=np.zeros((2, 7)))
         video["wrist_rgb"] = video["wrist_depth"] = np.zeros((2, 4, 4, 3), np.uint8)
         video.drawn = []
-        policy = HostedPolicy(pool.connect(), read_policy(spec), 0)
+        policy = HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 0)
         policy.reset("Pick it.", video)
         drawn.append(list(video.drawn))
         policy.act({})  # type: ignore[typeddict-item]
@@ -209,20 +217,24 @@ class It:
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> dict[Job, dict[str, Any]]:
+def records_without_a_host(tmp_path_factory: pytest.TempPathFactory) -> dict[Job, dict[str, Any]]:
     """Records of worlds that share no host: the policies are in their process."""
-    plan = changed(paper_plan("Dice", policy_process="shared"), policies=PLAYERS)
-    return play(plan, tmp_path_factory.mktemp("alone"), InProcess())
+    plan = changed(fake_world_plan("Dice", policy_process="shared"), policies=THREE_POLICIES)
+    return records_by_job(plan, tmp_path_factory.mktemp("alone"), InProcess())
 
 
 @pytest.mark.parametrize(("workers", "batch"), slow_but([(3, 3)], [(3, 3), (0, 16), (5, 16)]))
-def test_records_do_not_depend_on_workers_or_batches(tmp_path, monkeypatch, alone, workers, batch):
+def test_records_are_the_same_whatever_the_number_of_workers_or_the_size_of_batches(
+    tmp_path, monkeypatch, records_without_a_host, workers, batch
+):
     monkeypatch.setenv("ROBOIRG_TEST_SIZES", str(tmp_path / "sizes"))
-    plan = changed(paper_plan("Dice", batch=batch), policies=PLAYERS)
+    plan = changed(fake_world_plan("Dice", batch=batch), policies=THREE_POLICIES)
 
-    found = play(plan, tmp_path / "run", LocalProcesses(workers) if workers else InProcess())
+    found = records_by_job(
+        plan, tmp_path / "run", LocalProcesses(workers) if workers else InProcess()
+    )
 
-    assert found == alone
+    assert found == records_without_a_host
     assert {record["outcome"] for record in found.values()} == {"success", "failure", "error"}
     # What fails for one episode of a batch costs only that one.
     causes = {record["cause"] for record in found.values() if record["outcome"] == "error"}
@@ -239,7 +251,9 @@ def test_records_do_not_depend_on_workers_or_batches(tmp_path, monkeypatch, alon
     assert {record.policy_metadata["made"] for record in batched} == {1}
 
 
-def test_a_privileged_policy_stays_beside_the_world(tmp_path, write_policy):
+def test_a_privileged_policy_runs_in_the_worlds_process_and_reads_its_secret(
+    tmp_path, write_policy
+):
     spec = write_policy(
         "insider",
         """
@@ -253,7 +267,9 @@ class It:
         return np.ones((24, 8))
 """,
     )
-    play(paper_plan(f"privileged:{spec}", 1).checked(), tmp_path / "run", InProcess())
+    records_by_job(
+        fake_world_plan(f"privileged:{spec}", 1).checked(), tmp_path / "run", InProcess()
+    )
 
     (record,) = read_records(tmp_path / "run")
 
@@ -262,7 +278,7 @@ class It:
     assert "token" in str(record.policy_metadata["secret"])
 
 
-def test_each_device_has_a_process(write_policy):
+def test_worlds_share_one_process_of_a_policy_on_each_device(write_policy):
     ref = read_policy(
         write_policy(
             "located",
@@ -286,7 +302,8 @@ class It(hostile_policies.Hostile):
 # What a policy is
 
 
-def test_which_policies_get_a_process(tmp_path):
+def test_policies_of_a_users_code_get_a_process_and_built_in_ones_and_servers_do_not(tmp_path):
+    """*Hosted* ones get a process; *foreign* is code that is not of this package."""
     (tmp_path / "mine.toml").write_text('name = "mine"\npolicy = "somewhere:Mine"\n')
     foreign = ["somewhere:Mine", f"system:{tmp_path}/mine.toml"]
     ours = ["oracle", "random", "openpi://localhost:1", "system:GroundSG-QwenVL"]
@@ -298,12 +315,12 @@ def test_which_policies_get_a_process(tmp_path):
     assert not read_policy("lerobot://some/checkpoint").is_foreign
 
 
-def test_an_import_that_never_ends_is_ended(write_policy):
+def test_a_policy_whose_import_takes_too_long_is_refused(write_policy):
     with pytest.raises(InvalidValueError, match=r"not opened within 0[.]5 s"):
         open_policy(read_policy(write_policy("endless", "time.sleep(3600)")), 0.5)
 
 
-def test_a_policy_is_described_without_being_imported(write_policy):
+def test_version_and_needs_of_a_policy_are_read_without_importing_it_here(write_policy):
     spec = write_policy(
         "versioned",
         """
@@ -340,18 +357,20 @@ def test_a_policy_that_cannot_be_loaded_is_reported_before_the_run(
     text, error, words, write_policy
 ):
     with pytest.raises(error, match=words):
-        paper_plan(write_policy("broken", text), 1).checked()
+        fake_world_plan(write_policy("broken", text), 1).checked()
 
 
 # Deaths
 
 
-def child_of(pool: HostPool) -> PolicyChild:
-    (child,) = pool._children.values()
+def child_of(host_pool_of_test: HostPool) -> PolicyChild:
+    (child,) = host_pool_of_test._children.values()
     return child
 
 
-def test_only_the_episode_to_blame_learns_of_a_crash(pool, write_policy):
+def test_a_crash_of_a_policys_process_is_an_error_only_for_the_episode_that_caused_it(
+    host_pool_of_test, write_policy
+):
     spec = write_policy(
         "fragile",
         """
@@ -365,7 +384,9 @@ class It:
         return np.zeros((1, 8))
 """,
     )
-    good, bad, over, late = (HostedPolicy(pool.connect(), read_policy(spec), 0) for _ in range(4))
+    good, bad, over, late = (
+        HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 0) for _ in range(4)
+    )
     good.reset("live", {})
     bad.reset("die", {})
 
@@ -375,10 +396,10 @@ class It:
     assert guilty.value.kind == "policy"
     assert str(guilty.value) == "the process ended with exit code 7 in the policy's act()"
 
-    child = child_of(pool)
+    child = child_of(host_pool_of_test)
     child.check(0.1)
 
-    # All who ask are told alike, even after a check.
+    # Each episode that asks gets the same answer, even after a check.
     expected = Loss("policy", "the process ended with exit code 7", b"last words\n")
     assert child.loss() == child.loss() == expected
     with pytest.raises(EpisodeLostError):
@@ -388,15 +409,17 @@ class It:
 
     for policy in (good, bad, over, late):
         policy.close()
-    again = HostedPolicy(pool.connect(), read_policy(spec), 0)  # in a new process
+    again = HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 0)  # in a new process
     again.reset("live", {})
     assert again.act({}).shape == (1, 8)  # type: ignore[typeddict-item]
 
     again.close()
 
 
-def test_those_who_were_asked_together_are_played_again_alone(host):
-    """Would catch that each of them is to blame for a process that ends in their call."""
+def test_episodes_whose_policy_was_asked_together_and_crashed_are_played_again_one_by_one(
+    begun_policy,
+):
+    """One of them may be to blame, the others are not; alone it shows."""
     text = """
 from roboirg.runs.hosting import host_process
 from roboirg.runs.hosting.messages import Begun
@@ -406,7 +429,7 @@ class It(hostile_policies.Hostile):
     def act(self, observation):
         os._exit(5)
 """
-    world = host("joint", text)
+    world = begun_policy("joint", text)
     world.reset("Pick it.", {})
 
     with pytest.raises(EpisodeLostError, match="exit code 5") as lost:
@@ -414,14 +437,16 @@ class It(hostile_policies.Hostile):
     assert lost.value.alone
 
 
-def test_a_host_goes_on_after_worlds_that_die_or_are_interrupted(pool, monkeypatch):
-    """Would catch an interrupt that is forgotten, and a worker to whom nobody listens any more."""
+def test_a_policys_process_serves_others_after_a_world_died_or_was_interrupted(
+    host_pool_of_test, monkeypatch
+):
+    """Would find an interrupt that is forgotten, and a worker whose calls are not answered."""
 
     class Video(dict[str, Any]):
         def __getitem__(self, field: str) -> Any:
             raise KeyboardInterrupt
 
-    hosts = pool.connect()
+    hosts = host_pool_of_test.connect()
     ref = read_policy("hosting_fakes:Dice")
     with monkeypatch.context() as without:
         without.setattr(host_pool, "PolicyChild", lambda _environment: os.open("/nonexistent", 0))
@@ -434,17 +459,20 @@ def test_a_host_goes_on_after_worlds_that_die_or_are_interrupted(pool, monkeypat
     assert world.usage() == {}
 
     world.close()
-    line = pool.connect()
+    line = host_pool_of_test.connect()
     HostedPolicy(line, ref, 0)
     line.sendall((1000).to_bytes(8, "big") + b"half a message")
     line.close()
-    HostedPolicy(pool.connect(), ref, 1).close()
+    HostedPolicy(host_pool_of_test.connect(), ref, 1).close()
 
 
-def test_time_in_the_queue_is_not_the_calls_and_what_hangs_between_calls_is_ended(
-    pool, write_policy
+def test_a_call_has_its_time_limit_from_when_it_begins_and_a_frozen_process_is_ended(
+    host_pool_of_test, write_policy
 ):
-    """Would catch a limit that begins when a call is sent, and a wait without any limit."""
+    """Four calls of 1.5 s wait for each other; the limit is 4 s. Then the process is stopped.
+
+    Would find a limit that begins when a call is sent, and a wait without any limit.
+    """
     spec = write_policy(
         "stopping",
         """
@@ -458,7 +486,9 @@ class It:
         return np.zeros((1, 8))
 """,
     )
-    worlds = [HostedPolicy(pool.connect(), read_policy(spec), 0, 4.0) for _ in range(4)]
+    worlds = [
+        HostedPolicy(host_pool_of_test.connect(), read_policy(spec), 0, 4.0) for _ in range(4)
+    ]
     with ThreadPoolExecutor() as threads:
         list(threads.map(lambda world: world.reset("wait", {}), worlds))  # the last for 6 s
     worlds[0].hear("stop", 0)
@@ -471,8 +501,8 @@ class It:
         world.close()
 
 
-def test_a_call_is_not_to_blame_for_a_process_that_another_world_has_ended(
-    pool, tmp_path, write_policy
+def test_an_episode_whose_policy_was_ended_by_another_world_is_lost_and_not_to_blame(
+    host_pool_of_test, tmp_path, write_policy
 ):
     """Would catch a call that begins when an earlier one returns just after its limit."""
     text = """
@@ -482,9 +512,9 @@ class It(hostile_policies.Hostile):
         time.sleep(3600)
 """
     ref = read_policy(write_policy("sleepy", text))
-    hosts = pool.connect()
+    hosts = host_pool_of_test.connect()
     late = HostedPolicy(hosts, ref, 0)
-    world = HostedPolicy(pool.connect(), ref, 0)
+    world = HostedPolicy(host_pool_of_test.connect(), ref, 0)
     with ThreadPoolExecutor() as threads:
         call = threads.submit(world.reset, "Pick it.", {})
         while not (tmp_path / "begun").exists():
@@ -495,7 +525,9 @@ class It(hostile_policies.Hostile):
     late.close()
 
 
-def test_a_process_is_no_hanging_one_while_it_starts_or_its_world_draws(pool, host):
+def test_a_process_that_starts_or_waits_for_a_picture_is_not_ended_as_frozen(
+    host_pool_of_test, begun_policy
+):
     starting = PolicyChild(os.environ)
     starting.check(0.01)
     assert not starting.is_over
@@ -506,11 +538,11 @@ class It(hostile_policies.Hostile):
     def reset(self, instruction, demonstration):
         self.metadata = {"sum": int(demonstration["front_rgb"].sum())}
 """
-    world = host("viewer", text)
+    world = begun_policy("viewer", text)
 
     class Video(dict[str, Any]):
         def __getitem__(self, field: str) -> Any:
-            child_of(pool).check(10.0)  # of a world that waits
+            child_of(host_pool_of_test).check(10.0)  # of a world that waits
             return super().__getitem__(field)
 
     world.reset("Pick it.", Video(front_rgb=np.ones((2, 4, 4, 3), np.uint8)))
@@ -520,26 +552,28 @@ class It(hostile_policies.Hostile):
     world.close()
 
 
-def test_answers_that_nobody_asked_for_hide_no_process_that_hangs(pool, host):
+def test_a_frozen_process_is_noticed_although_it_had_sent_many_answers_in_advance(
+    host_pool_of_test, begun_policy
+):
     text = """
 class It(hostile_policies.Hostile):
     def reset(self, instruction, demonstration):
         hostile_policies.host_of(sys._getframe())._supervisor.send(b"!" * 1000)
 """
-    world = host("eager", text)
+    world = begun_policy("eager", text)
     world.reset("Pick it.", {})
     *_, pid = descendants(os.getpid())
     os.kill(pid, signal.SIGSTOP)
 
-    child_of(pool).check(0.1)
-    assert child_of(pool).is_over
+    child_of(host_pool_of_test).check(0.1)
+    assert child_of(host_pool_of_test).is_over
 
     world.close()
 
 
 @pytest.mark.parametrize("answer", ["nothing", "half a message", "to take in half a call"])
-def test_a_call_that_is_never_begun_ends_in_an_error_although_its_process_answers_checks(
-    pool, write_policy, monkeypatch, answer
+def test_a_policy_that_never_begins_a_call_is_an_error_although_its_process_is_alive(
+    host_pool_of_test, write_policy, monkeypatch, answer
 ):
     text = """
 def answer_checks(supervisor, line, way):
@@ -559,7 +593,7 @@ class It(hostile_policies.Hostile):
         line = hostile_policies.line_of(host)
         host._collect = lambda _seconds: answer_checks(host._supervisor, line, instruction)
 """
-    world = HostedPolicy(pool.connect(), read_policy(write_policy("silent", text)), 0)
+    world = HostedPolicy(host_pool_of_test.connect(), read_policy(write_policy("silent", text)), 0)
     world.reset(answer, {})
     world._line._limit_s = 0.5
     for name, seconds in (("DRAW_S", 1.0), ("MARGIN_S", 60.0)):
@@ -570,7 +604,9 @@ class It(hostile_policies.Hostile):
         world.act(picture)
 
 
-def test_messages_in_pieces_take_no_longer_than_a_call_may(pool, write_policy):
+def test_a_message_that_arrives_byte_by_byte_is_ended_at_the_time_limit_of_a_call(
+    host_pool_of_test, write_policy
+):
     text = """
 from roboirg.runs.hosting import host_process
 from roboirg.runs.hosting.messages import Outcome, send
@@ -590,8 +626,8 @@ class It(hostile_policies.Hostile):
         host_process.send = reply
 """
     ref = read_policy(write_policy("piecemeal", text))
-    early = HostedPolicy(pool.connect(), ref, 0)
-    world = HostedPolicy(pool.connect(), ref, 0)
+    early = HostedPolicy(host_pool_of_test.connect(), ref, 0)
+    world = HostedPolicy(host_pool_of_test.connect(), ref, 0)
     early.reset("too early", {})
 
     with pytest.raises(EpisodeLostError, match="a message of 1,000 bytes"):
@@ -617,16 +653,16 @@ def host_pids(supervisor: int) -> list[int]:
 
 
 @pytest.mark.slow
-def test_killed_hosts_worlds_and_supervisors_lose_and_double_nothing(tmp_path):
+def test_a_run_whose_processes_are_killed_at_random_has_the_same_records_in_the_end(tmp_path):
     folder = tmp_path / "killed"
     undisturbed = tmp_path / "undisturbed"
     folder.mkdir()
-    expected = play(hosting_fakes.KILLED_PLAN, undisturbed, InProcess())
+    expected = records_by_job(hosting_fakes.KILLED_PLAN, undisturbed, InProcess())
     command = [sys.executable, hosting_fakes.__file__, str(folder)]
     rng = random.Random(0)
     struck = 0
     child = subprocess.Popen(command)
-    for _ in range(KILLS):
+    for _ in range(NUMBER_OF_KILLS):
         time.sleep(rng.uniform(0.1, 1.5))
         if child.poll() is not None:
             child = subprocess.Popen(command)
@@ -651,7 +687,7 @@ def test_killed_hosts_worlds_and_supervisors_lose_and_double_nothing(tmp_path):
     assert not any(map(is_alive, worker_pids(folder)))
 
 
-def test_an_episode_that_is_lost_again_and_again_ends_in_an_error(
+def test_an_episode_whose_policy_ends_between_calls_is_repeated_and_then_an_error(
     tmp_path, monkeypatch, write_policy, capfd
 ):
     spec = write_policy(
@@ -669,8 +705,8 @@ class It:
 """,
     )
     monkeypatch.setattr("roboirg.runs.play.rollout.MAX_LOSSES", 2)
-    plan = paper_plan(spec, 1)
-    runner: PaperRunner = paper_runner(plan, tmp_path, seconds=2.0)
+    plan = fake_world_plan(spec, 1)
+    runner: FakeWorldRunner = fake_world_runner(plan, tmp_path, seconds=2.0)
 
     (record,) = InProcess().run(deque(plan.jobs()), runner)
 

@@ -34,18 +34,18 @@ from roboirg.records.record_codec import StoreError
 from roboirg.runs.run.ray_machines import MachineAgent, MachineVersions
 from roboirg.runs.run.runner import check_run
 
-Two = tuple[Record, Record]
-NAME = "random"
+TwoRecords = tuple[Record, Record]
+SHARED_NAME = "random"
 """Of all policies here, as the fake plan has it."""
 
 
-def named(spec: str) -> PolicyRef:
+def policy_of_version_7(spec: str) -> PolicyRef:
     """Return a policy as a plan has it, but of one version whatever it is."""
-    return dataclasses.replace(read_policy(spec, NAME), version="7")
+    return dataclasses.replace(read_policy(spec, SHARED_NAME), version="7")
 
 
 @pytest.fixture(scope="module")
-def played() -> Two:
+def two_records() -> TwoRecords:
     first, second, *_ = map(FakePlay(), small_plan(2).jobs())
     return first, second
 
@@ -58,10 +58,12 @@ def refusal(action: Callable[[], object]) -> str:
     return ""
 
 
-def meet(folder: Path, played: Two, before: PolicyRef, now: PolicyRef) -> dict:
+def what_is_said_where_they_meet(
+    folder: Path, two_records: TwoRecords, before: PolicyRef, now: PolicyRef
+) -> dict:
     """Return what is said where results of two policies of one name meet."""
-    first = replace(played[0], ref=before)
-    second = replace(played[1], ref=now)
+    first = replace(two_records[0], ref=before)
+    second = replace(two_records[1], ref=now)
     fill(folder / "a", first)
     fill(folder / "b", second)
     plan = small_plan(2).model_copy(update={"policies": (now,)})
@@ -78,7 +80,7 @@ def meet(folder: Path, played: Two, before: PolicyRef, now: PolicyRef) -> dict:
 
 OPENPI = "openpi://gpu:8000"
 MME = "mme-vla://gpu:8000"
-OTHERS = [
+PAIRS_OF_DIFFERENT_POLICIES = [
     ("oracle", "forgetful"),
     ("oracle", "mine:Policy"),
     ("mine:Policy", "mine:Other"),
@@ -96,23 +98,35 @@ OTHERS = [
 ]
 
 
-@pytest.mark.parametrize(("before", "now"), [OTHERS[0], OTHERS[5], OTHERS[8]])
+@pytest.mark.parametrize(
+    ("before", "now"),
+    [
+        PAIRS_OF_DIFFERENT_POLICIES[0],
+        PAIRS_OF_DIFFERENT_POLICIES[5],
+        PAIRS_OF_DIFFERENT_POLICIES[8],
+    ],
+)
 def test_another_policy_of_the_same_name_is_refused_or_kept_apart(
-    before, now, played, tmp_path, snapshot
+    before, now, two_records, tmp_path, snapshot
 ):
     """In one sentence with both values; tables name the difference in their labels."""
-    assert meet(tmp_path, played, named(before), named(now)) == snapshot
+    assert (
+        what_is_said_where_they_meet(
+            tmp_path, two_records, policy_of_version_7(before), policy_of_version_7(now)
+        )
+        == snapshot
+    )
 
 
 def test_what_a_policy_is_tells_it_from_others(snapshot):
     found = [read_policy(before).versions.differences(read_policy(now).versions)
-             for before, now in OTHERS]  # fmt: skip
+             for before, now in PAIRS_OF_DIFFERENT_POLICIES]  # fmt: skip
     lines = [[f"{what}: {first} | {second}" for what, first, second in each] for each in found]
     assert lines == snapshot
 
 
-CHECKPOINT = {"config.json": "{}", "model.safetensors": "weights"}
-SAME = [
+CHECKPOINT_FILES = {"config.json": "{}", "model.safetensors": "weights"}
+PAIRS_OF_EQUAL_POLICIES = [
     (OPENPI, "openpi://other:9/path"),
     (f"{OPENPI}?execute=8", f"{OPENPI}?execute=08&timeout=9&tls=yes"),
     (MME, f"{MME}?execute=16&history=yes&part=4"),
@@ -133,23 +147,29 @@ SAME = [
 def checkpoints(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     places = {name: tmp_path_factory.mktemp(name) for name in ("first", "second")}
     for place in places.values():
-        for name, content in CHECKPOINT.items():
+        for name, content in CHECKPOINT_FILES.items():
             (place / name).write_text(content)
     return places
 
 
-@pytest.mark.parametrize(("before", "now"), SAME)
-def test_a_policy_that_moved_or_is_typed_otherwise_is_the_same(before, now, checkpoints):
+@pytest.mark.parametrize(("before", "now"), PAIRS_OF_EQUAL_POLICIES)
+def test_a_policy_at_another_address_or_typed_in_another_way_is_the_same_policy(
+    before, now, checkpoints
+):
     refs = [read_policy(spec.format(**checkpoints)) for spec in (before, now)]
     assert refs[0].makeup == refs[1].makeup != ()
 
 
-def test_a_policy_that_moved_goes_on_in_its_folder(played, tmp_path):
-    found = meet(tmp_path, played, *(named(spec) for spec in SAME[1]))
+def test_a_policy_at_another_address_goes_on_in_its_run_and_is_merged_without_a_word(
+    two_records, tmp_path
+):
+    found = what_is_said_where_they_meet(
+        tmp_path, two_records, *(policy_of_version_7(spec) for spec in PAIRS_OF_EQUAL_POLICIES[1])
+    )
     assert found == {"resumed": "", "merged": "", "stored": "", "labels": ["random"], "mixed": []}
 
 
-def test_a_checkpoint_with_other_bytes_is_another(tmp_path):
+def test_a_checkpoint_folder_with_other_weights_is_another_policy(tmp_path):
     file = tmp_path / "model.safetensors"
     (tmp_path / "config.json").write_text("{}")
     found = set()
@@ -161,7 +181,7 @@ def test_a_checkpoint_with_other_bytes_is_another(tmp_path):
     assert len(found) == 2
 
 
-def test_a_machine_with_other_bytes_at_the_path_is_named(tmp_path):
+def test_a_machine_of_a_cluster_with_another_checkpoint_at_the_path_is_refused(tmp_path):
     file = tmp_path / "config.json"
     file.write_text("{}")
     versions = MachineVersions((read_policy(f"lerobot://{tmp_path}"),))
@@ -175,7 +195,7 @@ def test_a_machine_with_other_bytes_at_the_path_is_named(tmp_path):
     agent.close()
 
 
-OTHER_TEXTS = {
+OTHER_TEXT_VALUES = {
     "actions": "ee_pose",
     "asked": "every+9+steps",
     "base_url": "http://other:1",
@@ -193,16 +213,16 @@ def options_of(kind: type[BaseModel]) -> Iterator[tuple[str, FieldInfo]]:
             yield name, field
 
 
-def changed(name: str, field: FieldInfo) -> str:
+def changed_value(name: str, field: FieldInfo) -> str:
     """Return another value of an option, as it may be typed."""
     if field.annotation is bool:
         return "no" if field.default else "yes"
     if typing.get_origin(field.annotation) is typing.Literal:
         return next(value for value in typing.get_args(field.annotation) if value != field.default)
-    return OTHER_TEXTS.get(name, "7")
+    return OTHER_TEXT_VALUES.get(name, "7")
 
 
-def registry() -> Iterator[tuple[str, type[BaseModel]]]:
+def specs_and_their_options() -> Iterator[tuple[str, type[BaseModel]]]:
     """Yield a spec of each kind with options that are declared, and their type."""
     for scheme in url_classes():
         spec = f"{scheme}://nowhere:1?version=1"
@@ -214,8 +234,9 @@ def registry() -> Iterator[tuple[str, type[BaseModel]]]:
     yield "vlm-listener:openai?model=m", ListenerOptions
 
 
-def test_every_option_of_every_kind_is_compared_unless_it_is_declared_not_to_be():
-    for spec, kind in registry():
+def test_another_value_of_any_option_makes_another_policy_unless_declared_otherwise():
+    """As addresses and timeouts are. Would find a new option that results could differ in."""
+    for spec, kind in specs_and_their_options():
         before = read_policy(spec)
         target = spec.partition(":")[2].partition("?")[0].replace("openai", "listener")
         prompts = str(resources.files(vlm) / "prompts" / f"{target}.toml")
@@ -223,17 +244,20 @@ def test_every_option_of_every_kind_is_compared_unless_it_is_declared_not_to_be(
             if name == "provider" and spec.startswith("vlm-listener"):
                 continue  # it stands in front of the options
             bare = re.sub(rf"\?{name}=\w+", "", spec)
-            value = changed(name, field).format(prompts=prompts)
+            value = changed_value(name, field).format(prompts=prompts)
             now = read_policy(f"{bare}{'&' if '?' in bare else '?'}{name}={value}")
             is_compared = field.exclude is not NOT_COMPARED
             assert (before.makeup != now.makeup) == is_compared, (spec, name)
 
 
-def test_every_built_in_policy_is_one_of_its_own():
+def test_no_two_built_in_policies_count_as_the_same():
     assert len({read_policy(spec).makeup for spec in BUILTIN}) == len(BUILTIN)
 
 
-def test_of_a_kind_of_others_everything_that_is_typed_counts(tmp_path, monkeypatch):
+def test_of_a_policy_kind_of_another_package_every_typed_word_makes_another_policy(
+    tmp_path, monkeypatch
+):
+    """But the order of options, and where a file with the same content lies."""
     for module in (finding, policy_kinds):
         monkeypatch.setattr(module, "known_kinds", lambda: {"lab": False})
     for name in ("weights", "copy"):
@@ -257,7 +281,8 @@ def test_objects_of_two_classes_are_two_policies_even_if_they_declare_one_versio
         pass
 
     found = [
-        policy_of(policy, NAME).makeup for policy in (Mine(), Other(), Privileged(Mine()), Mine())
+        policy_of(policy, SHARED_NAME).makeup
+        for policy in (Mine(), Other(), Privileged(Mine()), Mine())
     ]
 
     assert found[0] == found[3]

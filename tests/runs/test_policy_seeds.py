@@ -6,12 +6,13 @@ from roboirg.runs.play.rollout import load_policy
 from roboirg.tasks.splits.splits import SIZES, get_episode
 
 
-def a_plan(**options):
+def plan_with(**options):
     chosen = {"tasks": "PickXtimes", "settings": "direct,explicit", "episodes": "3"} | options
     return make_plan(["random"], **chosen)
 
 
-def test_every_scene_policy_seed_and_only_the_arm_again_have_a_seed_of_their_own():
+def test_a_policy_draws_anew_in_each_scene_seed_and_repetition_but_not_in_other_arms():
+    """The arm *again* repeats an episode; others change its words, and nothing else may differ."""
     scenes = [get_episode("PickXtimes", "test", index).seed for index in range(SIZES["test"])]
     cases = [(seed, scene, arm) for seed in (0, 1) for scene in scenes for arm in ("told", "again")]
 
@@ -20,8 +21,9 @@ def test_every_scene_policy_seed_and_only_the_arm_again_have_a_seed_of_their_own
         assert episode_policy_seed(0, scenes[0], arm) == episode_policy_seed(0, scenes[0])
 
 
-def test_settings_and_forms_of_a_scene_share_the_seed_and_scenes_do_not():
-    jobs = a_plan(forms="implicit,resolved").jobs()
+def test_a_policy_draws_alike_in_all_settings_and_forms_of_a_scene():
+    """So that a gap between settings is due to words. Three scenes in three tellings each."""
+    jobs = plan_with(forms="implicit,resolved").jobs()
     seeds = {(job.episode, load_policy(PreparedJob(job)).seed) for job in jobs}
 
     assert len(jobs) == 9

@@ -17,7 +17,7 @@ from typing import Any
 
 import hostile_policies
 import pytest
-from hosting_fakes import PaperRunner, PaperWorld, paper_plan, paper_runner
+from hosting_fakes import FakeWorld, FakeWorldRunner, fake_world_plan, fake_world_runner
 from msgspec.structs import replace
 from run_fakes import FakePlay, changed, comparable, is_alive, small_plan
 
@@ -39,19 +39,23 @@ from roboirg.runs.run.runner import run_plan
 from roboirg.tasks.splits.private_splits import SALT_VARIABLE
 from roboirg.util.process_guard import descendants
 
-HONEST = "hosting_fakes:Dice"
+HONEST_POLICY = "hosting_fakes:Dice"
 
 
-def play(
+def records_of_each_policy(
     folder: Path, names: tuple[str, ...], episodes: int = 2, **options: Any
 ) -> dict[str, list[Record]]:
     """Play some episodes of each policy, and of an honest one between and after them."""
-    specs = [spec for name in names for spec in (hostile_policies.SPEC(name), f"{name}+1={HONEST}")]
+    specs = [
+        spec
+        for name in names
+        for spec in (hostile_policies.SPEC(name), f"{name}+1={HONEST_POLICY}")
+    ]
     if episodes == 1:  # what is left behind, not what comes after
         specs = specs[::2]
-    plan = changed(paper_plan("Dice", episodes), policies=specs, tries=1, **options)
+    plan = changed(fake_world_plan("Dice", episodes), policies=specs, tries=1, **options)
     folder.mkdir()
-    run_plan(plan, folder, paper_runner(plan, folder), LocalProcesses(1))
+    run_plan(plan, folder, fake_world_runner(plan, folder), LocalProcesses(1))
     found: dict[str, list[Record]] = {}
     for record in read_records(folder):
         found.setdefault(record.policy, []).append(record)
@@ -64,13 +68,16 @@ def hostile_run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("hostile") / "run"
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder.parent)
-        found = play(folder, (*hostile_policies.SPOILED, *hostile_policies.HARMLESS))
+        found = records_of_each_policy(
+            folder, (*hostile_policies.SPOILED, *hostile_policies.HARMLESS)
+        )
     return folder, found
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", hostile_policies.SPOILED)
-def test_what_a_policy_breaks_is_its_own(hostile_run, name):
+def test_a_policy_that_breaks_its_process_loses_its_own_episodes(hostile_run, name):
+    """Each cheats or breaks something: sends rubbish, closes files, raises an interrupt, ..."""
     _, found = hostile_run
     records = found[hostile_policies.SPEC(name)]
 
@@ -82,17 +89,18 @@ def test_what_a_policy_breaks_is_its_own(hostile_run, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", hostile_policies.HARMLESS)
-def test_what_breaks_nothing_fails_as_any_policy(hostile_run, name):
+def test_a_policy_that_cheats_in_vain_fails_as_any_policy(hostile_run, name):
+    """As one that searches memory for the goal, or declares itself the winner."""
     _, found = hostile_run
     records = found[hostile_policies.SPEC(name)]
     assert [(record.outcome, record.error) for record in records] == [("failure", None)] * 2
 
 
 @pytest.mark.slow
-def test_an_honest_policy_plays_after_each_as_alone(hostile_run, tmp_path):
+def test_an_honest_policy_has_the_same_outcomes_after_a_hostile_one_as_alone(hostile_run, tmp_path):
     folder, found = hostile_run
-    plan = paper_plan("Dice", 2, policy_process="shared")
-    alone = InProcess().run(deque(plan.jobs()), paper_runner(plan, tmp_path))
+    plan = fake_world_plan("Dice", 2, policy_process="shared")
+    alone = InProcess().run(deque(plan.jobs()), fake_world_runner(plan, tmp_path))
     expected = {record.episode: record.outcome for record in alone}
 
     for name in (*hostile_policies.SPOILED, *hostile_policies.HARMLESS):
@@ -103,20 +111,21 @@ def test_an_honest_policy_plays_after_each_as_alone(hostile_run, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_hosted_policy_finds_no_world_in_memory_and_one_beside_it_does(hostile_run, tmp_path):
+def test_a_policy_finds_the_goal_in_the_worlds_process_but_not_in_its_own(hostile_run, tmp_path):
+    """It searches every object and frame; the second half shows that its search does find it."""
     _, found = hostile_run
     for record in found[hostile_policies.SPEC("Searcher")]:
         assert record.policy_metadata == {"world": False, "job": False, "goal": False}
 
     beside = hostile_policies.Searcher()
-    job = paper_plan("Dice", 2, policy_process="shared").jobs()[0]
-    world = PaperWorld(job)  # both alive while it searches
+    job = fake_world_plan("Dice", 2, policy_process="shared").jobs()[0]
+    world = FakeWorld(job)  # both alive while it searches
     beside.reset(world.secret, {})
     assert beside.metadata == {"world": True, "job": True, "goal": True}, job
 
 
 @pytest.mark.slow
-def test_what_a_policy_owes_and_prints_is_stored_as_its_own(hostile_run):
+def test_usage_and_output_of_a_policy_are_stored_with_its_own_episodes(hostile_run):
     folder, found = hostile_run
     for record in found[hostile_policies.SPEC("Debtor")]:
         assert record.usage == {"input_tokens": 5.0}
@@ -126,11 +135,13 @@ def test_what_a_policy_owes_and_prints_is_stored_as_its_own(hostile_run):
 
 
 @pytest.mark.slow
-def test_what_a_policy_prints_or_enters_changes_neither_terminal_nor_folder(
+def test_policies_that_print_or_change_the_folder_leave_the_runs_terminal_and_folder_alone(
     tmp_path, monkeypatch, capfd
 ):
     monkeypatch.chdir(tmp_path)
-    play(tmp_path / "run", (*hostile_policies.SPOILED, *hostile_policies.HARMLESS))
+    records_of_each_policy(
+        tmp_path / "run", (*hostile_policies.SPOILED, *hostile_policies.HARMLESS)
+    )
 
     assert Path.cwd() == tmp_path
     printed = capfd.readouterr()
@@ -139,14 +150,14 @@ def test_what_a_policy_prints_or_enters_changes_neither_terminal_nor_folder(
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="there are subreapers on Linux")
-def test_what_is_forged_is_an_error_of_its_own_episode_and_nothing_started_survives(
+def test_forged_replies_are_errors_of_their_episode_and_processes_of_a_policy_end_with_it(
     tmp_path, monkeypatch
 ):
     notes = tmp_path / "notes"
     notes.mkdir()
     monkeypatch.setenv("HOSTILE_NOTES", str(notes))
     names = (*hostile_policies.FORGED, "Asker", "Forker", "GuardStopper", "Umlauts")
-    found = play(tmp_path / "run", names, episodes=1)
+    found = records_of_each_policy(tmp_path / "run", names, episodes=1)
 
     for name in names:
         cause = hostile_policies.FORGED.get(name)
@@ -164,7 +175,7 @@ def test_what_is_forged_is_an_error_of_its_own_episode_and_nothing_started_survi
 
 @pytest.mark.skipif(sys.platform != "linux", reason="there are subreapers on Linux")
 @pytest.mark.parametrize("name", ["Chain", "OutOfMemory"])
-def test_what_a_policy_started_ends_with_it_whatever_its_names_and_however_fast_it_forks(
+def test_processes_that_a_policy_starts_end_with_it_however_fast_they_multiply(
     tmp_path, monkeypatch, name
 ):
     monkeypatch.setenv("HOSTILE_NOTES", str(tmp_path))
@@ -185,7 +196,7 @@ def test_what_a_policy_started_ends_with_it_whatever_its_names_and_however_fast_
         assert not is_alive(int(note.name))
 
 
-READER = """
+CODE_OF_A_POLICY_THAT_LOOKS_FOR_SECRETS = """
 import contextlib, os, pathlib
 import numpy as np
 
@@ -203,14 +214,16 @@ class It:
 """
 
 
-def test_a_policy_gets_no_secrets_but_those_that_are_named(tmp_path, monkeypatch):
+def test_a_policys_process_has_no_keys_or_salt_of_the_environment_unless_the_plan_names_them(
+    tmp_path, monkeypatch
+):
     for name in ("OPENAI_API_KEY", "HF_TOKEN", "AWS_ACCESS_KEY_ID", "TOKENIZERS_PARALLELISM"):
         monkeypatch.setenv(name, "secret")
     monkeypatch.setenv(SALT_VARIABLE, "a very secret salt")
     monkeypatch.syspath_prepend(tmp_path)
-    (tmp_path / "reader.py").write_text(READER)
-    plan = paper_plan("reader:It", 1, policy_env="HF_TOKEN").checked()
-    run_plan(plan, tmp_path / "run", paper_runner(plan, tmp_path / "run"), LocalProcesses(1))
+    (tmp_path / "reader.py").write_text(CODE_OF_A_POLICY_THAT_LOOKS_FOR_SECRETS)
+    plan = fake_world_plan("reader:It", 1, policy_env="HF_TOKEN").checked()
+    run_plan(plan, tmp_path / "run", fake_world_runner(plan, tmp_path / "run"), LocalProcesses(1))
 
     (record,) = read_records(tmp_path / "run")
 
@@ -219,24 +232,24 @@ def test_a_policy_gets_no_secrets_but_those_that_are_named(tmp_path, monkeypatch
     assert {"HF_TOKEN", "TOKENIZERS_PARALLELISM"} <= record.policy_metadata.keys()
     assert {"OPENAI_API_KEY", "AWS_ACCESS_KEY_ID", SALT_VARIABLE}.isdisjoint(record.policy_metadata)
     with pytest.raises(InvalidValueError, match="NOT_SET_HERE is not set here, so policies cannot"):
-        paper_plan("reader:It", 1, policy_env="NOT_SET_HERE").checked()
+        fake_world_plan("reader:It", 1, policy_env="NOT_SET_HERE").checked()
 
 
-def test_honest_policies_play_alike_beside_a_cheat_in_a_long_folder_with_few_descriptors(
+def test_an_honest_policy_plays_alike_with_a_long_path_few_files_and_a_leaking_neighbor(
     tmp_path, monkeypatch
 ):
     folder = tmp_path / ("long" * 40)
     folder.mkdir()
     monkeypatch.setenv("TMPDIR", str(folder))
     monkeypatch.setattr(tempfile, "tempdir", None)
-    plan = paper_plan("Dice", 2, policy_process="shared")
-    alone = InProcess().run(deque(plan.jobs()), paper_runner(plan, tmp_path))
+    plan = fake_world_plan("Dice", 2, policy_process="shared")
+    alone = InProcess().run(deque(plan.jobs()), fake_world_runner(plan, tmp_path))
 
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     used = max(map(int, os.listdir("/dev/fd")))  # noqa: PTH208
     resource.setrlimit(resource.RLIMIT_NOFILE, (used + 30, hard))
     try:
-        beside = play(tmp_path / "beside", ("Leaker",))["Leaker+1"]
+        beside = records_of_each_policy(tmp_path / "beside", ("Leaker",))["Leaker+1"]
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
@@ -249,11 +262,11 @@ def unnamed(records):
 
 
 @pytest.fixture(scope="module")
-def hosted() -> Iterator[HostedPolicy]:
+def honest_policy_in_an_episode() -> Iterator[HostedPolicy]:
     """An honest policy in the middle of an episode."""
     with HostPool(HostSettings()) as pool:
-        policy = HostedPolicy(pool.connect(), read_policy(HONEST), 3)
-        world = PaperWorld(paper_plan("Dice", 1).jobs()[0])
+        policy = HostedPolicy(pool.connect(), read_policy(HONEST_POLICY), 3)
+        world = FakeWorld(fake_world_plan("Dice", 1).jobs()[0])
         _, info = world.reset()
         policy.reset("Pick the needle in the haystack.", info["demonstration"])
         policy.act(world.observation())  # type: ignore[arg-type]
@@ -262,8 +275,9 @@ def hosted() -> Iterator[HostedPolicy]:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-@pytest.mark.usefixtures("hosted")
-def test_nobody_can_connect_to_the_supervisor():
+@pytest.mark.usefixtures("honest_policy_in_an_episode")
+def test_no_socket_of_the_run_accepts_connections():
+    """In /proc/net/unix flags that are not 0 mean that a socket listens."""
     ours = {str(path.readlink()) for path in Path("/proc/self/fd").iterdir() if path.is_socket()}
     for line in Path("/proc/net/unix").read_text().splitlines()[1:]:
         *_, flags, _kind, _state, inode = line.split()[:7]
@@ -271,7 +285,9 @@ def test_nobody_can_connect_to_the_supervisor():
     assert ours
 
 
-def test_an_episode_begins_where_the_run_began(tmp_path, monkeypatch):
+def test_each_episode_begins_in_the_runs_folder_although_the_last_one_left_it(
+    tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     with HostPool(HostSettings()) as pool:
         for _ in range(2):  # the first one left for elsewhere
@@ -283,7 +299,10 @@ def test_an_episode_begins_where_the_run_began(tmp_path, monkeypatch):
             policy.close()
 
 
-def test_a_policy_and_files_beside_it_are_imported_only_in_its_own_process(tmp_path, monkeypatch):
+def test_a_policys_module_and_its_neighbors_are_imported_only_in_the_policys_process(
+    tmp_path, monkeypatch
+):
+    """Next to it lie files that shadow json, numpy and others; each notes where it is imported."""
     for module in ("json", "multiprocessing", "numpy", "roboirg"):
         (tmp_path / f"{module}.py").write_text(
             f"open('imported {module}', 'w').close()\nraise ImportError('shadowed')\n"
@@ -301,7 +320,7 @@ def test_a_policy_and_files_beside_it_are_imported_only_in_its_own_process(tmp_p
     for executor, limit in ((LocalProcesses(1), 99), (InProcess(), 9)):  # versions are compared
         plan = make_plan(["tattler:It"], tasks="PickXtimes", settings="direct", episodes="1",
                          max_steps=limit)  # fmt: skip
-        run_plan(plan, run, paper_runner(plan, run), executor)
+        run_plan(plan, run, fake_world_runner(plan, run), executor)
 
     imports = (tmp_path / "imports").read_text().splitlines()
 
@@ -332,10 +351,11 @@ def memory_of(pid: int, needle: bytes) -> bool:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-@pytest.mark.usefixtures("hosted")
-def test_the_memory_of_a_host_holds_no_goal_and_it_has_no_terminal():
+@pytest.mark.usefixtures("honest_policy_in_an_episode")
+def test_the_memory_of_a_policys_process_holds_its_instruction_but_not_the_goal():
+    """Nor has it the terminal. The search is tried on this process, which does know the goal."""
     *_, pid = descendants(os.getpid())
-    secret = PaperWorld(paper_plan("Dice", 1).jobs()[0]).secret.encode()
+    secret = FakeWorld(fake_world_plan("Dice", 1).jobs()[0]).secret.encode()
 
     assert memory_of(os.getpid(), secret)  # the search finds what is there
     assert memory_of(pid, b"Pick the needle in the haystack.")
@@ -343,12 +363,12 @@ def test_the_memory_of_a_host_holds_no_goal_and_it_has_no_terminal():
     assert os.getsid(pid) == pid
 
 
-def test_a_name_with_lone_surrogates_is_refused():
+def test_a_policy_name_that_cannot_be_written_as_utf8_is_refused():
     with pytest.raises(InvalidValueError, match="name of a policy"):
         make_plan(["x\ud800=random"], tasks="PickXtimes")
 
 
-class Liar(PaperRunner):
+class CallsFailuresSuccess(FakeWorldRunner):
     """Calls a failure a success, as a policy could that patches the judge in its own process."""
 
     def __call__(self, job: Job) -> Record:
@@ -356,9 +376,10 @@ class Liar(PaperRunner):
         return replace(record, outcome="success", cause="picked the wrong cube")
 
 
-def test_a_success_with_a_cause_is_refused(tmp_path):
+def test_a_failure_that_was_turned_into_a_success_is_noticed_by_its_cause(tmp_path):
+    """A success has no cause; a policy that patches the outcome alone leaves one."""
     plan: Plan = small_plan(1)
-    run_plan(plan, tmp_path, Liar(tmp_path), InProcess())
+    run_plan(plan, tmp_path, CallsFailuresSuccess(tmp_path), InProcess())
     for record in read_records(tmp_path):
         assert (record.outcome, record.error, record.goals) == ("error", "policy", None)
         assert record.cause == "policy: a success came with a cause (picked the wrong cube)"
@@ -369,8 +390,8 @@ def test_a_success_with_a_cause_is_refused(tmp_path):
         read_record(line, tmp_path, 1)
 
 
-def test_sigterm_is_the_users_where_ctrl_c_is_ignored(monkeypatch):
-    """A shell without a terminal starts what is in the background so."""
+def test_in_the_background_sigterm_ends_the_run_and_an_interrupt_is_the_policys_error(monkeypatch):
+    """There Ctrl-C is ignored (SIG_IGN), so an interrupt can only come from a policy."""
     monkeypatch.setattr(signal, "getsignal", lambda _number: signal.SIG_IGN)
     with pytest.raises(Terminated), attribute_errors("environment"):
         raise Terminated
@@ -378,8 +399,10 @@ def test_sigterm_is_the_users_where_ctrl_c_is_ignored(monkeypatch):
         raise KeyboardInterrupt
 
 
-def test_in_a_worker_an_interrupt_is_the_policys(tmp_path):
-    found = play(tmp_path / "run", ("Interrupter", "Unspeakable"), policy_process="shared")
+def test_a_policy_that_raises_an_interrupt_in_a_worker_loses_only_its_own_episodes(tmp_path):
+    found = records_of_each_policy(
+        tmp_path / "run", ("Interrupter", "Unspeakable"), policy_process="shared"
+    )
     for name in ("Interrupter", "Unspeakable"):
         for record in found[hostile_policies.SPEC(name)]:
             assert str(record.cause).startswith(hostile_policies.SPOILED[name])

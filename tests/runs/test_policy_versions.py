@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hosting_fakes import paper_plan, paper_runner
+from hosting_fakes import fake_world_plan, fake_world_runner
 from run_fakes import comparable
 
 from roboirg.core.errors import InvalidValueError
@@ -24,7 +24,7 @@ from roboirg.runs.plan.plan_maker import make_plan
 from roboirg.runs.run.executor import InProcess
 from roboirg.runs.run.runner import run_plan
 
-BODY = """
+CODE_OF_A_POLICY = """
 import os, pathlib
 import numpy as np
 
@@ -36,15 +36,15 @@ class It:
     def reset(self, instruction, demonstration): {reset}
     def act(self, observation): return np.ones((24, 8))
 """
-CHECKPOINT = 'os.environ["CKPT"]'
+CHECKPOINT_VARIABLE = 'os.environ["CKPT"]'
 NUMBER_BEHIND_TEXT = {
     "on_class": "version = 'base'",
-    "reset": f"self.version = float({CHECKPOINT})",
+    "reset": f"self.version = float({CHECKPOINT_VARIABLE})",
 }
 
 
 @pytest.fixture
-def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def write_policy_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "checkpointed", raising=False)
     monkeypatch.setenv("CKPT", "7")
@@ -57,64 +57,72 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 
 def code(**parts: str) -> str:
-    return BODY.format(**{"on_class": "", "made": "pass", "reset": "pass", **parts})
+    return CODE_OF_A_POLICY.format(**{"on_class": "", "made": "pass", "reset": "pass", **parts})
 
 
-def found_here(**parts: str) -> PolicyRef:
+def policy_opened_here(**parts: str) -> PolicyRef:
     """Open a class in this process, as a policy's own process does."""
     namespace: dict[str, Any] = {"__name__": "no_module"}
     exec(code(**parts), namespace)  # noqa: S102 - as a notebook does
     return open_policy(policy_of(namespace["It"]))
 
 
-def play(folder: Path) -> None:
-    plan = paper_plan("mine=checkpointed:It", 1)
+def play_one_episode(folder: Path) -> None:
+    plan = fake_world_plan("mine=checkpointed:It", 1)
     plan = plan.model_copy(update={"policies": tuple(map(open_policy, plan.policies))})
-    run_plan(plan, folder, paper_runner(plan, folder), InProcess())
+    run_plan(plan, folder, fake_world_runner(plan, folder), InProcess())
 
 
 @pytest.mark.parametrize(
     ("parts", "version"),
     [
-        ({"made": f"self.version = {CHECKPOINT}"}, "7"),
-        ({"on_class": f"version = property(lambda self: {CHECKPOINT})"}, "7"),
-        ({"made": f"self.version = np.int64({CHECKPOINT})"}, "7"),
-        ({"reset": f"self.version = pathlib.Path('ckpts', {CHECKPOINT})"}, "ckpts/7"),
+        ({"made": f"self.version = {CHECKPOINT_VARIABLE}"}, "7"),
+        ({"on_class": f"version = property(lambda self: {CHECKPOINT_VARIABLE})"}, "7"),
+        ({"made": f"self.version = np.int64({CHECKPOINT_VARIABLE})"}, "7"),
+        ({"reset": f"self.version = pathlib.Path('ckpts', {CHECKPOINT_VARIABLE})"}, "ckpts/7"),
         (NUMBER_BEHIND_TEXT, "7.0"),
     ],
 )
-def test_a_checkpoint_may_be_named_in_many_ways(parts, version, monkeypatch):
+def test_a_policy_may_give_its_version_as_text_number_or_path_when_made_or_reset(
+    parts, version, monkeypatch
+):
+    """Here the version is that of a checkpoint, which the environment variable CKPT names."""
     monkeypatch.setenv("CKPT", "7")
-    assert found_here(**parts).version == version
+    assert policy_opened_here(**parts).version == version
 
 
-def test_another_checkpoint_does_not_get_into_the_folder(write, tmp_path, monkeypatch):
-    write(**NUMBER_BEHIND_TEXT)
+def test_a_run_does_not_go_on_with_another_checkpoint_of_its_policy(
+    write_policy_module, tmp_path, monkeypatch
+):
+    """Nor with one whose version cannot be read; would find results of two under one name."""
+    write_policy_module(**NUMBER_BEHIND_TEXT)
     for _ in range(2):  # the same one goes on
-        play(tmp_path / "run")
+        play_one_episode(tmp_path / "run")
     before = read_records(tmp_path / "run")
     assert {record.policy_version for record in before} == {"7.0"}
 
     monkeypatch.setenv("CKPT", "8")
     with pytest.raises(StoreError, match=r"mine whose policy version is 7\.0, but now it is 8\.0"):
-        play(tmp_path / "run")
+        play_one_episode(tmp_path / "run")
 
-    write(made="self.version = 'b'", reset="raise KeyError('front')")
+    write_policy_module(made="self.version = 'b'", reset="raise KeyError('front')")
     with pytest.raises(StoreError, match=r"7.0, but the policy cannot be opened .*KeyError"):
-        play(tmp_path / "run")
+        play_one_episode(tmp_path / "run")
     assert list(map(comparable, read_records(tmp_path / "run"))) == list(map(comparable, before))
 
 
 @pytest.mark.parametrize("value", ["None", "''", "(1, 2)", "True", "object()"])
-def test_what_is_no_version_is_one_sentence(value):
+def test_a_version_that_is_neither_text_nor_number_is_refused(value):
     for parts in ({"made": f"self.version = {value}"}, {"on_class": f"version = {value}"}):
         with pytest.raises(InvalidValueError, match=r"version of It is .*; it must be a text, num"):
-            found_here(**parts)
+            policy_opened_here(**parts)
 
 
-def test_one_that_differs_in_each_process_gives_no_verdict(write, tmp_path):
-    write(made="self.version = os.getpid()")
-    play(tmp_path)
+def test_a_policy_whose_version_differs_from_process_to_process_gets_no_verdict(
+    write_policy_module, tmp_path
+):
+    write_policy_module(made="self.version = os.getpid()")
+    play_one_episode(tmp_path)
 
     (record,) = read_records(tmp_path)
 
@@ -122,33 +130,40 @@ def test_one_that_differs_in_each_process_gives_no_verdict(write, tmp_path):
     assert "must be the same in every process" in str(record.cause)
 
 
-def test_a_policy_that_cannot_begin_has_a_problem():
-    ref = found_here(made="self.version = 'b'", reset="raise KeyError('front')")
+def test_a_policy_whose_reset_raises_is_opened_with_the_error_as_its_problem():
+    ref = policy_opened_here(made="self.version = 'b'", reset="raise KeyError('front')")
     assert (ref.version, ref.problem) == ("unknown", "reset(): KeyError: 'front'")
 
 
-def test_a_command_opens_each_policy_once(write, tmp_path):
+def test_making_a_plan_opens_each_policy_once(write_policy_module, tmp_path):
+    """With a made-up instruction, to read its version; opening may take minutes."""
     note = tmp_path / "opened"
-    write(reset=f"open({str(note)!r}, 'a').write(instruction)")
+    write_policy_module(reset=f"open({str(note)!r}, 'a').write(instruction)")
 
     make_plan(["mine=checkpointed:It", "random"], tasks="PickXtimes", episodes="2")
 
     assert note.read_text() == "Put the red cube on the target."
 
 
-def test_a_version_that_cannot_be_read_is_not_taken_for_none():
+def test_a_policy_whose_version_raises_is_refused_rather_than_taken_for_one_without():
     for value in ("self.nett.name", 'os.environ["NOT_SET"]'):
         with pytest.raises(InvalidValueError, match="version of It cannot be read"):
-            found_here(on_class=f"version = property(lambda self: {value})")
+            policy_opened_here(on_class=f"version = property(lambda self: {value})")
 
 
-def test_versions_that_differ_in_what_a_name_cannot_hold_are_two():
+def test_versions_that_differ_only_in_unprintable_characters_stay_different():
+    """They are escaped for records; would find two versions that are escaped alike."""
     values = (r"'a\n'", r"'a\\n'", r"'a\udc80'", "'a?'")
-    assert len({found_here(made=f"self.version = {value}").version for value in values}) == 4
+    assert (
+        len({policy_opened_here(made=f"self.version = {value}").version for value in values}) == 4
+    )
 
 
-def test_without_a_version_another_class_or_part_of_a_system_is_another(write, tmp_path):
-    write()
+def test_policies_without_a_version_differ_by_class_code_and_by_planner_or_hands(
+    write_policy_module, tmp_path
+):
+    """Four policies, before and after their module changed: eight versions."""
+    write_policy_module()
     file = tmp_path / "checkpointed.py"
     file.write_text(
         file.read_text()
@@ -181,17 +196,22 @@ class Slots:
     assert "unknown" not in "".join(found)
 
 
-def test_two_versions_that_nobody_could_read_are_not_one(write, tmp_path):
-    write(reset="assert 'red cube on the target' not in instruction")
-    plan = paper_plan("mine=checkpointed:It", 1, policy_process="shared")
+def test_a_policy_whose_version_cannot_be_read_cannot_go_on_in_its_run(
+    write_policy_module, tmp_path
+):
+    """Two unreadable versions may be of two checkpoints."""
+    write_policy_module(reset="assert 'red cube on the target' not in instruction")
+    plan = fake_world_plan("mine=checkpointed:It", 1, policy_process="shared")
     plan = plan.model_copy(update={"policies": tuple(map(opened, plan.policies))})
-    run_plan(plan, tmp_path, paper_runner(plan, tmp_path), InProcess())
+    run_plan(plan, tmp_path, fake_world_runner(plan, tmp_path), InProcess())
 
     with pytest.raises(StoreError, match="cannot be opened to read its version"):
-        run_plan(plan, tmp_path, paper_runner(plan, tmp_path), InProcess())
+        run_plan(plan, tmp_path, fake_world_runner(plan, tmp_path), InProcess())
 
 
-def test_a_class_of_this_process_is_made_anew_in_each_run(monkeypatch):
+def test_the_version_of_a_class_in_this_process_is_read_anew_for_each_run(monkeypatch):
+    """Would find the version of a checkpoint that was loaded for an earlier run."""
+
     class Batched:
         def __init__(self) -> None:
             self.version = os.environ["CKPT"]
@@ -205,7 +225,8 @@ def test_a_class_of_this_process_is_made_anew_in_each_run(monkeypatch):
         assert open_policy(policy_of(Batched)).version == checkpoint
 
 
-def test_a_class_of_a_notebook_that_changes_is_another():
+def test_a_policy_class_of_a_notebook_is_another_after_its_cell_was_changed():
+    """And the first one again if the change is undone: the version follows from the code."""
     found = []
     for value in ("1", "2", "1"):
         cell = f"class It:\n    def act(self): return {value}\n"

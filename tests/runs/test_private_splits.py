@@ -42,16 +42,17 @@ def _no_salt(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(SALT_VARIABLE, "")  # so that what a test sets is undone
 
 
-def names_of(episodes: int, task: str, split: str) -> list[int]:
+def seeds_of(episodes: int, task: str, split: str) -> list[int]:
     return [get_episode(task, split, index).seed for index in range(episodes)]
 
 
-def test_a_salt_has_a_split_of_its_own():
+def test_each_salt_draws_episodes_of_its_own_that_are_in_no_public_split():
+    """A salt is a secret text from which the scenes' seeds of a private split follow."""
     first = use_salt(SALT)
     assert is_private(first)
-    seeds = {task: names_of(4, task, first) for task in find_tasks([ALL])}
+    seeds = {task: seeds_of(4, task, first) for task in find_tasks([ALL])}
     second = use_salt(OTHER)
-    other_seeds = {task: names_of(4, task, second) for task in find_tasks([ALL])}
+    other_seeds = {task: seeds_of(4, task, second) for task in find_tasks([ALL])}
 
     found = [*itertools.chain(*seeds.values(), *other_seeds.values())]
     assert len(set(found)) == len(found)
@@ -60,17 +61,17 @@ def test_a_salt_has_a_split_of_its_own():
     assert max(found) < 1 << 53  # a page's script can hold it
 
     use_salt(SALT)
-    assert names_of(4, "PickXtimes", first) == seeds["PickXtimes"]
+    assert seeds_of(4, "PickXtimes", first) == seeds["PickXtimes"]
     assert split_size(first) == split_size("random")
 
 
 def test_the_name_and_episodes_of_a_salt_never_change():
     assert use_salt("pinned-salt-0123") == "random@9be1761e24b2"
-    seeds = names_of(2, "PickXtimes", "random@9be1761e24b2")
+    seeds = seeds_of(2, "PickXtimes", "random@9be1761e24b2")
     assert seeds == [343211101013922, 319322239144157]
 
 
-def test_difficulties_repeat_and_scenes_are_those_of_their_seeds():
+def test_private_episodes_repeat_the_difficulties_and_their_scenes_follow_from_their_seeds():
     split = use_salt(SALT)
     episodes = [get_episode("BinFill", split, index) for index in range(8)]
 
@@ -80,7 +81,7 @@ def test_difficulties_repeat_and_scenes_are_those_of_their_seeds():
         assert (made.scene, made.goal) == (episode.scene, episode.goal)
 
 
-def test_seeds_without_a_scene_are_passed_over():
+def test_a_private_episode_takes_the_first_seed_for_which_a_scene_can_be_made():
     split = use_salt(SALT)
     task = "VideoPlaceOrder"
     rejected = 0
@@ -98,7 +99,7 @@ def test_seeds_without_a_scene_are_passed_over():
     assert rejected > 0
 
 
-def test_without_its_salt_a_split_is_refused():
+def test_a_private_split_is_refused_without_its_salt_or_with_another():
     split = use_salt(SALT)
     for other in ("", OTHER):
         os.environ[SALT_VARIABLE] = other
@@ -108,7 +109,7 @@ def test_without_its_salt_a_split_is_refused():
             make_plan(["oracle"], split=split, episodes="1")
 
 
-def test_what_a_salt_must_be():
+def test_a_short_salt_is_refused_without_being_printed_and_a_known_one_makes_random_private():
     with pytest.raises(InvalidValueError, match="at least 12") as found:
         use_salt("short")
     assert "short" not in str(found.value)
@@ -120,13 +121,13 @@ def test_what_a_salt_must_be():
     assert drawn_split("test") == "test"
 
 
-def test_a_policy_in_the_worlds_process_is_refused():
+def test_a_private_split_is_not_played_by_policies_that_share_the_worlds_process():
     split = use_salt(SALT)
     with pytest.raises(InvalidValueError, match="own"):
         make_plan(["oracle"], split=split, episodes="1", policy_process="shared")
 
 
-def contents(folder: Path) -> bytes:
+def all_bytes_written_in(folder: Path) -> bytes:
     """Return all that is written below a folder, with what is packed in archives."""
     found = []
     for path in sorted(folder.rglob("*")):
@@ -138,7 +139,8 @@ def contents(folder: Path) -> bytes:
     return b"\n".join(found)
 
 
-def test_results_are_read_without_the_salt(tmp_path):
+def test_results_of_a_private_split_are_shown_merged_and_packed_without_its_salt(tmp_path):
+    """Playing, verifying and showing scenes needs it, and no file that is written contains it."""
     split = use_salt(SALT)
     run = tmp_path / "run"
     run.mkdir()
@@ -158,19 +160,19 @@ def test_results_are_read_without_the_salt(tmp_path):
     for command in (("leaderboard", "verify", run), ("show", "PickXtimes", 0, "--split", split)):
         with pytest.raises(MissingSaltError):
             call(*command)
-    assert SALT.encode() not in contents(tmp_path)
+    assert SALT.encode() not in all_bytes_written_in(tmp_path)
 
 
-def test_the_salt_is_in_no_line_of_a_command(tmp_path, monkeypatch):
+def test_a_command_neither_prints_nor_writes_the_salt(tmp_path, monkeypatch):
     monkeypatch.setenv(SALT_VARIABLE, SALT)
     options = ["--policy", "random", "--split", "random", "--episodes", "1", "--dry-run"]
 
     assert SALT not in call("run", "--out", tmp_path / "run", *options)
-    assert SALT.encode() not in contents(tmp_path)
+    assert SALT.encode() not in all_bytes_written_in(tmp_path)
 
 
 @pytest.mark.slow
-def test_workers_of_a_cluster_get_the_salt_of_the_command(tmp_path):
+def test_workers_of_a_cluster_get_the_salt_and_write_it_into_no_log(tmp_path):
     ray = pytest.importorskip("ray")
     with tempfile.TemporaryDirectory(prefix="ray-") as logs:  # short: sockets are in it
         ray.init(num_cpus=1, log_to_driver=False, include_dashboard=False, _temp_dir=logs)
@@ -182,6 +184,6 @@ def test_workers_of_a_cluster_get_the_salt_of_the_command(tmp_path):
         finally:
             ray.shutdown()
         assert {record.split for record in read_records(run)} == {split}
-        written = contents(Path(logs))
+        written = all_bytes_written_in(Path(logs))
         assert b"raylet" in written
         assert SALT.encode() not in written

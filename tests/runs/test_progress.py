@@ -13,10 +13,10 @@ from roboirg.records.record import Record
 from roboirg.runs.run import progress
 from roboirg.runs.run.progress import ConsoleReporter
 
-RECORDS = [FakePlay()(job) for job in small_plan(2).jobs()]
+FOUR_RECORDS = [FakePlay()(job) for job in small_plan(2).jobs()]
 
 
-def report(records: list[Record], *, terminal: bool) -> str:
+def printed_report(records: list[Record], *, terminal: bool) -> str:
     console = Console(file=io.StringIO(), force_terminal=terminal, width=80)
     with ConsoleReporter(console) as reporter:
         reporter.start(6, 2)
@@ -26,29 +26,31 @@ def report(records: list[Record], *, terminal: bool) -> str:
 
 
 def test_a_terminal_sees_pace_time_left_and_score_in_80_columns():
-    text = report(RECORDS, terminal=True)
+    text = printed_report(FOUR_RECORDS, terminal=True)
     last = text[text.rindex("episodes") :]
     assert "6/6" in last
     assert "0:00 left" in last
     assert "/min" in last
 
     won = {
-        setting: sum(record.outcome == "success" for record in RECORDS if record.setting == setting)
+        setting: sum(
+            record.outcome == "success" for record in FOUR_RECORDS if record.setting == setting
+        )
         for setting in ("direct", "explicit")
     }
     assert f"direct {won['direct']}/2 · explicit {won['explicit']}/2" in last
 
 
-def test_elsewhere_every_episode_is_one_plain_line(monkeypatch):
-    """The time left goes by the pace of this run, a minute an episode, not by what was stored."""
+def test_outside_a_terminal_each_episode_is_reported_in_one_plain_line(monkeypatch):
+    """The time left is from the pace of this run, one minute an episode, not from stored ones."""
     minutes = itertools.count(0, 60)
     monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=minutes.__next__))
 
-    lines = report(
+    lines = printed_report(
         [
-            RECORDS[0],
-            replace(RECORDS[1].with_options(form="resolved"), arm="silent"),
-            *RECORDS[2:],
+            FOUR_RECORDS[0],
+            replace(FOUR_RECORDS[1].with_options(form="resolved"), arm="silent"),
+            *FOUR_RECORDS[2:],
         ],
         terminal=False,
     ).splitlines()
@@ -67,7 +69,9 @@ def test_a_warning_is_printed_at_once_on_stderr(capsys):
     assert capsys.readouterr().err == "Mind the gap.\n"
 
 
-def test_errors_are_in_the_score_but_in_no_rate():
-    """What is played again is not done twice."""
-    text = report([RECORDS[0], replace(RECORDS[0], outcome="error", attempt=2)], terminal=True)
+def test_errors_are_counted_apart_and_an_episode_played_again_is_done_once():
+    """Two of six were stored; one is played, fails, and is repeated with an error: 3 of 6."""
+    text = printed_report(
+        [FOUR_RECORDS[0], replace(FOUR_RECORDS[0], outcome="error", attempt=2)], terminal=True
+    )
     assert re.search(r"3/6.*direct 0/1 · errors 1", text[text.rindex("episodes") :], re.DOTALL)

@@ -33,24 +33,25 @@ from roboirg.runs.play.prompt_shares import (
 )
 from roboirg.runs.play.rollout import EpisodeRunner
 
-SYSTEMS = [f"system:{name}" for name in all_systems()]
-EXACT = PromptLimit(64, 0, most_tokens, "some.model")
-LONG = {"setting": "contextual", "distractors": 16}
+ALL_SYSTEMS_OF_THE_PAPER = [f"system:{name}" for name in all_systems()]
+LIMIT_OF_64_TOKENS = PromptLimit(64, 0, most_tokens, "some.model")
+LONG_INSTRUCTION = {"setting": "contextual", "distractors": 16}
 
 
-def job(**fields: object) -> Job:
+def job_with(**fields: object) -> Job:
     usual = {"policy": "random", "task": "PickXtimes", "split": "test", "episode": 0}
     return job_of(**{**usual, "setting": "direct", **fields})
 
 
-def test_no_system_of_the_paper_cuts_an_instruction_of_the_papers_plan():
+def test_every_model_of_the_paper_reads_all_instructions_of_the_papers_plan_to_the_end():
+    """A model reads so many tokens of a prompt; the rest is cut."""
     options = {**read_plan_file("paper"), "policy_seeds": "0", "episodes": "0,29"}
     options.pop("policies", None)
-    plan = make_plan(SYSTEMS, **options)
+    plan = make_plan(ALL_SYSTEMS_OF_THE_PAPER, **options)
 
     shares = prompt_shares(plan.jobs())
 
-    assert [share.policy for share in shares] == SYSTEMS
+    assert [share.policy for share in shares] == ALL_SYSTEMS_OF_THE_PAPER
     for share in shares:
         assert share.limit.tokens >= 64
         assert set(share.settings) == {"explicit", "direct", "reasoning", "contextual", "spatial"}
@@ -58,7 +59,11 @@ def test_no_system_of_the_paper_cuts_an_instruction_of_the_papers_plan():
     assert not list(warning_lines(shares))
 
 
-def test_options_that_add_words_are_cut():
+def test_a_dry_run_warns_which_share_of_longer_instructions_a_model_does_not_read():
+    """16 distractors make contextual ones too long for a's 64 tokens, but not for b's 1,000.
+
+    The random policy declares no limit. *Unknown* ones may be cut: 0 or 1 of 2.
+    """
     plan = make_plan(
         ["a=system:pi0.5", "b=openpi://localhost:1?prompt_tokens=1000", "random"],
         settings="explicit,contextual",
@@ -84,8 +89,11 @@ def test_options_that_add_words_are_cut():
     assert other.endswith("instructions does not reach it: direct 0–50 %.")
 
 
-def test_every_job_is_counted_by_its_own_words_and_limit():
-    """Of another episode, task, split, form, delivery, arm or limit the words are others."""
+def test_each_episode_is_counted_by_its_own_words_and_its_policys_limit():
+    """The counts are made fast, for groups; here they are compared with one by one.
+
+    Would find a group whose members differ in task, split, form, delivery, arm or limit.
+    """
     options = {"settings": "explicit,contextual", "forms": "implicit,resolved", "episodes": "0-2"}
     options |= {"tasks": "StopCube,BinFill", "in_turns": "contextual", "arms": "told,silent"}
     specs = [f"p{tokens}=openpi://localhost:1?prompt_tokens={tokens}" for tokens in (40, 60, 80)]
@@ -119,36 +127,39 @@ def test_every_job_is_counted_by_its_own_words_and_limit():
         ({"unknown": 1, "heard": 999}, "0–<1 %"),
     ],
 )
-def test_shares_are_between_bounds(counts, text):
+def test_a_share_of_cut_prompts_is_a_range_if_some_are_unknown(counts, text):
     assert share_text(Counter(counts)) == text  # type: ignore[arg-type]
 
 
-def test_messages_are_what_is_heard_at_once():
+def test_utterances_of_the_same_step_are_sent_as_one_message():
+    """By step; None is never. In the second case "a" comes in the reset, "d" after the end."""
     assert sent_messages("abc", (0, 0, 0)) == (("a", "b", "c"),)
     assert sent_messages("abcd", (0, 16, 16, None)) == (("a",), ("b", "c"))
 
 
-def test_in_turns_each_message_has_the_whole_budget():
-    at_once = job(**LONG)
-    in_turns = job(**LONG, delivery="turns")
-    assert audit_job(at_once, EXACT)[1] == "cut"
+def test_an_instruction_too_long_as_one_prompt_fits_if_it_comes_in_turns():
+    """Each message may have 64 tokens."""
+    at_once = job_with(**LONG_INSTRUCTION)
+    in_turns = job_with(**LONG_INSTRUCTION, delivery="turns")
+    assert audit_job(at_once, LIMIT_OF_64_TOKENS)[1] == "cut"
 
-    audit, verdict = audit_job(in_turns, EXACT)
+    audit, verdict = audit_job(in_turns, LIMIT_OF_64_TOKENS)
     assert verdict == "heard"
     assert audit.needed[1] < 64
     assert [len(turn) for turn in instruct_job(in_turns).turns] == list(audit.reached)
 
 
-def test_a_record_says_what_was_cut():
-    record = make_record(job(**LONG), "failure", "because")
-    audit_record(record, PreparedJob(job(**LONG)), EXACT)
+def test_a_record_notes_how_far_the_prompt_was_read_and_which_mentions_were_lost():
+    """The command stands at the end of the instruction, so it is what is lost."""
+    record = make_record(job_with(**LONG_INSTRUCTION), "failure", "because")
+    audit_record(record, PreparedJob(job_with(**LONG_INSTRUCTION)), LIMIT_OF_64_TOKENS)
 
     audit = record.prompt
 
     assert record.prompt_verdict == "cut"
     assert audit.needed[0] == audit.needed[1] > 64
     assert audit.tokenizer == "some.model"
-    # The command stands at the end.
+    # Characters read of each utterance: all of the first, none of the last.
     assert audit.reached[-1] == 0 < audit.reached[0] == len(record.instruction[0].text)
     assert record.mentions[-1].utterance == len(record.instruction) - 1
     assert len(record.mentions) - 1 in audit.lost
@@ -156,15 +167,16 @@ def test_a_record_says_what_was_cut():
     assert not {"prompt", "prompt_verdict"} & set(IDENTITY)
 
 
-def test_records_without_a_limit_are_unknown():
-    record = make_record(job(), "success")
+def test_a_record_of_a_policy_without_a_declared_limit_is_unknown_not_heard():
+    record = make_record(job_with(), "success")
     assert (record.prompt, record.prompt_verdict) == (None, "unknown")
 
 
-def test_what_was_not_said_yet_is_neither_heard_nor_lost():
-    played = job(setting="contextual", delivery="turns")
+def test_utterances_that_were_never_sent_count_neither_as_read_nor_as_lost():
+    """The episode ended after the first of several turns. The limit is 3 tokens."""
+    played = job_with(setting="contextual", delivery="turns")
     prepared = PreparedJob(played)
-    limit = EXACT._replace(tokens=3)
+    limit = LIMIT_OF_64_TOKENS._replace(tokens=3)
     record = make_record(played, "failure", "because", instruction=utterances_at(prepared, [0]))
     audit_record(record, prepared, limit)
 
@@ -176,11 +188,12 @@ def test_what_was_not_said_yet_is_neither_heard_nor_lost():
     assert len(record.prompt.reached) == len(record.instruction)
 
 
-def test_a_long_prompt_is_refused_before_it_is_played(tmp_path):
+def test_long_prompts_refuse_ends_an_episode_before_it_costs_anything(tmp_path):
+    """In turns the same words are short enough, so it begins, and fails to connect."""
     spec = "openpi://localhost:1?prompt_tokens=64&connect=1"  # nobody listens there
     for delivery in ("prompt", "turns"):
         record = EpisodeRunner(tmp_path, refuse_long=True)(
-            job(**LONG, ref=read_policy(spec), delivery=delivery)
+            job_with(**LONG_INSTRUCTION, ref=read_policy(spec), delivery=delivery)
         )
         if delivery == "prompt":
             assert (record.outcome, record.error, record.steps) == ("error", "prompt", 0)
@@ -193,14 +206,14 @@ def test_a_long_prompt_is_refused_before_it_is_played(tmp_path):
             assert record.error != "prompt"
 
 
-def test_only_what_is_certainly_cut_is_refused():
+def test_a_prompt_that_may_or_may_not_be_cut_is_not_refused():
     for verdict in ("heard", "unknown"):
-        check_prompt(audit_job(job(), EXACT)[0], verdict)
+        check_prompt(audit_job(job_with(), LIMIT_OF_64_TOKENS)[0], verdict)
     with pytest.raises(InvalidValueError, match="must be 'send' or 'refuse'"):
         make_plan(["random"], long_prompts="cut")
 
 
-def test_the_dry_run_prints_the_shares(tmp_path):
+def test_a_dry_run_prints_the_share_of_cut_prompts_and_the_policies_without_a_limit(tmp_path):
     words = ["run", "--dry-run", "--out", str(tmp_path), "--tasks", "PickXtimes"]
     words += ["--policy", "system:pi0.5", "--policy", "far=openpi://localhost:1"]
     said = CliRunner().invoke(main.app, [*words, "--plan", plan_file(distractors=16)])

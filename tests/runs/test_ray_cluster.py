@@ -11,7 +11,7 @@ from typing import Any
 
 import hosting_fakes
 import pytest
-from hosting_fakes import PatientRunner, paper_plan, paper_runner
+from hosting_fakes import PatientRunner, fake_world_plan, fake_world_runner
 from run_fakes import (
     FakePlayer,
     all_comparable,
@@ -36,13 +36,13 @@ pytestmark = pytest.mark.slow
 
 ray = pytest.importorskip("ray")
 
-PLAN = small_plan(5).model_copy(update={"arms": ("told", "silent")})
+PLAN_OF_TWO_ARMS = small_plan(5).model_copy(update={"arms": ("told", "silent")})
 
 
 @pytest.fixture(scope="module")
-def here(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, object]]:
+def records_of_one_process(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, object]]:
     folder = tmp_path_factory.mktemp("here")
-    run_plan(PLAN, folder, FakePlayer(folder), InProcess())
+    run_plan(PLAN_OF_TWO_ARMS, folder, FakePlayer(folder), InProcess())
     return all_comparable(folder)
 
 
@@ -56,8 +56,8 @@ def cluster() -> Iterator[Any]:
     nodes.shutdown()
 
 
-def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
-    cluster, tmp_path, here
+def test_a_cluster_that_loses_a_machine_half_way_gives_the_same_records_as_one_process(
+    cluster, tmp_path, records_of_one_process
 ):
     doomed = cluster.add_node(num_cpus=1)
     cluster.add_node(num_cpus=1)
@@ -77,7 +77,7 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
     killer = threading.Thread(target=kill, daemon=True)
     killer.start()
     summary = run_plan(
-        changed(PLAN, tries=3),
+        changed(PLAN_OF_TWO_ARMS, tries=3),
         tmp_path,
         FakePlayer(tmp_path, gate=tmp_path / "gate", closed=2),
         RayCluster(),
@@ -86,24 +86,25 @@ def test_records_are_those_of_one_process_even_if_a_node_is_killed_half_way(
     assert killed.is_set()
     assert (summary.errors, summary.missing) == ((), 0)
     # The episode that it had in hand was tried again.
-    assert line_count(tmp_path) > len(here)
-    assert all_comparable(tmp_path) == here
+    assert line_count(tmp_path) > len(records_of_one_process)
+    assert all_comparable(tmp_path) == records_of_one_process
     for record in read_records(tmp_path):
         assert (tmp_path / str(record.video)).read_text() == record.slug
 
     # What would end every episode ends the run if all machines say so.
     with pytest.raises(RoboIRGError, match=r"No machine of the Ray cluster.*No Vulkan device"):
-        run_plan(PLAN, tmp_path / "b", FakePlayer(tmp_path, fatal=0), RayCluster(1))
+        run_plan(PLAN_OF_TWO_ARMS, tmp_path / "b", FakePlayer(tmp_path, fatal=0), RayCluster(1))
 
 
-def test_the_workers_of_a_machine_share_its_policy_hosts(cluster, tmp_path, monkeypatch):
+def test_all_workers_of_a_machine_ask_one_process_for_their_policy(cluster, tmp_path, monkeypatch):
+    """Three workers on two machines, two processes with the policy, which all end with the run."""
     monkeypatch.syspath_prepend(Path(hosting_fakes.__file__).parent)
-    plan = paper_plan("Resident", 12)
+    plan = fake_world_plan("Resident", 12)
     local = tmp_path / "local"
     far = tmp_path / "far"
     for folder in (local, far):
         folder.mkdir()
-    run_plan(plan, local, paper_runner(plan, local), LocalProcesses(2))
+    run_plan(plan, local, fake_world_runner(plan, local), LocalProcesses(2))
     cluster.add_node(num_cpus=2)
     ray.init(address=cluster.address, log_to_driver=False)
     run_plan(
@@ -126,18 +127,21 @@ def test_the_workers_of_a_machine_share_its_policy_hosts(cluster, tmp_path, monk
     pytest.fail("a policy's process is left")
 
 
-def test_a_cluster_that_is_not_there_is_one_sentence(tmp_path):
+def test_a_cluster_that_cannot_be_joined_is_reported_in_one_sentence(tmp_path):
     with pytest.raises(RoboIRGError, match=r"cluster '127\.0\.0\.1:1' cannot be joined") as caught:
-        run_plan(PLAN, tmp_path, FakePlayer(tmp_path), RayCluster(address="127.0.0.1:1"))
+        run_plan(
+            PLAN_OF_TWO_ARMS, tmp_path, FakePlayer(tmp_path), RayCluster(address="127.0.0.1:1")
+        )
     assert "\n" not in str(caught.value)
 
 
-def test_no_workers_is_one_sentence():
+def test_a_cluster_with_no_worker_is_refused():
     with pytest.raises(InvalidValueError, match="workers is 0"):
         RayCluster(0)
 
 
-def test_only_who_has_the_key_reaches_the_hosts_of_a_machine(tmp_path):
+def test_only_a_client_with_the_key_reaches_the_policy_processes_of_a_machine(tmp_path):
+    """Another key and a silent client get nothing: their connection is closed."""
     hosts = MachineAgent(tmp_path / "agent", HostSettings())
     address = hosts.check(MachineVersions(())).hosts
 

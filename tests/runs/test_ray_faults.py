@@ -30,7 +30,7 @@ pytestmark = pytest.mark.slow
 
 ray = pytest.importorskip("ray")
 
-PLAN = changed(small_plan(8), tries=3)
+PLAN_OF_16_EPISODES = changed(small_plan(8), tries=3)
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def cluster(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     nodes.shutdown()
 
 
-def actors(cluster: Any, name: str) -> list[int]:
+def process_ids_of_actors(cluster: Any, name: str) -> list[int]:
     """Return the processes of this cluster's actors, as other tests may have clusters, too."""
     raylets = [node.all_processes["raylet"][0].process.pid for node in cluster.list_all_nodes()]
     command = ["pgrep", "-P", ",".join(map(str, raylets)), "-f", f"ray::{name}"]
@@ -52,7 +52,7 @@ def actors(cluster: Any, name: str) -> list[int]:
     return list(map(int, found.stdout.split()))
 
 
-def after(
+def act_after_records(
     folder: Path, count: int, act: Callable[[], object], run_ended: Callable[[], bool] | None = None
 ) -> threading.Thread:
     """Act in a thread as soon as that many records are stored; never, if the run ends before."""
@@ -69,16 +69,18 @@ def after(
     return thread
 
 
-FAULTS = (
+FAULTY_PLAYERS = (
     (WithoutVulkan, "random", "No Vulkan device can render; install one."),
     (WithoutModule, "random", "No module named 'needed_here'"),
     (FakePlayer, "local_policy:Local", "No module named 'their_model'"),
 )
 
 
-def test_a_bad_machine_is_left_out_and_named_once(cluster, tmp_path):
+def test_a_machine_that_cannot_play_is_left_out_and_named_once_and_the_others_play_all(
+    cluster, tmp_path
+):
     cluster.add_node(num_cpus=1, env_vars={BAD_MACHINE: "1"})
-    for number, (play, policy, fault) in enumerate(FAULTS):
+    for number, (play, policy, fault) in enumerate(FAULTY_PLAYERS):
         folder = tmp_path / str(number)
         gate = tmp_path / f"left-out-{number}"
         reporter = mock.Mock(spec=Reporter)
@@ -97,7 +99,7 @@ def test_a_bad_machine_is_left_out_and_named_once(cluster, tmp_path):
 
 
 @pytest.mark.parametrize("actor", ["RemoteWorker", "MachineAgent"])
-def test_what_is_frozen_is_noticed_and_its_episode_played_elsewhere(
+def test_a_worker_or_machine_that_freezes_is_ended_and_its_episode_played_elsewhere(
     cluster, tmp_path, monkeypatch, actor
 ):
     monkeypatch.setattr(ray_pool, "BEAT_S", 1.0)
@@ -106,17 +108,18 @@ def test_what_is_frozen_is_noticed_and_its_episode_played_elsewhere(
     frozen: list[int] = []
 
     def freeze() -> None:
-        frozen.append(actors(cluster, actor)[0])
+        frozen.append(process_ids_of_actors(cluster, actor)[0])
         # Not before: Ray may take longer to start an actor.
         monkeypatch.setattr(ray_pool, "SILENCE_S", 20.0)
         os.kill(frozen[0], signal.SIGSTOP)
 
     play = FakePlayer(tmp_path, 0.5, gate=tmp_path / "gate", closed=7)
     run = threading.Thread(
-        target=run_plan, args=(PLAN, tmp_path, play, RayCluster(address=cluster.address))
+        target=run_plan,
+        args=(PLAN_OF_16_EPISODES, tmp_path, play, RayCluster(address=cluster.address)),
     )
     run.start()
-    after(tmp_path, 4, freeze, lambda: not run.is_alive()).join()
+    act_after_records(tmp_path, 4, freeze, lambda: not run.is_alive()).join()
     deadline = time.monotonic() + 300
     while frozen and Path(f"/proc/{frozen[0]}").exists() and run.is_alive():
         if time.monotonic() > deadline:
@@ -129,11 +132,14 @@ def test_what_is_frozen_is_noticed_and_its_episode_played_elsewhere(
     assert not Path(f"/proc/{frozen[0]}").exists()
 
     kept = list(read_records(tmp_path))
-    assert (len(kept), [record.error for record in kept if record.error]) == (len(PLAN.jobs()), [])
+    assert (len(kept), [record.error for record in kept if record.error]) == (
+        len(PLAN_OF_16_EPISODES.jobs()),
+        [],
+    )
     assert "has not answered" in (tmp_path / RECORDS_FILE).read_text()
 
 
-def test_a_machine_that_joins_is_used_and_a_head_without_cpus_is_not(tmp_path, monkeypatch):
+def test_a_run_waits_for_a_free_machine_and_uses_one_that_joins_later(tmp_path, monkeypatch):
     from ray.cluster_utils import Cluster
 
     nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
@@ -142,7 +148,9 @@ def test_a_machine_that_joins_is_used_and_a_head_without_cpus_is_not(tmp_path, m
     play = FakePlayer(tmp_path)
     executor = RayCluster(address=nodes.address)
     run = threading.Thread(
-        target=run_plan, args=(PLAN, tmp_path, play, executor), kwargs={"reporter": warnings}
+        target=run_plan,
+        args=(PLAN_OF_16_EPISODES, tmp_path, play, executor),
+        kwargs={"reporter": warnings},
     )
     try:
         run.start()
@@ -154,10 +162,13 @@ def test_a_machine_that_joins_is_used_and_a_head_without_cpus_is_not(tmp_path, m
         ray.shutdown()
         nodes.shutdown()
     assert "Waiting for a free CPU" in warnings.warn.call_args_list[0].args[0]
-    assert line_count(tmp_path) == len(PLAN.jobs())
+    assert line_count(tmp_path) == len(PLAN_OF_16_EPISODES.jobs())
 
 
-def test_a_worker_gets_what_the_plan_asks_for(cluster, tmp_path, monkeypatch):
+def test_a_worker_gets_the_label_gpu_share_variables_and_folder_that_the_plan_asks_for(
+    cluster, tmp_path, monkeypatch
+):
+    """Each notes its variable A_KEY, a file of the copied folder and the label of its machine."""
     folder = tmp_path / "policies"
     out = tmp_path / "run"
     folder.mkdir()
@@ -172,7 +183,7 @@ def test_a_worker_gets_what_the_plan_asks_for(cluster, tmp_path, monkeypatch):
         gpus=0.5, labels={"rack": "b"}, variables=("A_KEY",), working_dir=str(folder)
     )
     executor = RayCluster(address=cluster.address, needs=needs)
-    summary = run_plan(PLAN, out, NotingPlace(out), executor)
+    summary = run_plan(PLAN_OF_16_EPISODES, out, NotingPlace(out), executor)
     assert (summary.errors, summary.missing) == ((), 0)
     assert {(out / str(record.video)).read_text() for record in read_records(out)} == {
         "secret copied b"
@@ -185,7 +196,9 @@ def test_a_worker_gets_what_the_plan_asks_for(cluster, tmp_path, monkeypatch):
         )
 
 
-def test_the_loss_of_the_head_is_one_sentence(cluster, tmp_path, monkeypatch):
+def test_a_run_that_loses_the_head_of_its_cluster_ends_in_one_sentence_and_keeps_its_records(
+    cluster, tmp_path, monkeypatch
+):
     monkeypatch.setattr(ray_head, "HEAD_LOST_S", 5.0)
     gcs = cluster.head_node.all_processes["gcs_server"][0].process.pid
 
@@ -199,9 +212,9 @@ def test_the_loss_of_the_head_is_one_sentence(cluster, tmp_path, monkeypatch):
             time.sleep(0.05)
         os.kill(gcs, signal.SIGKILL)
 
-    after(tmp_path, 4, kill)
+    act_after_records(tmp_path, 4, kill)
     play = FakePlayer(tmp_path, 0.5, gate=tmp_path / "gate", closed=4)
 
     with pytest.raises(RoboIRGError, match=r"head of the Ray cluster .* same command again"):
-        run_plan(PLAN, tmp_path, play, RayCluster(address=cluster.address))
+        run_plan(PLAN_OF_16_EPISODES, tmp_path, play, RayCluster(address=cluster.address))
     assert 4 <= line_count(tmp_path) == len(list(read_records(tmp_path)))

@@ -1,4 +1,4 @@
-"""One episode against a world and a policy made of paper."""
+"""One episode with a fake world and a fake policy."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ JOB = Job(
 )
 
 
-class PaperWorld:
+class FakeWorld:
     """Ends after `length` steps with `status`."""
 
     render_device = "none"
@@ -63,7 +63,7 @@ class PaperWorld:
         self.trouble: Exception | None = None
 
     @property
-    def unwrapped(self) -> PaperWorld:
+    def unwrapped(self) -> FakeWorld:
         return self
 
     def set_frame_hook(self, hook: Callable[[Any, bool], None], every: int = 1) -> None:
@@ -112,7 +112,7 @@ class PaperWorld:
         self.closed = True
 
 
-class PaperPolicy:
+class FakePolicy:
     cameras = ()
 
     def __init__(self, answer: Any = None) -> None:
@@ -129,16 +129,16 @@ class PaperPolicy:
         return self.answer
 
 
-class PaperInsider(PaperPolicy):
+class PolicyWithAttach(FakePolicy):
     def attach(self, env: Any) -> None:
         self.heard.append(type(env).__name__)
 
 
 @pytest.fixture
-def set_up(monkeypatch: pytest.MonkeyPatch) -> SetUp:
+def give_world_and_policy(monkeypatch: pytest.MonkeyPatch) -> SetUp:
     """Return what sets the world and the policy of the next episode."""
 
-    def give(world: PaperWorld, policy: Any) -> None:
+    def give(world: FakeWorld, policy: Any) -> None:
         monkeypatch.setattr(rollout, "make_env", lambda _job, _needs: world)
         monkeypatch.setattr(rollout, "load_policy", lambda _job: policy)
 
@@ -146,19 +146,25 @@ def set_up(monkeypatch: pytest.MonkeyPatch) -> SetUp:
 
 
 @pytest.fixture
-def stage(set_up: SetUp) -> Stage:
-    def play(world: PaperWorld, policy: Any, job: Job = JOB) -> Record:
-        set_up(world, policy)
+def record_of_episode(give_world_and_policy: SetUp) -> Stage:
+    def play(world: FakeWorld, policy: Any, job: Job = JOB) -> Record:
+        give_world_and_policy(world, policy)
         return EpisodeRunner(Path()).play_once(job)[0]
 
     return play
 
 
-def test_all_rows_are_played_until_the_end(stage):
-    policy = PaperPolicy()
-    world = PaperWorld(length=5)
+def test_an_episode_ends_within_a_chunk_of_actions_and_its_record_counts_what_was_executed(
+    record_of_episode,
+):
+    """The policy answers with 3 actions at a time, the world ends after 5: two calls, 3 + 2.
 
-    course = stage(world, policy)
+    *executed* is the most of a call, 3.
+    """
+    policy = FakePolicy()
+    world = FakeWorld(length=5)
+
+    course = record_of_episode(world, policy)
 
     assert (course.outcome, course.cause, course.steps) == ("success", None, 5)
     assert (course.calls, course.executed) == (2, 3)
@@ -169,21 +175,25 @@ def test_all_rows_are_played_until_the_end(stage):
     assert world.closed
 
 
-def test_a_record_holds_what_the_job_prescribes_instead_of_the_policy(stage):
+def test_a_plan_may_prescribe_the_frames_of_the_video_but_not_other_actions(record_of_episode):
+    """A policy that wants other actions than the plan prescribes is an error."""
     job = replace(JOB, environment=EnvironmentOptions(demonstration_frames=4))
-    needs = stage(PaperWorld(), PaperPolicy(), job).needs
+    needs = record_of_episode(FakeWorld(), FakePolicy(), job).needs
     assert (needs["demonstration_frames"], needs["cameras"]) == (4, [])
 
     job = replace(JOB, environment=EnvironmentOptions(actions="ee_pose"))
-    assert stage(PaperWorld(), PaperPolicy(), job).cause == (
+    assert record_of_episode(FakeWorld(), FakePolicy(), job).cause == (
         "policy: the policy's action space is 'joint_angle', but the plan requires 'ee_pose'."
     )
 
 
-@pytest.mark.parametrize(("spec", "attached"), [("oracle", ["PaperWorld"]), ("random", [])])
-def test_a_policy_that_is_declared_privileged_is_attached_before_reset(stage, spec, attached):
-    policy = PaperInsider()
-    stage(PaperWorld(), policy, replace(JOB, policy=spec, ref=read_policy(spec)))
+@pytest.mark.parametrize(("spec", "attached"), [("oracle", ["FakeWorld"]), ("random", [])])
+def test_only_a_policy_that_is_declared_privileged_gets_the_world(
+    record_of_episode, spec, attached
+):
+    """`oracle` is declared, `random` is not. Before reset with words and a video of 3 steps."""
+    policy = PolicyWithAttach()
+    record_of_episode(FakeWorld(), policy, replace(JOB, policy=spec, ref=read_policy(spec)))
     assert policy.heard == [*attached, instruct_job(JOB).text, 3]
 
 
@@ -194,8 +204,10 @@ def test_a_policy_that_is_declared_privileged_is_attached_before_reset(stage, sp
         ("timeout", None, "failure", "not done after 1300 steps"),
     ],
 )
-def test_the_judge_decides(stage, status, given, outcome, cause):
-    course = stage(PaperWorld(3, status, given), PaperPolicy())
+def test_the_outcome_and_its_cause_are_those_of_the_world(
+    record_of_episode, status, given, outcome, cause
+):
+    course = record_of_episode(FakeWorld(3, status, given), FakePolicy())
     assert (course.outcome, course.cause) == (outcome, cause)
 
 
@@ -212,9 +224,12 @@ def test_the_judge_decides(stage, status, given, outcome, cause):
         ("left", "invalid action: .*numbers"),
     ],
 )
-def test_a_fault_of_the_policy_is_an_error_not_a_failure(stage, answer, cause):
-    world = PaperWorld()
-    course = stage(world, PaperPolicy(answer))
+def test_a_policy_that_raises_or_answers_nonsense_ends_its_episode_as_an_error_not_a_failure(
+    record_of_episode, answer, cause
+):
+    """An error counts in no rate. Its cause has no address of memory, which differs each time."""
+    world = FakeWorld()
+    course = record_of_episode(world, FakePolicy(answer))
 
     assert course.outcome == "error"
     assert re.fullmatch(f"{cause}.*", str(course.cause))
@@ -237,11 +252,13 @@ def test_a_fault_of_the_policy_is_an_error_not_a_failure(stage, answer, cause):
     ],
     ids=str,
 )
-def test_metadata_become_json_or_one_sentence_that_names_the_key(stage, value, stored):
-    policy = PaperPolicy()
+def test_metadata_of_a_policy_are_stored_as_json_or_refused_by_the_name_of_their_key(
+    record_of_episode, value, stored
+):
+    policy = FakePolicy()
     policy.metadata = {"deep": {"value": value}}  # type: ignore[attr-defined]
 
-    record = stage(PaperWorld(), policy)
+    record = record_of_episode(FakeWorld(), policy)
 
     if record.outcome == "success":
         assert record.policy_metadata == {"deep": {"value": stored}}
@@ -257,11 +274,13 @@ def test_metadata_become_json_or_one_sentence_that_names_the_key(stage, value, s
         (InvalidActionError("got nan"), "invalid action: got nan"),
     ],
 )
-def test_a_fault_of_the_world_is_an_error(stage, trouble, cause):
-    world = PaperWorld()
+def test_an_exception_in_the_world_ends_the_episode_as_an_error_of_the_environment(
+    record_of_episode, trouble, cause
+):
+    world = FakeWorld()
     world.trouble = trouble
 
-    course = stage(world, PaperPolicy())
+    course = record_of_episode(world, FakePolicy())
 
     assert course.outcome == "error"
     assert str(course.cause).startswith(f"{cause} (test_rollout.py, line ")
@@ -269,24 +288,26 @@ def test_a_fault_of_the_world_is_an_error(stage, trouble, cause):
 
 
 @pytest.mark.parametrize("error", [RenderDeviceError("no"), MissingDependencyError("no")])
-def test_what_ends_every_episode_ends_the_run(stage, error):
+def test_missing_graphics_or_packages_stop_the_run_instead_of_one_episode(record_of_episode, error):
     with pytest.raises(type(error)):
-        stage(PaperWorld(), PaperPolicy(error))
+        record_of_episode(FakeWorld(), FakePolicy(error))
 
 
-def test_ctrl_c_is_no_episode_error(stage):
-    policy = PaperPolicy()
+def test_ctrl_c_in_a_policy_stops_the_run_and_is_no_error_of_the_episode(record_of_episode):
+    policy = FakePolicy()
     policy.act = lambda _observation: (_ for _ in ()).throw(KeyboardInterrupt)  # type: ignore[method-assign]
     with pytest.raises(KeyboardInterrupt):
-        stage(PaperWorld(), policy)
+        record_of_episode(FakeWorld(), policy)
 
 
 @pytest.mark.parametrize(
     ("mode", "status", "kept"),
     [("all", "success", True), ("failures", "success", False), ("failures", "failure", True)],
 )
-def test_videos_are_kept_as_asked(set_up, tmp_path, mode, status, kept):
-    set_up(PaperWorld(5, status), PaperPolicy())
+def test_a_video_is_kept_of_all_episodes_or_of_failures_alone_as_asked(
+    give_world_and_policy, tmp_path, mode, status, kept
+):
+    give_world_and_policy(FakeWorld(5, status), FakePolicy())
     record = EpisodeRunner(tmp_path, mode)(JOB)
     assert (record.video is not None) == kept
 
@@ -295,7 +316,7 @@ def test_videos_are_kept_as_asked(set_up, tmp_path, mode, status, kept):
     assert record.video in (None, f"videos/{JOB.slug}.mp4")
 
 
-class Broken:
+class FullDiskContainer:
     """A container that can be written to no longer, as on a full disk."""
 
     def mux(self, packets: object) -> None:
@@ -306,8 +327,8 @@ class Broken:
 
 
 @pytest.mark.parametrize("after", [1, 3, 8])
-def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
-    set_up, monkeypatch, tmp_path, after
+def test_a_full_disk_costs_the_video_but_not_the_verdict(
+    give_world_and_policy, monkeypatch, tmp_path, after
 ):
     real = VideoWriter._encode
     count = 0
@@ -315,12 +336,12 @@ def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
     def add(writer: VideoWriter, frame: np.ndarray) -> None:
         nonlocal count
         if count == after:
-            writer._video = writer._video._replace(container=Broken())  # type: ignore[union-attr]
+            writer._video = writer._video._replace(container=FullDiskContainer())  # type: ignore[union-attr]
         count += 1
         real(writer, frame)
 
     monkeypatch.setattr(VideoWriter, "_encode", add)
-    set_up(PaperWorld(5), PaperPolicy())
+    give_world_and_policy(FakeWorld(5), FakePolicy())
 
     record = EpisodeRunner(tmp_path, "all")(JOB)
 
@@ -329,7 +350,8 @@ def test_a_video_that_cannot_be_written_does_not_change_the_verdict(
     assert {path.suffix for path in tmp_path.rglob("*") if path.is_file()} == {".npz"}
 
 
-def test_a_record_says_what_is_in_the_words_and_who_cheats():
+def test_a_record_has_the_pattern_of_its_words_and_whether_its_policy_is_privileged():
+    """The oracle knows the goal from the simulator's state: privileged. The random one does not."""
     job = replace(JOB.with_options(setting="reasoning"), policy="oracle", ref=read_policy("oracle"))
     record = make_record(job, "success")
 
@@ -348,7 +370,13 @@ def test_a_record_says_what_is_in_the_words_and_who_cheats():
         ("direct", "robot", "wrong_object"),
     ],
 )
-def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(setting, frame, failure):
+def test_a_wrong_cube_on_the_other_side_is_named_mirrored_if_the_words_named_a_side(
+    setting, frame, failure
+):
+    """The words may count sides from the robot or from the camera; direct ones name none.
+
+    Would find left and right mixed up in one of the frames, or a guess without a side.
+    """
     job = Job(
         policy="random",
         task="PickXtimes",
@@ -363,7 +391,7 @@ def test_a_record_tells_a_mirrored_pick_where_the_words_name_a_side(setting, fra
     assert (record.attribution.failure, record.attribution.subject) == (failure, "cube_red")
 
 
-class Stubborn(PaperPolicy):
+class RepeatsItsSubgoal(FakePolicy):
     """Names the same subgoal again, however its last try ended."""
 
     reports = True
@@ -377,8 +405,9 @@ class Stubborn(PaperPolicy):
         return ends[: next(self.turns)]
 
 
-def test_a_subgoal_is_noted_again_where_its_last_try_came_to_nothing(stage):
-    found = stage(PaperWorld(30), Stubborn()).subgoals
+def test_a_repeated_subgoal_is_noted_again_only_if_its_last_try_had_ended(record_of_episode):
+    """A call every 3 steps; each reports how the last try ended. Done at step 12: no new note."""
+    found = record_of_episode(FakeWorld(30), RepeatsItsSubgoal()).subgoals
     assert [
         (subgoal.step, subgoal.text, subgoal.ended, subgoal.why, subgoal.thing) for subgoal in found
     ] == [
@@ -391,7 +420,7 @@ def test_a_subgoal_is_noted_again_where_its_last_try_came_to_nothing(stage):
     ]
 
 
-class TellingWorld(PaperWorld):
+class SpeakingWorld(FakeWorld):
     """Tells its utterances at given steps; what comes after the last step is never told."""
 
     def __init__(self, steps: tuple[int, ...], length: int) -> None:
@@ -414,7 +443,7 @@ class TellingWorld(PaperWorld):
         return fresh
 
 
-class Hearing(PaperPolicy):
+class NotesWhatItHears(FakePolicy):
     """Writes down what it hears; its metadata are what it has heard."""
 
     def hear(self, text: str, step: int) -> None:
@@ -425,22 +454,26 @@ class Hearing(PaperPolicy):
         return {"heard": len(self.heard)}
 
 
-TURNS = JOB.with_options(setting="contextual", delivery="turns")
+JOB_IN_TURNS = JOB.with_options(setting="contextual", delivery="turns")
 
 
-@pytest.mark.parametrize("policy_class", [PaperPolicy, Hearing])
-def test_a_record_holds_what_was_heard_when(policy_class, stage):
-    world = TellingWorld((0, 3, 6, 6), length=10)
+@pytest.mark.parametrize("policy_class", [FakePolicy, NotesWhatItHears])
+def test_a_record_has_the_step_at_which_each_utterance_was_heard(policy_class, record_of_episode):
+    """Four of five utterances come at steps 0, 3, 6 and 6; the fifth never (None).
+
+    A policy without hear() gets the first alone, in reset(), and the record is the same.
+    """
+    world = SpeakingWorld((0, 3, 6, 6), length=10)
     policy = policy_class()
 
-    record = stage(world, policy, TURNS)
+    record = record_of_episode(world, policy, JOB_IN_TURNS)
 
     assert record.outcome == "success"
     turns = world.instruction.turns
     steps = [turn.step for turn in record.instruction]
     assert [turn.text for turn in record.instruction] == list(turns)
     assert steps == [0, 3, 6, 6, None]
-    if policy_class is Hearing:
+    if policy_class is NotesWhatItHears:
         assert policy.heard == [turns[0], 3, turns[1], 3, turns[2], 6, turns[3], 6]
         assert record.policy_metadata == {"heard": 8}
     else:
@@ -449,8 +482,8 @@ def test_a_record_holds_what_was_heard_when(policy_class, stage):
     assert read_record(encode(record), Path(), 1) == record
 
 
-def test_the_caption_grows_as_utterances_are_heard(set_up, tmp_path):
-    world = TellingWorld((0, 3, 6, 6, 9), length=11)
+def test_the_caption_of_a_video_grows_with_each_utterance(give_world_and_policy, tmp_path):
+    world = SpeakingWorld((0, 3, 6, 6, 9), length=11)
     captions: list[str] = []
 
     class Captions(VideoWriter):
@@ -459,8 +492,8 @@ def test_the_caption_grows_as_utterances_are_heard(set_up, tmp_path):
             captions.append(self.caption)
             assert self.longest_caption == world.instruction.text
 
-    set_up(world, PaperPolicy())
-    EpisodeRunner(tmp_path).play_once(TURNS, Captions(tmp_path / "x.mp4"))
+    give_world_and_policy(world, FakePolicy())
+    EpisodeRunner(tmp_path).play_once(JOB_IN_TURNS, Captions(tmp_path / "x.mp4"))
 
     counts = [1, 1, 1, 1, 1, 2, 2, 2, 4, 4, 4, 5, 5]  # video, first frame, chunks of 3
     assert captions == [" ".join(world.instruction.turns[:count]) for count in counts]

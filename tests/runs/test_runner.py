@@ -59,7 +59,7 @@ def wait_until(condition: Callable[[], bool]) -> None:
         time.sleep(0.02)
 
 
-def begin(folder: Path, workers: int = 1) -> subprocess.Popen[bytes]:
+def begun_run(folder: Path, workers: int = 1) -> subprocess.Popen[bytes]:
     """The run of `run_fakes` in a process of its own, until three episodes have ended."""
     child = subprocess.Popen([sys.executable, run_fakes.__file__, folder, str(workers)])
     wait_until(lambda: line_count(folder) >= 3 or child.poll() is not None)
@@ -67,19 +67,22 @@ def begin(folder: Path, workers: int = 1) -> subprocess.Popen[bytes]:
     return child
 
 
-def finish(folder: Path) -> RunSummary:
+def finish_run(folder: Path) -> RunSummary:
     return fake_run(folder, small_plan(8))
 
 
 @pytest.fixture(scope="module")
-def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> Comparable:
+def records_of_an_uninterrupted_run(tmp_path_factory: pytest.TempPathFactory) -> Comparable:
     folder = tmp_path_factory.mktemp("uninterrupted")
     fake_run(folder, small_plan(8))
     return all_comparable(folder)
 
 
-def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(tmp_path, uninterrupted):
-    child = begin(tmp_path, workers=2)
+def test_a_killed_run_goes_on_with_the_same_command_and_has_the_same_records_in_the_end(
+    tmp_path, records_of_an_uninterrupted_run
+):
+    """Of 16 episodes at least 3 had ended. A line of 22 bytes that was cut off is set aside."""
+    child = begun_run(tmp_path, workers=2)
     child.send_signal(signal.SIGKILL)
     child.wait()
     wait_until(lambda: not any(map(is_alive, worker_pids(tmp_path))))
@@ -89,27 +92,30 @@ def test_after_sigkill_the_workers_are_gone_and_the_same_command_goes_on(tmp_pat
     with (tmp_path / RECORDS_FILE).open("ab") as file:
         file.write(b'{"policy":"random","ta')
 
-    summary = finish(tmp_path)
+    summary = finish_run(tmp_path)
 
     assert summary.played == 16 - stored
     assert len((tmp_path / TORN_FILE).read_bytes().rstrip()) == 22
-    assert all_comparable(tmp_path) == uninterrupted
+    assert all_comparable(tmp_path) == records_of_an_uninterrupted_run
     assert line_count(tmp_path) == 16
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_stopped_run_ends_its_workers_and_keeps_what_ended(tmp_path, number, uninterrupted):
-    child = begin(tmp_path)
+def test_ctrl_c_or_sigterm_ends_the_workers_and_keeps_the_records_of_ended_episodes(
+    tmp_path, number, records_of_an_uninterrupted_run
+):
+    child = begun_run(tmp_path)
     child.send_signal(number)
     assert child.wait(WAIT_S) != 0
     assert not any(map(is_alive, worker_pids(tmp_path)))
     assert 3 <= len(read_records(tmp_path)) < 16
 
-    finish(tmp_path)
-    assert all_comparable(tmp_path) == uninterrupted
+    finish_run(tmp_path)
+    assert all_comparable(tmp_path) == records_of_an_uninterrupted_run
 
 
-def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path):
+def test_an_episode_in_which_the_worker_dies_twice_is_one_error_and_the_rest_is_played(tmp_path):
+    """A dead process may be bad luck, so it is tried twice; then it is an error of its own kind."""
     plan = changed(small_plan(), settings="direct")
 
     summary = run_plan(plan, tmp_path, FakePlay(tmp_path, deadly=2), LocalProcesses(1))
@@ -121,7 +127,8 @@ def test_a_worker_that_dies_twice_costs_one_error_and_the_rest_goes_on(tmp_path)
     assert len(starts(tmp_path, error.identity)) == 2
 
 
-def test_errors_are_played_again_unless_asked_not_to(tmp_path):
+def test_the_same_command_plays_errors_again_unless_asked_not_to(tmp_path):
+    """One of 4 episodes was an error. A third attempt succeeds, and nothing is left to play."""
     plan = changed(small_plan(), settings="direct")
     run_plan(plan, tmp_path, FakePlay(tmp_path, deadly=2), LocalProcesses(1))
 
@@ -134,13 +141,14 @@ def test_errors_are_played_again_unless_asked_not_to(tmp_path):
     assert not earlier_plans(tmp_path)  # it was the same one each time
 
 
-def test_missing_graphics_stop_the_run_and_lose_nothing(tmp_path):
+def test_missing_graphics_stop_the_run_and_the_records_before_are_kept(tmp_path):
     with pytest.raises(RenderDeviceError, match="No Vulkan device can render; install one"):
         run_plan(small_plan(), tmp_path, FakePlay(fatal=2), LocalProcesses(1))
     assert {record.episode for record in read_records(tmp_path)} == {0, 1}
 
 
-def test_a_folder_may_get_more_and_fewer_jobs(tmp_path):
+def test_a_run_may_be_repeated_with_more_or_fewer_episodes_in_its_folder(tmp_path):
+    """Each episode is told in two settings: 2 are 4 results, 4 are 8, of which 4 are new."""
     fake_run(tmp_path, small_plan(2))
     more = fake_run(tmp_path, small_plan(4))
     assert (more.played, more.total) == (4, 8)
@@ -172,12 +180,14 @@ def test_a_folder_may_get_more_and_fewer_jobs(tmp_path):
         ("policy_version", "old", r"random whose policy version is old, but now it is built-in"),
     ],
 )
-def test_worlds_of_two_versions_are_not_mixed(tmp_path, name, value, sentence):
+def test_a_run_does_not_go_on_in_a_folder_with_results_of_other_scenes_words_or_versions(
+    tmp_path, name, value, sentence
+):
     played, fine = map(FakePlay(), small_plan(1).jobs())
     is_policy = name == "policy_version"
     record = with_version(played, "old") if is_policy else replace(played, **{name: value})
     lost = replace(fine, outcome="error", error="connection", cause="connection: x")
-    fill(tmp_path, lost, record)  # not the first
+    fill(tmp_path, lost, record)  # the first record fits: all have to be compared
 
     with pytest.raises(StoreError, match=sentence):
         fake_run(tmp_path, small_plan(2))
@@ -185,7 +195,7 @@ def test_worlds_of_two_versions_are_not_mixed(tmp_path, name, value, sentence):
     assert read_plan(tmp_path) is None
 
 
-def test_a_torn_line_is_told_before_anything_is_played(tmp_path):
+def test_a_line_that_was_cut_off_is_reported_before_an_episode_is_played(tmp_path):
     (tmp_path / RECORDS_FILE).write_bytes(b'{"policy":"random","ta')
     ears = mock.Mock(spec=Reporter)
     fake_run(tmp_path, small_plan(1), reporter=ears)
@@ -209,7 +219,7 @@ def test_a_torn_line_is_told_before_anything_is_played(tmp_path):
         ),
     ],
 )
-def test_tasks_that_a_policy_was_not_trained_on_are_named_once(tmp_path, trained, warned):
+def test_a_run_warns_once_of_a_task_on_which_the_policy_was_not_trained(tmp_path, trained, warned):
     ears = mock.Mock(spec=Reporter)
     needs = PolicyNeeds(trained_tasks=trained)
     plan = changed(
@@ -240,7 +250,7 @@ def test_the_number_of_workers_chooses_the_executor(monkeypatch):
         ("words", OTHER_WORDS, "words"),
     ],
 )
-def test_a_record_of_another_version_is_not_stored(tmp_path, field, value, what):
+def test_a_record_that_a_worker_of_another_version_made_is_not_stored(tmp_path, field, value, what):
     plan = small_plan(1).checked()
 
     def elsewhere(job: Job) -> Record:
@@ -251,9 +261,10 @@ def test_a_record_of_another_version_is_not_stored(tmp_path, field, value, what)
     assert not (tmp_path / RECORDS_FILE).read_bytes()
 
 
-def test_fingerprints_of_the_code_see_data_files_and_one_only_what_decides_verdicts(
+def test_a_changed_file_changes_the_fingerprint_of_the_code_and_that_of_verdicts_if_it_matters(
     tmp_path, monkeypatch
 ):
+    """A record has both. Tables cannot change a verdict, words can; caches are no code."""
     folder = tmp_path / "roboirg"
     monkeypatch.setattr(episode_record, "__file__", str(folder / "a" / "b" / "module.py"))
     folder.mkdir()
@@ -273,7 +284,10 @@ def test_fingerprints_of_the_code_see_data_files_and_one_only_what_decides_verdi
 
 
 @pytest.mark.parametrize(("error", "place"), [("infrastructure", 1), ("environment", -1)])
-def test_what_was_lost_is_retried_at_once_and_errors_after_all_others(tmp_path, error, place):
+def test_an_episode_that_lost_its_process_is_repeated_at_once_and_one_with_an_error_last(
+    tmp_path, error, place
+):
+    """The first episode fails: it is played again as the second one (1), or as the last (-1)."""
     played: list[str] = []
 
     def play(job: Job) -> Record:
@@ -289,7 +303,8 @@ def test_what_was_lost_is_retried_at_once_and_errors_after_all_others(tmp_path, 
     assert len(played) == len(small_plan(4).jobs()) + 1
 
 
-def test_machines_of_other_versions_are_named():
+def test_a_machine_with_another_package_or_policy_version_is_refused_by_name():
+    """A policy whose version is unknown here is not compared."""
     from roboirg.runs.run.ray_machines import MachineVersions
 
     random = read_policy("random")

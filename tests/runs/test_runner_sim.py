@@ -19,7 +19,7 @@ from roboirg.runs.plan.stored_plans import read_plan
 
 pytestmark = pytest.mark.sim
 
-LOUD = """
+CODE_OF_A_POLICY_THAT_PRINTS = """
 import os
 import numpy as np
 
@@ -37,7 +37,9 @@ class Loud:
 """
 
 
-def command(*words: object, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+def run_in_a_process(
+    *words: object, cwd: Path, **environment: str
+) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "roboirg", *map(str, words)],
         cwd=cwd,
@@ -52,10 +54,12 @@ def run_here(*words: object) -> Result:
     return CliRunner().invoke(app, ["run", *map(str, words)])
 
 
-def test_an_invalid_action_is_told_and_what_a_policy_prints_goes_to_its_log(tmp_path):
-    (tmp_path / "mine.py").write_text(LOUD)
+def test_an_invalid_action_is_one_sentence_and_what_a_policy_prints_goes_to_its_log(tmp_path):
+    (tmp_path / "mine.py").write_text(CODE_OF_A_POLICY_THAT_PRINTS)
     words = ("--policy", "mine:Loud", "--tasks", "PickXtimes", "--settings", "direct")
-    said = command("run", *words, "--episodes", "1", "--out", "o", "--workers", "1", cwd=tmp_path)
+    said = run_in_a_process(
+        "run", *words, "--episodes", "1", "--out", "o", "--workers", "1", cwd=tmp_path
+    )
     assert said.returncode == 2
     assert said.stderr.count("\n") == 1
     assert "invalid action: " in said.stderr
@@ -69,7 +73,9 @@ def test_an_invalid_action_is_told_and_what_a_policy_prints_goes_to_its_log(tmp_
     assert not {"told:", "asked"} & {*said.stdout.split(), *said.stderr.split()}
 
 
-def test_missing_vulkan_loses_no_record_and_no_video(tmp_path, monkeypatch):
+def test_a_render_device_that_is_not_there_ends_the_run_and_keeps_what_was_played(
+    tmp_path, monkeypatch
+):
     words = ("--policy", "random", "--tasks", "PickXtimes", "--settings", "explicit",
              "--max-steps", "9", "--video", "all", "--out", tmp_path / "o",
              "--episodes")  # fmt: skip
@@ -88,7 +94,7 @@ def test_missing_vulkan_loses_no_record_and_no_video(tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("without_cache")
-def test_equal_commands_give_equal_records(tmp_path):
+def test_the_same_command_gives_the_same_records_with_and_without_a_worker_process(tmp_path):
     played = []
     for workers in (0, 1):
         folder = tmp_path / f"by {workers}"

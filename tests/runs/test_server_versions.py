@@ -20,12 +20,12 @@ from roboirg.runs.run.executor import InProcess
 from roboirg.runs.run.runner import run_plan
 
 
-def plan_of(episodes: int, **options: object) -> Plan:
+def plan_of_episodes(episodes: int, **options: object) -> Plan:
     few = {"tasks": "PickXtimes", "settings": "explicit", "episodes": episodes}
     return make_plan("random", **few, **options)
 
 
-class Told:
+class PlaysWithServerVersions:
     """Plays jobs with a server that tells these versions, one for each episode."""
 
     def __init__(self, *versions: str | None) -> None:
@@ -40,38 +40,47 @@ class Told:
         return make_record(job, "success", policy_metadata=metadata, server_version=told)
 
 
-def versions(folder: Path) -> list[str | None]:
+def stored_server_versions(folder: Path) -> list[str | None]:
     return [record.server_version for record in read_records(folder)]
 
 
-def test_a_run_stops_when_the_server_is_another_version(tmp_path):
-    plan = plan_of(4)
+def test_a_run_stops_when_its_policys_server_reports_another_version(tmp_path):
+    """The third of four episodes is answered by version b instead of a; it is not stored."""
+    plan = plan_of_episodes(4)
     with pytest.raises(StoreError, match=r"whose server version is a, but in random-.* it is b"):
-        run_plan(plan, tmp_path, Told("a", "a", "b", "a"), InProcess())
-    assert versions(tmp_path) == ["a", "a"]
-    # Nor does it go on later with another one, or with one that tells none; with the same it does.
+        run_plan(plan, tmp_path, PlaysWithServerVersions("a", "a", "b", "a"), InProcess())
+    assert stored_server_versions(tmp_path) == ["a", "a"]
+    # Nor does it go on later with b, or with a server without a version; with a it does.
     for other, words in (("b", "b"), (None, "none")):
         with pytest.raises(
             StoreError, match=f"server version is a, but in .* it is {words}; choose another"
         ):
-            run_plan(plan, tmp_path, Told(other, other), InProcess())
+            run_plan(plan, tmp_path, PlaysWithServerVersions(other, other), InProcess())
 
-    run_plan(plan, tmp_path, Told("a", "a"), InProcess())
-    assert versions(tmp_path) == ["a"] * 4
-
-
-def test_a_version_that_controls_a_terminal_stops_no_run(tmp_path):
-    run_plan(plan_of(2), tmp_path, Told(*["\x1b[2J\u202e" + "9" * 5000] * 2), InProcess())
-    assert {version[:12] for version in map(str, versions(tmp_path))} == {r"\x1b[2J\u202e"[:12]}
+    run_plan(plan, tmp_path, PlaysWithServerVersions("a", "a"), InProcess())
+    assert stored_server_versions(tmp_path) == ["a"] * 4
 
 
-def test_errors_before_the_server_told_its_version_do_not_count(tmp_path):
-    plan = plan_of(3, tries=1)
-    run_plan(plan, tmp_path, Told("refused", "a", "refused"), InProcess())
-    assert versions(tmp_path) == ["a"] * 3
+def test_a_server_version_with_terminal_codes_is_stored_escaped(tmp_path):
+    """ "\\x1b[2J" would clear the terminal of whoever prints the record."""
+    run_plan(
+        plan_of_episodes(2),
+        tmp_path,
+        PlaysWithServerVersions(*["\x1b[2J\u202e" + "9" * 5000] * 2),
+        InProcess(),
+    )
+    assert {version[:12] for version in map(str, stored_server_versions(tmp_path))} == {
+        r"\x1b[2J\u202e"[:12]
+    }
 
 
-class Guide:
+def test_an_episode_without_a_connection_has_no_server_version_that_could_differ(tmp_path):
+    plan = plan_of_episodes(3, tries=1)
+    run_plan(plan, tmp_path, PlaysWithServerVersions("refused", "a", "refused"), InProcess())
+    assert stored_server_versions(tmp_path) == ["a"] * 3
+
+
+class PlannerWithVersion:
     """A planner of this process."""
 
     version = "7"
@@ -81,13 +90,14 @@ class Guide:
         pass
 
 
-def test_the_version_comes_from_the_server_also_behind_a_planner():
+def test_the_server_version_is_that_of_the_server_and_not_of_its_client_or_planner():
+    """The planner has version 7 and the client was given "mine"; the server says "phase-1"."""
     with ChallengeServer() as server:
         client = make_policy(f"challenge://{server.place}?version=mine", 0)
         client.reset("go", {})  # type: ignore[typeddict-item]
         assert server_version(client.metadata) == "phase-1"  # type: ignore[attr-defined]
         client.follow = print  # type: ignore[attr-defined]
-        system = HierarchicalPolicy(Guide(), client)  # type: ignore[arg-type]
+        system = HierarchicalPolicy(PlannerWithVersion(), client)  # type: ignore[arg-type]
         assert server_version(system.metadata) == "phase-1"
         client.close()  # type: ignore[attr-defined]
     for told in ({}, {"version": "1"}, {"server": "x"}, {"server": "x", "version": "unknown"}):

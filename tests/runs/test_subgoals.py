@@ -22,7 +22,7 @@ from roboirg.records.record import Job, SubgoalRecord
 from roboirg.records.record_codec import StoreError, encode, read_record
 from roboirg.runs.play.rollout import EpisodeRunner
 
-TABLE = ("tables", "--which", "subgoals", "--format", "markdown")
+SUBGOALS_TABLE = ("tables", "--which", "subgoals", "--format", "markdown")
 JOB = Job(
     policy="random",
     ref=read_policy("random"),
@@ -32,7 +32,7 @@ JOB = Job(
     options=InstructionOptions("direct"),
     environment=EnvironmentOptions(max_steps=30),
 )
-SAID = (
+THREE_SUBGOALS = (
     SubgoalRecord(
         step=0, text="pick up the cube at <3, 4>", point=(3, 4), due="pick it up",
         verdict="wrong_thing",
@@ -43,54 +43,55 @@ SAID = (
 
 
 @pytest.mark.parametrize("subgoal", [3, b"pick", ["pick"], "x" * 301, "a\nb", "\x1b[2J", "\ud800"])
-def test_a_subgoal_is_a_short_text(subgoal):
+def test_a_subgoal_that_is_no_short_printable_text_is_refused(subgoal):
     with pytest.raises(InvalidValueError, match="The policy's subgoal"):
         policy_subgoal(SimpleNamespace(subgoal=subgoal))
 
 
-def test_a_subgoal_is_optional():
+def test_a_policy_may_name_no_subgoal_or_one_of_up_to_300_characters():
     assert policy_subgoal(SimpleNamespace()) is policy_subgoal(SimpleNamespace(subgoal="")) is None
     assert policy_subgoal(SimpleNamespace(subgoal="x" * 300)) == "x" * 300
 
 
-def test_records_keep_them_and_refuse_others():
-    record = make_record(JOB, "failure", "no", subgoals=SAID)
-    assert read_record(encode(record), Path("r"), 1).subgoals == SAID
+def test_subgoals_are_read_back_from_a_record_and_too_long_ones_are_refused():
+    record = make_record(JOB, "failure", "no", subgoals=THREE_SUBGOALS)
+    assert read_record(encode(record), Path("r"), 1).subgoals == THREE_SUBGOALS
 
-    long = replace(record, subgoals=(replace(SAID[0], text="x" * 301),))
+    long = replace(record, subgoals=(replace(THREE_SUBGOALS[0], text="x" * 301),))
     with pytest.raises(StoreError, match="text"):
         read_record(encode(long), Path("r"), 1)
 
 
-def test_the_page_and_the_table_show_them(tmp_path):
+def test_the_page_and_the_table_show_which_subgoals_were_right_wrong_or_unreadable(tmp_path):
+    """Of three, one named a wrong thing, one was right, and one could not be understood (lost)."""
     spent = {"calls": 3.0, "answered_s": 6.5, "waited_s": 2.25}
-    record = make_record(JOB, "failure", "no", subgoals=SAID, usage=spent)
+    record = make_record(JOB, "failure", "no", subgoals=THREE_SUBGOALS, usage=spent)
     page = render([record])
     assert "(wrong thing; due: pick it up)" in page
     assert "sing (lost; due: nothing)" in page
 
-    # Costs are per episode: in another one of the cell the planner named nothing.
+    # Means of two episodes: (3 + 1) / 2 calls, 6.5 / 2 seconds; the other has no subgoal.
     other = make_record(replace(JOB, episode=1), "failure", "no", usage={"calls": 1.0})
     fill(tmp_path, record, other)
     counts = "| 3 | 1 (33 %) | 1 (33 %) | 0 (0 %) | 0 (0 %) | 1 (33 %) |"
-    assert f"{counts} 2 | 3.25 | 1.12 |" in call(*TABLE, tmp_path)
+    assert f"{counts} 2 | 3.25 | 1.12 |" in call(*SUBGOALS_TABLE, tmp_path)
 
 
-def test_the_table_says_unknown_where_a_service_did_not_report_all_tokens(tmp_path):
+def test_the_table_has_unknown_costs_where_a_service_did_not_report_all_of_them(tmp_path):
     known = {"calls": 1.0, "input_tokens": 8.0, "output_tokens": 2.0, "cost_usd": 0.5}
     partly = {"calls": 1.0, "input_tokens": 4.0}
     played = (("direct", 0, known), ("contextual", 0, known), ("contextual", 1, partly))
     for setting, episode, usage in played:
         job = replace(JOB, episode=episode, options=InstructionOptions(setting))
-        fill(tmp_path, make_record(job, "failure", "no", subgoals=SAID, usage=usage))
+        fill(tmp_path, make_record(job, "failure", "no", subgoals=THREE_SUBGOALS, usage=usage))
 
-    printed = call(*TABLE, tmp_path)
+    printed = call(*SUBGOALS_TABLE, tmp_path)
 
     assert "| 1 | 8 | 2 | 0.5 |" in printed
     assert "| 1 | 6 | unknown | unknown |" in printed
 
 
-class Planning:
+class PointsTwice:
     """Points into a corner, then says nothing new, then points at the thing."""
 
     cameras = ("front",)
@@ -108,13 +109,16 @@ class Planning:
 
 
 @pytest.mark.sim
-def test_a_played_episode_notes_what_is_new_with_the_stage_that_is_due(monkeypatch):
-    monkeypatch.setattr("roboirg.runs.play.rollout.load_policy", lambda prepared: Planning())
+def test_an_episode_notes_a_subgoal_when_it_changes_with_its_point_and_whether_it_is_right(
+    monkeypatch,
+):
+    """Answers of 10 steps: twice it points into a corner, then at the right cube, at step 20."""
+    monkeypatch.setattr("roboirg.runs.play.rollout.load_policy", lambda prepared: PointsTwice())
     env = roboirg.make(JOB.task, episode=0, cameras=(), grounded=True)
     _, info = env.reset()
     _, point = split_point(info["grounded_subgoal"])
     env.close()
-    monkeypatch.setattr(Planning, "point", point)
+    monkeypatch.setattr(PointsTwice, "point", point)
     result, _ = EpisodeRunner(Path()).play_once(JOB)
 
     assert result.outcome == "failure", result.cause

@@ -32,14 +32,14 @@ from roboirg.runs.run.runner import UNREACHABLE_AFTER, run_plan
 from roboirg.runs.run.workers import Worker
 
 
-def sleepy(job: Job) -> Record:
+def sleeps_for_an_hour(job: Job) -> Record:
     time.sleep(3600)
     raise AssertionError(job)
 
 
 def test_an_episode_that_takes_too_long_is_ended_and_named(tmp_path):
     plan = changed(small_plan(1), settings="direct")
-    run_plan(plan, tmp_path, sleepy, LocalProcesses(1, episode_timeout_s=0.5))
+    run_plan(plan, tmp_path, sleeps_for_an_hour, LocalProcesses(1, episode_timeout_s=0.5))
     (record,) = read_records(tmp_path)
     assert record.error == "timeout"
 
@@ -50,14 +50,15 @@ def test_an_episode_that_takes_too_long_is_ended_and_named(tmp_path):
     assert record.duration_s >= 0.5
 
 
-def crashing(job: Job) -> Record:
+def crashes_in_native_code(job: Job) -> Record:
     ctypes.string_at(0)
     raise AssertionError(job)
 
 
-def test_a_crash_in_the_simulators_native_code_is_the_worlds(tmp_path):
+def test_a_crash_in_native_code_of_the_simulator_is_an_error_of_the_environment(tmp_path):
+    """Not of the policy, which has a process of its own."""
     plan = changed(small_plan(1), settings="direct")
-    summary = run_plan(plan, tmp_path, crashing, LocalProcesses(1))
+    summary = run_plan(plan, tmp_path, crashes_in_native_code, LocalProcesses(1))
     assert (summary.total, len(summary.errors)) == (1, 1)
 
     (record,) = read_records(tmp_path)
@@ -68,7 +69,9 @@ def test_a_crash_in_the_simulators_native_code_is_the_worlds(tmp_path):
     assert record.cause == words
 
 
-def hanging(code: NativeCode, load_library: type[ctypes.CDLL], folder: Path, job: Job) -> Record:
+def hangs_once_in_native_code(
+    code: NativeCode, load_library: type[ctypes.CDLL], folder: Path, job: Job
+) -> Record:
     """At first never return from native code, which may keep Python's lock; then play."""
     with watchdog.watched("policy's reset()"), NativeCall(code):
         if not starts(folder, job):
@@ -80,11 +83,11 @@ def hanging(code: NativeCode, load_library: type[ctypes.CDLL], folder: Path, job
 @pytest.mark.parametrize(
     ("code", "load_library"), [("drawing", ctypes.PyDLL), ("physics", ctypes.CDLL)]
 )
-def test_native_code_that_hangs_is_the_worlds_and_played_again_by_another(
+def test_drawing_or_physics_that_hangs_is_ended_and_the_episode_played_by_another_worker(
     tmp_path, monkeypatch, code, load_library
 ):
     monkeypatch.setattr(watchdog, "NATIVE_LIMIT_S", 0.5)
-    play = functools.partial(hanging, code, load_library, tmp_path)
+    play = functools.partial(hangs_once_in_native_code, code, load_library, tmp_path)
     run_plan(changed(small_plan(1), settings="direct"), tmp_path, play, LocalProcesses(1))
 
     lost, again = map(json.loads, (tmp_path / RECORDS_FILE).read_text().splitlines())
@@ -93,7 +96,7 @@ def test_native_code_that_hangs_is_the_worlds_and_played_again_by_another(
     assert (again["outcome"] != "error", again["attempt"]) == (True, 2)
 
 
-class Homeless:
+class CannotBeUnpickled:
     """Cannot be received by another process."""
 
     def __call__(self, job: Job) -> Record:
@@ -103,14 +106,18 @@ class Homeless:
         return os._exit, (3,)
 
 
-def test_processes_that_cannot_start_end_the_run(tmp_path):
+def test_a_run_whose_workers_cannot_start_ends_instead_of_trying_all_episodes(tmp_path):
     words = r"No worker process can start \(environment: .* exit code 3 in the worker startup\)"
     with pytest.raises(RoboIRGError, match=words):
-        run_plan(small_plan(50), tmp_path, Homeless(), LocalProcesses(1))
+        run_plan(small_plan(50), tmp_path, CannotBeUnpickled(), LocalProcesses(1))
     assert len(read_records(tmp_path)) < 5
 
 
-def test_deadlines_stand_still_in_a_queue(monkeypatch):
+def test_waiting_in_a_queue_does_not_count_for_the_time_limit_of_a_call(monkeypatch):
+    """A call may take 10 s. After 9 s it waits 1,000 s for a free server, and then has 1 s left.
+
+    Waiting for the server's reply does count.
+    """
     now = [100.0]
     monkeypatch.setattr(watchdog, "time", SimpleNamespace(monotonic=lambda: now[0]))
     board = watchdog.Watchdog()
@@ -140,8 +147,8 @@ def test_deadlines_stand_still_in_a_queue(monkeypatch):
     assert (board.queued_s, board.awaited, board.overdue) == (0.0, "", None)
 
 
-def test_a_policy_is_not_late_while_the_world_draws():
-    """A built-in policy and a client draw the video in the policy's own time."""
+def test_time_in_which_the_world_draws_does_not_count_as_the_policys():
+    """A policy may read a picture that is drawn just then. Drawing has its own limit, 120 s."""
     board = watchdog.Watchdog()
     board.write("policy's reset()", 1e-9)
     board.write_native("drawing", time.monotonic())
@@ -154,7 +161,7 @@ def test_a_policy_is_not_late_while_the_world_draws():
     assert (board.phase, board.overdue) == ("policy's reset()", ("policy's reset()", 1e-9))
 
 
-def test_time_in_a_queue_has_a_timing_of_its_own():
+def test_a_record_has_the_time_in_a_queue_apart_from_the_time_of_the_call():
     timings = {"policy_queue": 5.0}  # of earlier calls
     guard = CallGuard(timings, None)
     start = time.perf_counter()
@@ -167,8 +174,8 @@ def test_time_in_a_queue_has_a_timing_of_its_own():
     assert timings["policy_reset"] <= total - 0.3 + 1e-6
 
 
-def test_an_overdue_worker_is_killed():
-    worker = Worker(sleepy, small_plan(1).jobs()[0])
+def test_a_worker_whose_episode_takes_too_long_is_killed():
+    worker = Worker(sleeps_for_an_hour, small_plan(1).jobs()[0])
     assert worker.poll(3600) is None
 
     record = worker.poll(0.0)
@@ -188,13 +195,15 @@ def test_an_overdue_worker_is_killed():
         ("environment", TimeoutError("slow"), "environment"),
     ],
 )
-def test_an_error_has_the_kind_of_who_raised_it(whom, error, kind):
+def test_an_exception_is_an_error_of_the_policy_the_environment_or_the_connection(
+    whom, error, kind
+):
     with pytest.raises(EpisodeError) as caught, attribute_errors(whom):  # type: ignore[arg-type]
         raise error
     assert caught.value.kind == kind
 
 
-class Unreachable:
+class WithoutConnection:
     """Every episode of one policy ends without a connection."""
 
     def __init__(self, policy: str) -> None:
@@ -208,9 +217,9 @@ class Unreachable:
         return replace(record, **lost)
 
 
-def test_a_policy_that_cannot_be_reached_is_left_and_the_others_go_on(tmp_path):
+def test_a_policy_that_cannot_be_connected_to_is_given_up_and_the_others_are_played(tmp_path):
     plan = small_plan(15, ("random", "oracle"))
-    summary = run_plan(plan, tmp_path, Unreachable("random"), InProcess())
+    summary = run_plan(plan, tmp_path, WithoutConnection("random"), InProcess())
     assert summary.unreachable == ("random",)
 
     played = len(summary.errors)
@@ -219,9 +228,9 @@ def test_a_policy_that_cannot_be_reached_is_left_and_the_others_go_on(tmp_path):
     assert sum(record.policy == "oracle" for record in read_records(tmp_path)) == 30
 
 
-def test_connection_errors_that_are_not_in_a_row_leave_no_policy(tmp_path):
+def test_a_policy_with_every_other_connection_refused_is_not_given_up(tmp_path):
     """A server that drops every other connection is slow, not gone."""
-    turns = itertools.cycle((Unreachable("random"), FakePlay()))
+    turns = itertools.cycle((WithoutConnection("random"), FakePlay()))
 
     def play(job: Job) -> Record:
         return next(turns)(job)
@@ -231,7 +240,7 @@ def test_connection_errors_that_are_not_in_a_row_leave_no_policy(tmp_path):
     assert (summary.unreachable, summary.missing) == ((), 0)
 
 
-def hand_out(jobs: deque[Job], workers: int) -> list[Job]:
+def order_for_workers(jobs: deque[Job], workers: int) -> list[Job]:
     """Return the jobs as workers that take turns get them."""
     active: list[SimpleNamespace] = []
     played = []
@@ -246,11 +255,15 @@ def hand_out(jobs: deque[Job], workers: int) -> list[Job]:
     return played
 
 
-def test_a_worker_keeps_to_its_scene_and_away_from_those_of_others():
+def test_a_worker_plays_all_episodes_of_its_scene_before_it_takes_another():
+    """Two workers by turns, three scenes with two settings and two seeds each.
+
+    A scene is built once by its worker; would find two workers that build the same one.
+    """
     jobs = deque(small_plan(3, seeds=2).jobs())
     every = set(jobs)
 
-    played = hand_out(jobs, 2)
+    played = order_for_workers(jobs, 2)
 
     assert [job.episode for job in played] == [0, 1] * 4 + [2] * 4
     assert set(played) == every
@@ -258,10 +271,11 @@ def test_a_worker_keeps_to_its_scene_and_away_from_those_of_others():
 
 @settings(max_examples=25)
 @given(st.integers(1, 4), st.integers(1, 3), st.integers(1, 5))
-def test_policies_play_one_after_the_other(episodes, seeds, workers):
+def test_all_episodes_of_a_policy_are_played_before_those_of_the_next(episodes, seeds, workers):
+    """So that only one model is in memory at a time."""
     jobs = deque(small_plan(episodes, ("random", "oracle"), seeds).jobs())
     every = list(jobs)
-    played = hand_out(jobs, workers)
+    played = order_for_workers(jobs, workers)
     assert len(played) == len(every)
     assert set(played) == set(every)
 

@@ -19,12 +19,12 @@ from roboirg.tasks.splits.splits import get_episode
 pytest.importorskip("sklearn")
 
 COLORS = ("red", "green", "blue")
-FIRST = ("Good morning.", "Hello there.")
-LAST = ("Good evening.", "How nice.")
+GREETINGS_THAT_MEAN_THE_FIRST = ("Good morning.", "Hello there.")
+GREETINGS_THAT_MEAN_THE_LAST = ("Good evening.", "How nice.")
 TASK = "VideoPlaceButton"
 
 
-def told(episode, text, color):
+def episode_told_as(episode, text, color):
     """An episode whose goal has this color, with this text."""
     goal = Goal.of(color=color, relation="before")
     said = replace(
@@ -33,18 +33,22 @@ def told(episode, text, color):
     return replace(episode, goal=goal), said
 
 
-def planted(text_of, first, count):
+def episodes_with_made_up_texts(text_of, first, count):
     """Texts about random colors: `text_of(rng)` returns a text and the color that it means."""
     rng = np.random.default_rng(first)
     return [
-        told(get_episode(TASK, "random", first + number), *text_of(rng)) for number in range(count)
+        episode_told_as(get_episode(TASK, "random", first + number), *text_of(rng))
+        for number in range(count)
     ]
 
 
-def shares(text_of, count=150):
+def share_of_right_colors(text_of, count=150):
     """The share of test texts whose color each floor gets right."""
-    learner = GoalLearner(planted(text_of, 1000, count), planted(text_of, 5000, 50))
-    tested = planted(text_of, 9000, 100)
+    learner = GoalLearner(
+        episodes_with_made_up_texts(text_of, 1000, count),
+        episodes_with_made_up_texts(text_of, 5000, 50),
+    )
+    tested = episodes_with_made_up_texts(text_of, 9000, 100)
     heard = [LearnerInput.of(episode) for episode in tested]
     found = {}
     for floor in LEARNED_FLOORS:
@@ -55,45 +59,58 @@ def shares(text_of, count=150):
     return found
 
 
-def by_word(rng):
+def color_given_away_by_a_word(rng):
     """The greeting gives the color away."""
     number = int(rng.integers(3))
     return f"{('Bravo', 'Hooray', 'Sigh')[number]}, take the one I like.", COLORS[number]
 
 
-def by_position(rng):
+def color_given_away_by_position(rng):
     """The greeting says which of two colors is meant; neither word nor color does."""
     first, second = rng.permutation(COLORS)[:2].tolist()
     is_first = bool(rng.integers(2))
-    greeting = str(rng.choice(FIRST if is_first else LAST))
+    greeting = str(
+        rng.choice(GREETINGS_THAT_MEAN_THE_FIRST if is_first else GREETINGS_THAT_MEAN_THE_LAST)
+    )
     text = f"There are {first} and {second}. {greeting} Take the one I like."
     return text, first if is_first else second
 
 
-def by_chance(rng):
+def color_not_given_away(rng):
     """Nothing shows which of two colors is meant."""
     first, second = rng.permutation(COLORS)[:2].tolist()
     return f"There are {first} and {second}. Take the one I like.", str(rng.choice([first, second]))
 
 
-@pytest.mark.parametrize("cue", [by_word, by_position])
-def test_a_word_that_gives_the_value_or_the_position_away_is_found(cue):
-    """No linear model of the words as they are can say the value by the position."""
-    found = shares(cue)
+@pytest.mark.parametrize("cue", [color_given_away_by_a_word, color_given_away_by_position])
+def test_a_learner_finds_a_word_that_gives_the_color_or_its_position_away(cue):
+    """Texts are made up so that a greeting decides which color is meant; the scene does not.
+
+    Would find a learner that misses leaks: with a position, no single word tells the color.
+    """
+    found = share_of_right_colors(cue)
     assert found["text-only"] == found["union"] == 1
     assert max(found["scene-only"], found["majority"]) < 0.5
 
 
-def test_without_a_cue_learners_are_at_chance():
-    found = shares(by_chance)
+def test_a_learner_is_at_chance_if_nothing_gives_the_color_away():
+    """Two of three colors are named, so knowing the words gives 1 of 2; the scene, 1 of 3."""
+    found = share_of_right_colors(color_not_given_away)
     assert 0.35 < found["text-only"] < 0.65
     assert found["union"] < 0.65
     assert max(found["scene-only"], found["majority"]) < 0.5
 
 
-def test_a_cue_of_the_scene_is_found_without_words():
-    """In the video, the robot moves the cube that the goal asks for."""
-    learned, held_back, told = (said_of(1000, 100), said_of(5000, 40), said_of(9000, 80))
+def test_a_learner_without_words_finds_what_the_scene_gives_away():
+    """In the video the robot moves the cube that the goal asks for, which shows its color.
+
+    The relation (before or after the press) is not shown: 1 of 2.
+    """
+    learned, held_back, told = (
+        episodes_with_instructions(1000, 100),
+        episodes_with_instructions(5000, 40),
+        episodes_with_instructions(9000, 80),
+    )
     learner = GoalLearner(learned, held_back)
     heard = [LearnerInput.of(episode)._replace(text="", candidates={}) for episode in told]
 
@@ -106,7 +123,7 @@ def test_a_cue_of_the_scene_is_found_without_words():
     assert 0.3 < right_relations / len(told) < 0.7
 
 
-def said_of(first, count):
+def episodes_with_instructions(first, count):
     """Return episodes from an index on with what is said in them."""
     episodes = [get_episode(TASK, "random", first + number) for number in range(count)]
     return [(episode, instruct(episode, "direct")) for episode in episodes]
@@ -122,9 +139,15 @@ def test_the_facts_of_a_scene_are_as_stored_and_do_not_follow_from_its_goal(snap
                        if thing.name != thing.kind)  # fmt: skip
 
 
-def test_the_same_texts_teach_the_same():
-    sets = planted(by_position, 1000, 40), planted(by_position, 5000, 15)
-    heard = [LearnerInput.of(told) for told in planted(by_position, 9000, 20)]
+def test_two_learners_of_the_same_texts_guess_the_same():
+    sets = (
+        episodes_with_made_up_texts(color_given_away_by_position, 1000, 40),
+        episodes_with_made_up_texts(color_given_away_by_position, 5000, 15),
+    )
+    heard = [
+        LearnerInput.of(told)
+        for told in episodes_with_made_up_texts(color_given_away_by_position, 9000, 20)
+    ]
 
     first = GoalLearner(*sets)
     second = GoalLearner(*sets)
@@ -133,15 +156,17 @@ def test_the_same_texts_teach_the_same():
         assert first.guesses(floor, heard) == second.guesses(floor, heard)
 
 
-def test_a_learner_hears_the_same_whatever_the_goal():
-    ((episode, said),) = planted(by_position, 9000, 1)
+def test_what_a_learner_gets_of_an_episode_does_not_depend_on_its_goal():
+    """Would find that the answer leaks into the question."""
+    ((episode, said),) = episodes_with_made_up_texts(color_given_away_by_position, 9000, 1)
     for goal in get_task(TASK).goals(episode.scene):
         assert LearnerInput.of((replace(episode, goal=goal), said)) == LearnerInput.of(
             (episode, said)
         )
 
 
-def test_rivals_are_candidates_in_the_order_of_mention():
+def test_a_learner_gets_the_values_that_the_words_name_in_the_order_of_mention():
+    """With a *rival*, a second thing that fits the words but for one property, two are named."""
     goals_of = get_task("PickXtimes").goals
     episodes = (get_episode("PickXtimes", "random", index) for index in range(40))
     episode = next(drawn for drawn in episodes if len(goals_of(drawn.scene)) > 5)
@@ -153,12 +178,13 @@ def test_rivals_are_candidates_in_the_order_of_mention():
     }
 
 
-def test_values_are_marked_by_their_rank():
+def test_colors_in_a_text_are_replaced_by_the_rank_in_which_they_were_first_named():
+    """So that a learner can tell positions: red is rank0, blue rank1, wherever they return."""
     vocabulary = goal_vocabulary("PickXtimes")["color"]
     text = "I like red and blue. Not the blue one."
     assert marked_text(text, "color", vocabulary) == "i like rank0 and rank1 not the rank1 one"
 
 
-def test_there_has_to_be_something_to_learn_from():
+def test_a_learner_without_instructions_is_refused():
     with pytest.raises(InvalidValueError, match="no instruction to learn from"):
         GoalLearner([], [])

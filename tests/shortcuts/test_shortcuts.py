@@ -44,19 +44,21 @@ from roboirg.tasks import get_task
 from roboirg.tasks.splits.splits import get_episode
 
 COLORS = ("blue", "green", "red")
-EXCLUDED = "My kitchen is painted red and blue. Take the cube of a color other than that pair"
+NEITHER_RED_NOR_BLUE = (
+    "My kitchen is painted red and blue. Take the cube of a color other than that pair"
+)
 CHOSEN = "Of the two, I would choose blue."
-PICKS = (
+LIFT_NEITHER_THEN_THE_OTHER = (
     "Lift the container over the cube that is neither of those, then lift the container over the "
     "cube in the other of those colors."
 )
 
 
-def places(rule, text, task, slot):
+def guessed_values(rule, text, task, slot):
     return guess_goal(rule, text, task)[slot]
 
 
-BY_HAND = {
+GUESSES_BY_HAND = {
     ("PickXtimes", "color"): [
         ("first-mention", "I like the red cube. My door is green. Take it once.", ("red",)),
         ("last-mention", "I like the red cube. My door is green. Take it once.", ("green",)),
@@ -64,7 +66,7 @@ BY_HAND = {
         ("elimination", "I like the red cube. Take it once.", ("blue", "green")),
         ("elimination", "Red, green and blue are nice. Take it once.", COLORS),
         ("surface", "I like the red cube. My door is green. Take it once.", ("red",)),
-        ("surface", f"{EXCLUDED} once.", ("green",)),
+        ("surface", f"{NEITHER_RED_NOR_BLUE} once.", ("green",)),
         (
             "surface",
             "I like the red cube and the blue cube. I mean the latter. Take it.",
@@ -72,8 +74,8 @@ BY_HAND = {
         ),
         ("surface", "Here are red and blue. Not the former. Take the cube I mean.", ("blue",)),
         ("surface", "Here are red and blue. Not the former but the latter. Take it.", ("red",)),
-        ("first-mention", f"{EXCLUDED} once.", ("red",)),
-        ("last-mention", f"{EXCLUDED} once.", ("blue",)),
+        ("first-mention", f"{NEITHER_RED_NOR_BLUE} once.", ("red",)),
+        ("last-mention", f"{NEITHER_RED_NOR_BLUE} once.", ("blue",)),
         ("first-mention", "Have a look at the cube at the far left. Take it once.", COLORS),
         ("last-mention", "A green door. Take the red cube once.", ("red",)),
         ("elimination", "A green door. Take the red cube once.", ("red",)),
@@ -98,7 +100,7 @@ BY_HAND = {
         ("surface", "I knock twice. Take the red cube just as often.", (2,)),
         ("surface", "I knock five times. Take the red cube two times fewer than that.", (3,)),
         ("first-mention", "My number is four. Take the red cube one time fewer than that.", (4,)),
-        ("first-mention", f"{EXCLUDED} three times.", (3,)),
+        ("first-mention", f"{NEITHER_RED_NOR_BLUE} three times.", (3,)),
         ("first-mention", "I like those two. Take the one there twice.", (2,)),
         ("first-mention", "Take one of them as before.", (1, 2, 3, 4, 5)),
         ("last-mention", "My number is 4. Take it that many times.", (4,)),
@@ -116,22 +118,26 @@ BY_HAND = {
 }
 
 
-@pytest.mark.parametrize("slot", BY_HAND)
-def test_each_rule_guesses_the_value_that_its_words_give(slot):
-    for rule, text, found in BY_HAND[slot]:
-        assert (rule, text, places(rule, text, *slot)) == (rule, text, (found,))
+@pytest.mark.parametrize("slot", GUESSES_BY_HAND)
+def test_each_surface_rule_guesses_the_value_that_its_reading_of_the_words_gives(slot):
+    """A rule takes what is named first, last or not at all, or computes ("one fewer than that").
+
+    Several values are a draw between them.
+    """
+    for rule, text, found in GUESSES_BY_HAND[slot]:
+        assert (rule, text, guessed_values(rule, text, *slot)) == (rule, text, (found,))
 
 
-TWO = (
+RED_THEN_BLUE = (
     "I like the red cube and the blue cube. Lift the container over the former, then the container "
     "over the latter."
 )
-AMOUNTS = (
+TWO_RED_AND_ONE_BLUE = (
     "She asked for two red cubes and one blue cube. Put the former and the latter into the bin."
 )
 TWO_AND_ONE = {"colors": (("red",), ("blue",)), "counts": ((2,), (1,))}
-PAIR = f"My kitchen is painted red and blue. {CHOSEN} {PICKS}"
-MOMENTS = (
+PAIR = f"My kitchen is painted red and blue. {CHOSEN} {LIFT_NEITHER_THEN_THE_OTHER}"
+THE_OTHER_MOMENT_THAN = (
     "Of the two moments right before and right after the press, he prefers the one right {} it. "
     "Take the red cube and put it at the other of the two moments, not that one."
 )
@@ -140,13 +146,13 @@ MOMENTS = (
 @pytest.mark.parametrize(
     ("rule", "text", "task", "found"),
     [
-        ("first-mention", TWO, "VideoUnmask", {"colors": (("red",), ("blue",))}),
-        ("elimination", TWO, "VideoUnmask", {"colors": (("green",), COLORS)}),
+        ("first-mention", RED_THEN_BLUE, "VideoUnmask", {"colors": (("red",), ("blue",))}),
+        ("elimination", RED_THEN_BLUE, "VideoUnmask", {"colors": (("green",), COLORS)}),
         ("surface", PAIR, "VideoUnmask", {"colors": (("green",), ("red",))}),
         ("last-mention", PAIR, "VideoUnmask", {"colors": (("blue",), ("blue",))}),
         (
             "first-mention",
-            AMOUNTS,
+            TWO_RED_AND_ONE_BLUE,
             "BinFill",
             TWO_AND_ONE,
         ),
@@ -158,22 +164,29 @@ MOMENTS = (
         ),
     ],
 )
-def test_each_rule_guesses_several_values(rule, text, task, found):
+def test_each_surface_rule_guesses_the_values_of_a_goal_with_several_things(
+    rule, text, task, found
+):
+    """For each thing the values that it draws from; all colors if the words give none."""
     assert guess_goal(rule, text, task) == found
 
 
 @pytest.mark.parametrize(("named", "other"), [("before", "after"), ("after", "before")])
-def test_each_rule_guesses_between_two_moments(named, other):
+def test_each_surface_rule_guesses_which_of_two_moments_is_meant(named, other):
+    """He prefers the one, so *the other of the two* is meant: one rule understands it."""
     for rule, moment in {
         "surface": other,
         "last-mention": named,
         "first-mention": "before",
     }.items():
-        said = MOMENTS.format(named)
-        assert places(rule, said, "VideoPlaceButton", "relation") == ((moment,),), (rule, said)
+        said = THE_OTHER_MOMENT_THAN.format(named)
+        assert guessed_values(rule, said, "VideoPlaceButton", "relation") == ((moment,),), (
+            rule,
+            said,
+        )
 
 
-def test_amounts_in_another_order_are_the_same_goal():
+def test_a_guess_of_amounts_in_another_order_than_the_goals_is_right():
     episode = get_episode("BinFill", "test", 3)  # three red cubes and one green cube
     text = "She wants one green cube and three red cubes. Put the former and the latter into it."
 
@@ -183,18 +196,19 @@ def test_amounts_in_another_order_are_the_same_goal():
     assert draw_goal(guess, episode, np.random.default_rng(0)) == episode.goal
 
 
-WORDS = (
+WORDS_OF_RANDOM_TEXTS = (
     "red green blue one two three first second once twice other different not before after half "
     "fewer more the of that those cube container neighbor place take and I like 2 seven"
 )
 TEXTS = st.lists(
-    st.lists(st.sampled_from(WORDS.split()), max_size=9).map(" ".join), max_size=4
+    st.lists(st.sampled_from(WORDS_OF_RANDOM_TEXTS.split()), max_size=9).map(" ".join), max_size=4
 ).map(". ".join)
 
 
 @settings(max_examples=40)
 @given(text=TEXTS, rule=st.sampled_from(sorted(SURFACE_RULES)), task=st.sampled_from(TASKS))
-def test_any_text_gives_a_guess_of_the_right_shape(text, rule, task):
+def test_any_text_gives_a_guess_whose_values_exist_in_either_case(text, rule, task):
+    """One that is drawn from it is a goal of the scene, or none."""
     guess = guess_goal(rule, text, task)
     vocabulary = goal_vocabulary(task)
     assert list(guess) == list(vocabulary)
@@ -212,21 +226,23 @@ def test_any_text_gives_a_guess_of_the_right_shape(text, rule, task):
 
 @settings(max_examples=25)
 @given(named=st.lists(st.sampled_from(COLORS), min_size=1, max_size=6))
-def test_rules_take_the_first_the_last_or_what_is_not_named(named):
+def test_rules_guess_the_first_the_last_or_an_unnamed_color(named):
+    """If all colors are named, elimination draws from all."""
     text = " ".join(f"I like {color}." for color in named) + " Take it."
-    assert places("first-mention", text, "PickXtimes", "color") == ((named[0],),)
-    assert places("last-mention", text, "PickXtimes", "color") == ((named[-1],),)
+    assert guessed_values("first-mention", text, "PickXtimes", "color") == ((named[0],),)
+    assert guessed_values("last-mention", text, "PickXtimes", "color") == ((named[-1],),)
 
     rest = tuple(color for color in COLORS if color not in named)
-    assert places("elimination", text, "PickXtimes", "color") == (rest or COLORS,)
+    assert guessed_values("elimination", text, "PickXtimes", "color") == (rest or COLORS,)
 
 
-def test_a_rule_has_to_exist():
+def test_a_misspelled_rule_is_refused_with_the_right_name():
     with pytest.raises(UnknownNameError, match="first-mention"):
         guess_goal("first-mentoin", "Take it.", "PickXtimes")
 
 
-def test_vocabularies_hold_every_goal_of_the_test_split():
+def test_every_goal_of_the_test_split_can_be_guessed():
+    """Its values are in the vocabulary from which rules guess, and are not more than it allows."""
     for task in TASKS:
         vocabulary = goal_vocabulary(task)
         for episode in first_episodes(task, "test", 50):
@@ -236,7 +252,8 @@ def test_vocabularies_hold_every_goal_of_the_test_split():
 
 
 @pytest.mark.parametrize(("task", "setting"), PAIRS)
-def test_shares_of_every_setting_are_of_its_hidden_slots(task, setting):
+def test_a_rule_is_scored_on_what_the_words_hide_and_is_right_if_they_hide_nothing(task, setting):
+    """A slot is a part of the goal, as its color. The *resolved* form names everything."""
     for episode in first_episodes(task, "test", 2):
         for options in expressible_options(episode):
             if options.setting != setting:
@@ -251,7 +268,7 @@ def test_shares_of_every_setting_are_of_its_hidden_slots(task, setting):
                 assert score_rule("elimination", told).goal == 1
 
 
-def test_shares_of_a_known_episode_are_all_or_nothing():
+def test_in_a_known_episode_the_first_mention_is_right_and_elimination_wrong():
     episode = get_episode("VideoPlaceButton", "test", 0)
     told = episode, instruct(episode, "direct")
 
@@ -271,11 +288,15 @@ def test_shares_of_a_known_episode_are_all_or_nothing():
         ((("red",), COLORS, ("blue",), ("green",)), Fraction(4, 9)),
     ],
 )
-def test_a_share_is_of_the_values_of_the_goal_however_many_are_guessed(guessed, share):
+def test_a_guess_is_scored_by_the_share_of_the_goals_three_values_that_it_gets_right(
+    guessed, share
+):
+    """The goal is red, green, red. A draw from n colors counts 1/n: (1/3 + 1/2) / 3 = 5/18."""
     assert slot_share({"colors": guessed}, "colors", ("red", "green", "red"), range(3)) == share
 
 
-def test_of_two_containers_of_which_one_is_named_only_the_described_one_counts():
+def test_of_two_containers_one_of_which_is_named_only_the_other_is_scored():
+    """It is described by its place: a draw from three colors is right in 1/3, chance in 1/2."""
     found = set()
     for index in range(50):
         episode = get_episode("ButtonUnmaskSwap", "test", index)
@@ -290,7 +311,8 @@ def test_of_two_containers_of_which_one_is_named_only_the_described_one_counts()
     assert found == {0, 1}
 
 
-def test_only_slots_that_a_text_touches_count():
+def test_only_the_parts_of_a_goal_that_a_text_touches_are_scored():
+    """*touched* is in the metadata of an instruction; an explicit one hides nothing."""
     episode = get_episode("VideoPlaceButton", "test", 0)
     said = instruct(episode, "direct")
 
@@ -302,7 +324,11 @@ def test_only_slots_that_a_text_touches_count():
     assert counted_slots((episode, instruct(episode))) == ()
 
 
-def test_a_place_tells_no_color_but_that_of_another_cube():
+def test_words_for_a_place_give_a_color_away_only_if_they_name_another_cube():
+    """*Left of the red one*: elimination draws from two colors, other rules are wrong.
+
+    Without a color every rule draws from three.
+    """
     named = 0
     for episode in first_episodes("PickXtimes", "test", 50):
         told = episode, instruct(episode, "spatial")
@@ -315,7 +341,8 @@ def test_a_place_tells_no_color_but_that_of_another_cube():
     assert 0 < named < 25
 
 
-def test_rows_have_all_instructions():
+def test_rows_by_pattern_task_or_slot_add_up_to_the_row_of_all_instructions():
+    """50 episodes of BinFill in one setting."""
     rows = {
         by: shortcut_rows(("BinFill",), ("test",), ("reasoning",), InstructionOptions(), by=by)
         for by in (None, "pattern", "task", "slot")
@@ -334,7 +361,7 @@ def test_rows_have_all_instructions():
     assert sum(by_slot.values()) / hidden == pytest.approx(whole.shares[CHANCE].slots)
 
 
-def call(*words):
+def shortcuts_command(*words):
     return CliRunner().invoke(app, ["language", "shortcuts", *words])
 
 
@@ -349,17 +376,18 @@ def call(*words):
     ids=" ".join,
 )
 def test_the_command_prints_a_row_for_each_setting_pattern_or_slot(words, snapshot):
-    assert call("--tasks", "StopCube", *words).output == snapshot
+    assert shortcuts_command("--tasks", "StopCube", *words).output == snapshot
 
 
 @pytest.mark.parametrize(
     ("value", "text"), [(0.25, "+25.0 (+21.1 to +28.9)"), (-0.02, "−2.0 (−5.9 to +1.9)")]
 )
-def test_an_excess_has_its_signs_and_its_ends_in_order(value, text):
+def test_how_far_a_shortcut_exceeds_chance_is_printed_with_sign_and_interval(value, text):
+    """The standard error is 0.02: 1.96 times 2 points to both sides."""
     assert excess_text(Excess(value, 0.02), 1) == text
 
 
-def test_the_note_names_how_the_intervals_of_several_rows_are_adjusted():
+def test_the_caption_of_a_table_names_the_adjustment_of_its_intervals():
     rows = [ShortcutRow((name,), 9, {}, Excess(0.1, 0.02)) for name in ("direct", "spatial")]
     caption = str(shortcut_table(rows, "Shortcuts").caption)
     assert caption.endswith("with 95 % intervals, Bonferroni-adjusted for 2 rows.")
@@ -378,22 +406,26 @@ def test_the_note_names_how_the_intervals_of_several_rows_are_adjusted():
         (("--plan", plan_file(distractors=0)), "distractors"),
     ],
 )
-def test_bad_input_is_one_sentence(words, sentence):
-    outcome = call("--tasks", "StopCube", *words)
+def test_a_wrong_option_of_the_shortcuts_command_is_one_sentence(words, sentence):
+    outcome = shortcuts_command("--tasks", "StopCube", *words)
     assert outcome.exit_code
     assert isinstance(outcome.exception, (InvalidValueError, UnknownNameError))
     assert sentence in str(outcome.exception)
 
 
-def test_without_scikit_learn_one_sentence_says_so(monkeypatch):
+def test_without_scikit_learn_the_learned_floors_are_refused_with_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "sklearn.neural_network", None)
-    outcome = call("--tasks", "StopCube", "--learned")
+    outcome = shortcuts_command("--tasks", "StopCube", "--learned")
 
     assert isinstance(outcome.exception, MissingDependencyError)
     assert "[report]'" in str(outcome.exception)
 
 
-def test_the_learned_floors_are_columns():
+def test_rates_of_learners_are_columns_with_an_interval_that_widens_with_the_rows():
+    """In StopCube the words alone give the visit away in 9 of 10; 100 rows adjust it more than 1.
+
+    Such a rate is called a floor: it takes no understanding of the scene.
+    """
     pytest.importorskip("sklearn")
     (row,) = shortcut_rows(("StopCube",), ("test",), ("direct",), InstructionOptions(), learning=0)
     assert list(row.shares) == ["chance", *SURFACE_RULES, *LEARNED_FLOORS]

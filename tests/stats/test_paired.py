@@ -20,7 +20,7 @@ from roboirg.stats.paired_tests import (
 )
 
 
-def cell(*won: str) -> Cell:
+def cell_of_words(*won: str) -> Cell:
     """A word for each episode, a letter for each seed: 1 won, 0 lost, anything else unplayed."""
     return Cell(
         {
@@ -41,8 +41,8 @@ def gap_of(first: Cell, second: Cell):
 
 @settings(max_examples=40)
 @given(st.lists(st.integers(-3, 3), max_size=10))
-def test_the_test_is_what_all_swaps_give(differences):
-    """By brute force over all 2^n ways to swap the two of each pair."""
+def test_the_p_value_is_the_share_of_all_sign_flips_that_are_as_extreme(differences):
+    """By brute force over all 2^n ways to swap the two results of each pair."""
     observed = abs(sum(differences))
     swaps = itertools.product((1, -1), repeat=len(differences))
     as_far = [
@@ -56,9 +56,13 @@ def test_the_test_is_what_all_swaps_give(differences):
     assert sign_flip_test(-7 * np.array(differences, dtype=np.int64)) == pytest.approx(ours)
 
 
-def test_gap_retention_and_overlap_by_hand():
-    implicit = cell("1", "0", "1", "0", "0", "-")
-    explicit = cell("1", "1", "0", "1", "0", "1")
+def test_gap_and_retention_are_over_the_episodes_that_both_have():
+    """1 is won, 0 lost, - not played: implicit wins 2 and explicit 3 of the five in common.
+
+    The gap is the difference of rates, retention their ratio, discordance the share that differs.
+    """
+    implicit = cell_of_words("1", "0", "1", "0", "0", "-")
+    explicit = cell_of_words("1", "1", "0", "1", "0", "1")
 
     gap = gap_of(implicit, explicit)
 
@@ -67,10 +71,11 @@ def test_gap_retention_and_overlap_by_hand():
     assert gap.overlap == Overlap(both=1, only_first=1, only_second=2, neither=1)
 
 
-def test_a_task_of_one_episode_counts_as_much_as_one_of_18():
-    won = Pairs.of(cell("1"), cell("0"))
-    lost = Pairs.of(cell(*"0" * 18), cell(*"1" * 18))
-    without_pairs = Pairs.of(cell("1"), cell("-"))
+def test_a_gap_over_tasks_weighs_them_equally_whatever_their_number_of_episodes():
+    """+1 in a task of one episode, -1 in a task of 18: 0. One without a pair does not count."""
+    won = Pairs.of(cell_of_words("1"), cell_of_words("0"))
+    lost = Pairs.of(cell_of_words(*"0" * 18), cell_of_words(*"1" * 18))
+    without_pairs = Pairs.of(cell_of_words("1"), cell_of_words("-"))
 
     gap = measure_gap([won, lost, without_pairs], np.random.default_rng(0))
 
@@ -78,54 +83,63 @@ def test_a_task_of_one_episode_counts_as_much_as_one_of_18():
     assert measure_gap([without_pairs], np.random.default_rng(0)) is None
 
 
-def test_seeds_are_paired_with_themselves_and_else_by_episode():
-    shared = Pairs.of(cell("11-", "0"), cell("-01", "1"))
+def test_trials_are_paired_by_seed_or_by_episode_if_no_seed_is_common():
+    """A word is an episode, a letter a seed: 1 won, 0 lost, - not played.
+
+    A row is won and played of the first policy, then of the second.
+    """
+    shared = Pairs.of(cell_of_words("11-", "0"), cell_of_words("-01", "1"))
     assert shared.rows.tolist() == [[1, 1, 0, 1], [0, 1, 1, 1]]
 
-    strangers = Pairs.of(cell("11", "0"), cell("--0", "---1"))
+    strangers = Pairs.of(cell_of_words("11", "0"), cell_of_words("--0", "---1"))
     assert strangers.rows.tolist() == [[2, 2, 0, 1], [0, 1, 1, 1]]
     assert strangers.differences.tolist() == [2, -1]
     assert (strangers.overlap, strangers.overlap.discordance) == (Overlap(0, 0, 0, 0), None)
 
 
-def test_nothing_is_retained_of_nothing():
-    gap = gap_of(cell("0", "1"), cell("0", "0"))
+def test_retention_is_unknown_if_nothing_was_won_in_explicit():
+    """It is a ratio to explicit's rate; if that can be 0 in a resample, it has no upper bound."""
+    gap = gap_of(cell_of_words("0", "1"), cell_of_words("0", "0"))
     assert (gap.retention, gap.retention_interval) == (None, None)
 
     # One success of six: one resample in three has none, and is no bound.
-    barely = gap_of(cell(*"100000"), cell(*"100000"))
+    barely = gap_of(cell_of_words(*"100000"), cell_of_words(*"100000"))
     assert (barely.retention, *barely.retention_interval) == (1.0, 0.0, math.inf)
 
 
-def test_resamples_that_are_all_alike_leave_room_for_others():
-    """Rates differ from resample to resample; their ratio does not, nor their difference."""
-    same = gap_of(cell(*"10" * 20), cell(*"10" * 20))
+def test_a_ratio_or_gap_that_is_equal_in_all_resamples_still_has_an_interval():
+    """Rates differ from resample to resample, but their ratio is always 1, the gap always -1/3.
+
+    Would find an interval of width 0, which looks like certainty.
+    """
+    same = gap_of(cell_of_words(*"10" * 20), cell_of_words(*"10" * 20))
     low, high = same.retention_interval
     assert low < 0.9
     assert high > 1.1
 
     tasks = [("0", "1"), ("110", "110"), ("1010010", "1010010")]
-    pairs = [Pairs.of(cell(*first), cell(*second)) for first, second in tasks]
+    pairs = [Pairs.of(cell_of_words(*first), cell_of_words(*second)) for first, second in tasks]
     lost = measure_gap(pairs, np.random.default_rng(0))
     low, high = lost.interval
 
     assert low < -0.5 < lost.value < 0 < high, "but for rounding all are −33.3 points"
 
 
-def test_episodes_that_are_all_alike_leave_room_for_others():
-    same = gap_of(cell(*"1" * 50), cell(*"1" * 50))
+def test_a_gap_whose_episodes_all_ended_alike_still_has_an_interval():
+    """50 won by both, and 50 won by one alone. 0.07135 is z² / (50 + z²), as Wilson's."""
+    same = gap_of(cell_of_words(*"1" * 50), cell_of_words(*"1" * 50))
     assert same.interval == pytest.approx((-0.07135, 0.07135), abs=1e-5)
     assert same.retention_interval == pytest.approx((0.92865, 1 / 0.92865), abs=1e-4)
 
-    lost = gap_of(cell(*"0" * 50), cell(*"1" * 50))
+    lost = gap_of(cell_of_words(*"0" * 50), cell_of_words(*"1" * 50))
     assert lost.interval == pytest.approx((-1, -0.8573), abs=1e-4)
     assert lost.p_value == pytest.approx(2 / 2**50)
-    assert gap_of(cell("1"), cell("0")).interval is None
+    assert gap_of(cell_of_words("1"), cell_of_words("0")).interval is None
 
 
 @settings(max_examples=30)
 @given(st.lists(st.floats(0, 1), min_size=1, max_size=60))
-def test_holm_is_that_of_statsmodels(p_values):
+def test_holms_correction_of_p_values_is_that_of_statsmodels(p_values):
     from statsmodels.stats.multitest import multipletests
 
     assert holm(p_values) == tuple(multipletests(p_values, method="holm")[1].tolist())

@@ -24,13 +24,21 @@ from roboirg.stats.power import (
         (6, 0.0, 0.0, 0.0),
     ],
 )
-def test_power_is_what_the_binomial_gives_by_hand(episodes, gap, discordance, power):
-    """Six episodes, all to one side: the test rejects 6 of 6 and 0 of 6 only (p = 1/32)."""
+def test_the_chance_to_find_a_gap_in_six_episodes_is_the_one_computed_by_hand(
+    episodes, gap, discordance, power
+):
+    """Of six episodes all must differ to one side (p = 2 / 2^6 = 1/32); five can never do (1/16).
+
+    `discordance` is the share of episodes that differ at all.
+    """
     assert mcnemar_power(episodes, gap, discordance) == pytest.approx(power)
 
 
 @pytest.mark.parametrize(("episodes", "gap", "discordance"), [(50, 0.2, 0.3), (40, -0.25, 0.5)])
-def test_power_is_the_share_of_draws_that_are_rejected(episodes, gap, discordance):
+def test_the_computed_power_is_the_share_of_simulated_studies_that_find_the_gap(
+    episodes, gap, discordance
+):
+    """4,000 studies are drawn; a study finds the gap if its p-value is at most 0.05."""
     rng = np.random.default_rng(2)
     first = (discordance + gap) / 2
     second = (discordance - gap) / 2
@@ -47,7 +55,9 @@ def test_power_is_the_share_of_draws_that_are_rejected(episodes, gap, discordanc
 
 @settings(deadline=None, max_examples=15)
 @given(st.floats(0.05, 1), st.floats(0.05, 1))
-def test_the_needed_episodes_are_enough_and_half_are_not(share, discordance):
+def test_the_number_of_episodes_given_for_a_gap_finds_it_in_80_percent_and_half_does_not(
+    share, discordance
+):
     gap = share * discordance
     needed = episodes_needed(gap, discordance)
 
@@ -59,7 +69,8 @@ def test_the_needed_episodes_are_enough_and_half_are_not(share, discordance):
     assert mcnemar_power(max(1, needed // 2), gap, discordance) < 0.8
 
 
-def test_a_run_has_a_smallest_gap_that_it_can_find():
+def test_the_smallest_gap_that_50_episodes_can_find_is_exact_to_a_thousandth():
+    """*Find* is at least 80 % power. Too few episodes find none, and no number a gap of 0."""
     gap = smallest_gap(50, 0.3)
     assert mcnemar_power(50, gap, 0.3) >= 0.8 > mcnemar_power(50, gap - 0.001, 0.3)
 

@@ -53,7 +53,7 @@ def draw_sample(tasks: Sequence[str], settings: Sequence[str], seed: int) -> lis
 
 
 def _texts(task: str, setting: str, seed: int) -> Iterator[SampledText]:
-    """Yield a text of a task for each frame, the situation that it tells of; without frames `TEXTS`.
+    """Yield a text of a task for each frame (the situation in it); without frames `TEXTS`.
 
     They are from random scenes that only this seed uses, in the words of the test pool.
     """
