@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
@@ -38,8 +39,18 @@ _DARK = frozenset((*_ORANGE[:4], *_BLUE[:4], *_GRAY[:2]))
 NOTE = "n: trials with a verdict; the rest of a bar succeeded."
 
 
-COLORS = dict(zip(FAILURE_KINDS, (*_ORANGE, *_BLUE, *_GRAY, "#eeeeee"), strict=True))
-"""By name of the failure: orange for grounding, blue for execution, gray for undecided."""
+def _color_failures() -> dict[str, str]:
+    """Return a color by name of the failure; if a kind has more names, its colors come again."""
+    shades = {
+        "grounding": itertools.cycle(_ORANGE),
+        "execution": itertools.cycle(_BLUE),
+        "undecided": itertools.cycle(_GRAY),
+        "": itertools.cycle(["#eeeeee"]),
+    }
+    return {name: next(shades[kind]) for name, kind in FAILURE_KINDS.items()}
+
+
+COLORS = _color_failures()
 
 
 def draw_failures(content: RunData) -> Figure | None:
