@@ -22,7 +22,7 @@ def exchange_sides(words: str) -> str:
 
 
 def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str, frozenset[str]]:
-    """Return the objects that an instruction's place means with left and right exchanged.
+    """Return which objects the instruction would mean to a listener who takes left for right.
 
     Where the goal counts cubes, a place only gives their color, so all cubes of a color stand for
     one another. No object is given that the instruction means as well.
@@ -42,10 +42,10 @@ def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str,
     if meant is None or exchanged is None:
         return {}
     meant_names = _exchangeable(episode, meant)
-    mirrored = _exchangeable(episode, exchanged) - meant_names
-    if not mirrored:
+    mirrored_names = _exchangeable(episode, exchanged) - meant_names
+    if not mirrored_names:
         return {}
-    return dict.fromkeys(meant_names, mirrored)
+    return dict.fromkeys(meant_names, mirrored_names)
 
 
 def _exchangeable(episode: Episode, thing: SceneObject) -> frozenset[str]:

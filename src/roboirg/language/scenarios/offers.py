@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
-from roboirg.language.clues import LEFT, Clue
+from roboirg.language.clues import CUBES_LEFT_OVER, Clue
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.places import PlaceClass, SpokenPlace, spoken_places
 from roboirg.language.request import GoalValue, InstructionRequest
@@ -137,7 +137,7 @@ def _clued(request: InstructionRequest, thing: GoalValue, clue: Clue) -> Offer:
     """Return the offer of a clue to a value of the goal, at which the command points back."""
     notes = {"touched": [thing.slot], "pattern": clue.kind, "patterns": [clue.kind]}
     if thing.slot == "counts":  # "all but three"
-        kept = (IntroducedValue(REFERENCE, "number", LEFT),)
+        kept = (IntroducedValue(REFERENCE, "number", CUBES_LEFT_OVER),)
         return Offer(["colors.0", "counts.0"], {"kept": kept}, notes)
     fields = [value.field for value in request.values_in(thing.slot)]
     offer = Offer(fields, _seen(thing, clue), notes)

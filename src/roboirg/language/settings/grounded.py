@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from roboirg.core.episode import Goal, Scene, values_in
 from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.core.motions import Away
-from roboirg.language.clues import LEFT, Clue, EventClue, event_clues, thing_clues
+from roboirg.language.clues import CUBES_LEFT_OVER, Clue, EventClue, event_clues, thing_clues
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.settings.setting import Setting
 from roboirg.tasks import Task
@@ -121,7 +121,7 @@ def _amount_clues(request: InstructionRequest, count: GoalValue) -> list[Clue]:
     if _is_late(request.episode.scene) or len(request.scene_colors) > 1:
         return []
     cubes = request.objects_to_point_at(request.color_values[0])
-    if len(cubes) - count.number != LEFT:
+    if len(cubes) - count.number != CUBES_LEFT_OVER:
         return []
     return [Clue("counts", "all but three")]
 
