@@ -34,7 +34,7 @@ def judge_subgoal(
     episode: Episode,
     facts: AbstractSet[Fact] = frozenset(),
 ) -> SubgoalVerdict:
-    """Compare a subgoal with the stage that is due.
+    """Return whether a planner's subgoal, in words, is what is due next, or how it is wrong.
 
     Where *pick up the red cube* is due: itself -> ``right``, *pick up the green cube* ->
     ``wrong_thing``, *press the button* -> ``lost``. Ordinals may be left out, objects that look
@@ -113,7 +113,7 @@ class _Subgoal:
         return self.words.startswith("pick") and not self.colors and bool(right.colors)
 
     def is_other_time(self, right: _Subgoal) -> bool:
-        """Return whether the words have another ordinal than the right ones, of the same thing.
+        """Return whether the words are about another time than the right ones, of the same thing.
 
         *For the second time* where *for the first time* is right; *again* fits any time. The
         ordinals of buttons do not count: both have to be pressed, in any order.
@@ -138,7 +138,7 @@ def _is_elsewhere(
 
 
 def _judge_words(said: _Subgoal, right: _Subgoal, meant: Sequence[SceneObject]) -> SubgoalVerdict:
-    """Compare the words of a subgoal with the right ones for the same act.
+    """Return how the words of a subgoal compare with the right words for the same act.
 
     `meant` are the objects with which the stage can rightly be completed. The order matters: a
     wrong color weighs more than a wrong side, and that more than a wrong ordinal.

@@ -39,20 +39,21 @@ class Referents:
         """Return the colors that a description can mean; None if it says nothing about them.
 
         *the red cube* gives ``{"red"}``, *the cube on the left* the colors of what may be meant
-        there, and *the container over the red cube* that of the cube.
+        there, and *the container over the red cube* that of the cube. Empty if nothing in the scene
+        fits.
         """
         if thing.like is not None:
             return self.colors_of(thing.like)
         if thing.under is not None:
             return self.colors_of(thing.under)
-        found: set[str] | None = None
+        colors: set[str] | None = None
         if thing.color is not None:
-            found = {thing.color} & self.colors  # empty if nothing there has it
+            colors = {thing.color} & self.colors  # empty if nothing there has it
         if thing.place is not None:
-            colors = {self._color(item) for item in self.things_at(thing, thing.place)}
-            at_place = {color for color in colors if color is not None}
-            found = at_place if found is None else found & at_place
-        return found
+            colors_there = {self._color(item) for item in self.things_at(thing, thing.place)}
+            at_place = {color for color in colors_there if color is not None}
+            colors = at_place if colors is None else colors & at_place
+        return colors
 
     def count_of(self, color: str) -> int:
         """Return how many cubes of a color there are."""
@@ -71,7 +72,7 @@ class Referents:
         return None if cube is None else cube.color
 
     def things_at(self, thing: Description, place: Place) -> Things:
-        """Return the things at the place of a description.
+        """Return the things of a description's kind and color that its place may mean.
 
         *Now on the left* is meant of the end, after all swaps, and *on the left at first* of the
         start; without such words it may be either.
@@ -85,7 +86,7 @@ class Referents:
         return [self._scene[name] for name in names]
 
     def _find(self, thing: Description, place: Place, scene: Scene) -> Things:
-        """Return the things at the place of a description in a scene.
+        """Return the things that a description can mean at its place, as they stand in `scene`.
 
         Where several have its color, they are compared with each other, and with no others: *the
         red cube on the left* need not be left of the blue ones.
@@ -105,9 +106,9 @@ class Referents:
         return find_objects(place, candidates, find_anchors)
 
     def _anchors(self, thing: Description, scene: Scene) -> Things:
-        """Return the things that an anchor can mean: of *next to the red cube*, the red cube.
+        """Return the things that words like *next to the red cube* may name: here the red cube.
 
-        Empty if its color fits none or several.
+        By its color it must be the only one; else none is returned.
         """
         if thing.place is not None:
             return self._find(thing, thing.place, scene)

@@ -156,7 +156,7 @@ _WAY = compiled(
 def _times(found: FoundPhrase) -> int:
     """Return the number of repetitions that a phrase names: 3 for *three times*, 2 for *twice*.
 
-    Without a number it is once.
+    Each group of the phrase holds another way to say it; without a number it is once.
     """
     for name in ("number", "many", "another", "x"):
         if found[name]:
@@ -200,7 +200,8 @@ def _side_target(found: FoundPhrase) -> Target:
 def _target(found: FoundPhrase) -> Target | None:
     """Return a target with the placement that its words name; None if they name several.
 
-    *the second target used before the press* has the rank 2 and the relation ``before``.
+    A placement is that of the cube in the video: *the second target used before the press* has the
+    rank 2 and the relation ``before``. The groups of the phrase hold ordinals and numbers.
     """
     ordinals = [found["rank"], found["at"], found["of"], found["first"]]
     rank = _rank(ordinals)
