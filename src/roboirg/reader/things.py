@@ -17,7 +17,7 @@ from roboirg.reader.places import Place, Side
 from roboirg.reader.tokens import color_of, number_of, ordinal_of
 
 Moment = Literal["first", "last"]
-ALL = -1
+ALL_OF_THEM = -1
 """The number of *all red cubes*."""
 
 
@@ -27,7 +27,7 @@ class Description(NamedTuple):
     Attributes:
         noun: ``cube``, ``container``, ``box`` or ``tape``; ``one`` for any of them.
         color: of the thing.
-        number: how many of them, or `ALL`; None if the words do not say.
+        number: how many of them, or `ALL_OF_THEM`; None if the words do not say.
         is_definite: whether it is *the* or *that*, so that it may have been named before.
         is_shown: whether it is the one that the video shows.
         place: where it stands.
@@ -277,7 +277,7 @@ def _named(found: FoundPhrase) -> Description:
 def _number_by(determiner: str, *, is_plural: bool) -> int | None:
     """Return how many things words without a number mean: *a cube* is one; None if unclear."""
     if determiner in ("all", "each", "every", "both"):
-        return ALL
+        return ALL_OF_THEM
     if determiner in ("a", "an", "another", "the", "") and not is_plural:
         return 1
     return None
