@@ -60,7 +60,7 @@ class SaidValues:
         self.by_slot[slot] = values
 
     def operands(self, slot: str) -> tuple[Operand, ...]:
-        """Return what a slot named; empty if it was not said.
+        """Return what a slot named: values, or descriptions of things; empty if it was not said.
 
         ``colors.1`` may have been named alone, or as the second of ``colors``.
         """
@@ -77,9 +77,10 @@ class SaidValues:
         return int(number.value)
 
     def listed(self, *bases: str) -> tuple[Operand, ...]:
-        """Return the members of a list, named together or one by one, as they were said.
+        """Return the members of lists, named together or one by one, in the order of speaking.
 
-        Of several bases, the members are those of any: a cube by its color, another by its place.
+        Of several bases, ``place`` and ``clue``, the members are those of any: a cube by its color,
+        another by its place.
         """
         members: list[Operand] = []
         for slot in self.by_slot:
@@ -201,9 +202,10 @@ def _rank_of(pointer: Pointer, said: SaidValues) -> int:
 
 
 def chosen_term(pointer: Pointer, remark: ChoosingRemark, said: SaidValues) -> Term:
-    """Return the term of words for a value that a remark has chosen from a list of two.
+    """Return how a value follows from a list of two of which a remark has chosen one.
 
-    *The other one* is the one that was not chosen.
+    *Let's skip the former* chooses the second. Words for *the other one* then mean the one that was
+    not chosen.
     """
     members = said.listed("list")
     rank = _RANKS[remark.pointer.expression]
