@@ -9,7 +9,7 @@ from roboirg.core.episode import Episode, SlotValue, describe_goal, values_in
 from roboirg.core.failures import FailureName
 from roboirg.judging.failure_attribution import FailureAttribution
 
-_FAILURES: Mapping[str, FailureName] = {
+_FAILURE_BY_VERDICT: Mapping[str, FailureName] = {
     "wrong_thing": "wrong_object",
     "wrong_place": "wrong_place",
     "wrong_count": "wrong_count",
@@ -44,9 +44,11 @@ class DeclaredIntent:
         last_verdict = self._last_verdict(found.step)
         if last_verdict == "right":
             return _not_followed(found)
-        if last_verdict in _FAILURES and found.kind != "grounding":
+        if last_verdict in _FAILURE_BY_VERDICT and found.kind != "grounding":
             words = f"named something else than what was due: {found.sentence[:-1]}"
-            return FailureAttribution.of(_FAILURES[last_verdict], found.subject, found.step, words)
+            return FailureAttribution.of(
+                _FAILURE_BY_VERDICT[last_verdict], found.subject, found.step, words
+            )
         return found
 
     def _last_verdict(self, step: int) -> str:

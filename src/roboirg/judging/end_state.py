@@ -34,7 +34,7 @@ that may have been meant for that moment."""
 _PAUSE_FACTOR = 1.5
 """How many times as long as any pause before it a rest must be to count as stopping."""
 
-_WORDS: Mapping[FailureName, str] = {
+_FAILURE_WORDS: Mapping[FailureName, str] = {
     "missed_grasp": "did not get hold of {}",
     "missed_press": "came down next to {} without pressing it",
     "dropped": "dropped {}",
@@ -126,7 +126,7 @@ def explain_missing(
     is to be carried over several places, a pass next to one of them explains that place only.
     `skipped` has the indices of the stages whose acts are missing.
     """
-    meant = _meant_by_any(replay, skipped)
+    meant = _objects_meant_by_any(replay, skipped)
     unnoticed = [
         slip for slip in slips if slip.subjects <= meant and not is_noticed(replay, slip, slips)
     ]
@@ -173,7 +173,7 @@ def _missing_acts(replay: EpisodeReplay, skipped: range) -> _Missing:
         stage = replay.stages[index]
         if not picked_up.isdisjoint(facts_of(stage.expects)):
             continue
-        roles = _roles(stage)
+        roles = _expected_roles(stage)
         if FactRole.RAISE in roles:
             picks += 1
         elif picks == 0 and roles - {FactRole.RELEASE}:
@@ -183,7 +183,7 @@ def _missing_acts(replay: EpisodeReplay, skipped: range) -> _Missing:
     return _Missing(picks + has_one_in_hand, visits)
 
 
-def _roles(stage: Stage) -> set[FactRole]:
+def _expected_roles(stage: Stage) -> set[FactRole]:
     """Return the roles of the facts that a stage expects; none if it only waits."""
     return {fact.traits.role for fact in facts_of(stage.expects)}
 
@@ -201,7 +201,7 @@ def judge_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> FailureAttribut
     tries = [slip for slip in slips if slip.step >= replay.acted_since]
     if not tries:
         return None
-    right_objects = _meant_at_end(replay)
+    right_objects = _objects_meant_at_end(replay)
     # What can have been about a right object or about another one is in neither list.
     at_right = [slip for slip in tries if slip.subjects <= right_objects]
     at_wrong = [slip for slip in tries if slip.subjects.isdisjoint(right_objects)]
@@ -214,18 +214,18 @@ def judge_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> FailureAttribut
         return describe_slip(replay, tries[-1], "ambiguous_act")
 
     stages_left = range(replay.expected_stage, len(replay.stages))
-    if at_wrong[-1].subjects.isdisjoint(_meant_by_any(replay, stages_left)):
+    if at_wrong[-1].subjects.isdisjoint(_objects_meant_by_any(replay, stages_left)):
         return describe_slip(replay, at_wrong[-1], "wrong_object")
     return describe_slip(replay, at_wrong[-1], "wrong_order")
 
 
-def _meant_at_end(replay: EpisodeReplay) -> frozenset[str]:
+def _objects_meant_at_end(replay: EpisodeReplay) -> frozenset[str]:
     """Return the names of the objects that the stage means that is current at the end."""
     current = replay.expected_stage
     return meant_objects(replay.stages, current, replay.episode.scene, replay.facts[-1])
 
 
-def _meant_by_any(replay: EpisodeReplay, indices: range) -> set[str]:
+def _objects_meant_by_any(replay: EpisodeReplay, indices: range) -> set[str]:
     """Return the names of the objects that any of some stages means."""
     names: set[str] = set()
     for index in indices:
@@ -251,7 +251,7 @@ def describe_slip(
             failure = moment
 
     subject = min(slip.subjects)
-    words = _WORDS[failure].format(describe_object(subject, replay.episode.scene))
+    words = _FAILURE_WORDS[failure].format(describe_object(subject, replay.episode.scene))
     expected = describe_expected(replay.stage_at(slip.step))
     return FailureAttribution.of(failure, subject, slip.step, f"{words}; {expected}")
 
@@ -309,13 +309,13 @@ def _unexpected_act(replay: EpisodeReplay, unmet: Sequence[Fact]) -> _Unexpected
     """
     acts = list(_standing_acts(replay))
     for act in reversed(acts):
-        failure = _failure_of(replay, act.fact, unmet)
+        failure = _failure_of_act(replay, act.fact, unmet)
         if failure is not None:
             return _UnexpectedAct(act, failure)
     return None
 
 
-def _failure_of(replay: EpisodeReplay, fact: Fact, unmet: Sequence[Fact]) -> FailureName | None:
+def _failure_of_act(replay: EpisodeReplay, fact: Fact, unmet: Sequence[Fact]) -> FailureName | None:
     """Return the failure that an act is; None if it may lead to what the current stage expects.
 
     With *put the red cube on the target* unmet: a red cube in the hand -> None, on the wrong target
@@ -325,7 +325,7 @@ def _failure_of(replay: EpisodeReplay, fact: Fact, unmet: Sequence[Fact]) -> Fai
     if all(fact.subject != expected.subject for expected in unmet):
         return _classify(replay, fact)
     # A stage may expect any cube, of which only some are meant.
-    if fact.traits.grips and fact.subject not in _meant_at_end(replay):
+    if fact.traits.grips and fact.subject not in _objects_meant_at_end(replay):
         return "wrong_object"
     if fact.traits.role is FactRole.PLACING and fact not in unmet:
         return "wrong_place"
@@ -360,7 +360,7 @@ def _is_not_undone(replay: EpisodeReplay, act: FactInterval) -> bool:
         case FactRole.RAISE:
             return is_due_later and not act.fact.traits.undone_by_release
         case FactRole.PRESS:
-            return is_due_later or FactRole.PRESS in _roles(replay.stages[current_stage])
+            return is_due_later or FactRole.PRESS in _expected_roles(replay.stages[current_stage])
         case FactRole.PLACING:
             # An object that was not picked up was there before and has only been touched.
             raised = {raised.subject for raised in replay.started(FactRole.RAISE)}
@@ -395,13 +395,13 @@ def _stopped_short(replay: EpisodeReplay) -> FailureAttribution | None:
     all alone for a time could have ended after any stage.
     """
     stopped_at = _stopped_since(replay)
-    completed_roles = [_roles(stage) for stage in replay.stages[: replay.expected_stage]]
+    completed_roles = [_expected_roles(stage) for stage in replay.stages[: replay.expected_stage]]
     act_roles = [roles for roles in completed_roles if roles != {FactRole.RELEASE}]
     if stopped_at is None or not act_roles:
         return None
     last_stage = replay.stages[-1]
     ends_alone = isinstance(last_stage.expects, Elapsed)
-    if ends_alone or act_roles[-1] == _roles(last_stage):
+    if ends_alone or act_roles[-1] == _expected_roles(last_stage):
         return _describe(replay, "wrong_count", None, stopped_at, "came to rest")
     return None
 
@@ -453,7 +453,7 @@ def _at_rest(replay: EpisodeReplay) -> FailureAttribution:
         failure = "stopped"
     if not _has_begun(replay):
         failure = "no_attempt"
-    return _describe(replay, failure, None, step, _WORDS[failure])
+    return _describe(replay, failure, None, step, _FAILURE_WORDS[failure])
 
 
 def _has_begun(replay: EpisodeReplay) -> bool:
@@ -463,5 +463,5 @@ def _has_begun(replay: EpisodeReplay) -> bool:
         return True
     places = {approach.fact.place for approach in replay.started(FactRole.APPROACH)}
     places |= {above.fact.place for above in replay.tried("above")}
-    meant = _meant_by_any(replay, range(len(replay.stages)))
+    meant = _objects_meant_by_any(replay, range(len(replay.stages)))
     return not places.isdisjoint(meant)

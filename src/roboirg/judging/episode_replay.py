@@ -188,7 +188,7 @@ def rejudge(
     judge = Judge.of(episode)
     expected_stage = -len(episode.demonstration)
     expected_stages: list[int] = []
-    for step in _evaluate(judge, events, elapsed_steps):
+    for step in _evaluated_steps(judge, events, elapsed_steps):
         # The evaluation at the step itself still tests the stage that was expected before.
         expected_stages += [expected_stage] * (step + 1 - len(expected_stages))
         expected_stage = judge.index - len(episode.demonstration)
@@ -208,7 +208,7 @@ def rejudge(
 def decide(episode: Episode, events: Sequence[Event], elapsed_steps: int) -> Decision:
     """Judge an episode again up to its verdict; faster than `rejudge`."""
     judge = Judge.of(episode)
-    for step in _evaluate(judge, events, elapsed_steps):
+    for step in _evaluated_steps(judge, events, elapsed_steps):
         if judge.status is not Status.ONGOING:
             return Decision(judge, step)
     return Decision(judge, elapsed_steps)
@@ -223,14 +223,14 @@ def completed_stages(
     """
     judge = Judge.of(episode)
     steps: dict[int, int] = {}
-    for step in _evaluate(judge, events, elapsed_steps):
+    for step in _evaluated_steps(judge, events, elapsed_steps):
         last_completed = judge.index - len(episode.demonstration) - 1
         if last_completed >= 0:
             steps.setdefault(last_completed, step)
     return steps
 
 
-def _evaluate(judge: Judge, events: Sequence[Event], elapsed_steps: int) -> Iterator[int]:
+def _evaluated_steps(judge: Judge, events: Sequence[Event], elapsed_steps: int) -> Iterator[int]:
     """Let a judge evaluate each step at which anything may change, and yield the step.
 
     These are the steps with an event, a fact that begins or ceases to hold, and those at which a

@@ -20,7 +20,7 @@ from roboirg.core.conditions import All, Condition, Elapsed, Fact, Rule
 from roboirg.core.episode import Episode, Scene, Stage
 from roboirg.judging.fact_history import FactHistory
 
-_PLAINER = {"remain static": "wait"}
+_PLAINER_SUBGOALS = {"remain static": "wait"}
 """Subgoals of RoboMME, and what a cause says instead."""
 
 
@@ -128,7 +128,7 @@ class _StageWatch:
     def __init__(self, stage: Stage, first_step: int) -> None:
         self._stage = stage
         self._first_step = first_step
-        self._elapsed = tuple(_elapsed_parts(stage))
+        self._elapsed = tuple(_time_conditions(stage))
         # Since which step all evaluations have met what the stage expects; None if the last one
         # did not. Only of a stage that has to last.
         self._met_since: int | None = None
@@ -170,7 +170,7 @@ def _condition_of(forbidden: Fact | Rule) -> Condition:
     return forbidden.condition if isinstance(forbidden, Rule) else forbidden
 
 
-def _elapsed_parts(stage: Stage) -> Iterator[Elapsed]:
+def _time_conditions(stage: Stage) -> Iterator[Elapsed]:
     """Yield the conditions on time in what a stage expects and forbids: *100 steps passed*."""
     conditions: list[Condition] = [stage.expects]
     conditions += [_condition_of(forbidden) for forbidden in stage.forbids]
@@ -191,7 +191,7 @@ def describe_violation(violation: Fact | Rule, stage: Stage, scene: Scene) -> st
 def describe_expected(stage: Stage) -> str:
     """Return what the stage expects, to follow an act: ``"expected: press the button"``."""
     words = plain_subgoal(stage)
-    return f"expected: {_PLAINER.get(words, words)}"
+    return f"expected: {_PLAINER_SUBGOALS.get(words, words)}"
 
 
 def describe_act(fact: Fact, scene: Scene) -> str:

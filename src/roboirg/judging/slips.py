@@ -29,9 +29,9 @@ TREMOR_STEPS = 10
 MISSES = ("missed_grasp", "missed_press")
 """Slips at which the hand did not reach its object; at all others it lost it, or passed a place."""
 
-_OPEN_PLACES = ("bin", "box")
+_PLACES_TO_FALL_INTO = ("bin", "box")
 """Kinds of places into which an object falls that is let go in the air."""
-_PLACES = ("target", "site", *_OPEN_PLACES)
+_PLACES_TO_REST = ("target", "site", *_PLACES_TO_FALL_INTO)
 """Kinds of places at which an object comes to rest that is put down."""
 
 
@@ -128,8 +128,8 @@ def _missed_grasps(replay: EpisodeReplay) -> Iterator[Slip]:
 
 def _fruitless_holds(replay: EpisodeReplay) -> Iterator[FactInterval]:
     """Yield when the fingers held something that did not come up."""
-    for hold in _ended_holds(replay):
-        if not _raises(replay, hold):
+    for hold in _holds_let_go(replay):
+        if not _lifts_during(replay, hold):
             yield hold
 
 
@@ -150,7 +150,7 @@ def _idle_touches(replay: EpisodeReplay, closing_steps: Sequence[int]) -> Iterat
             yield touch
 
 
-def _ended_holds(replay: EpisodeReplay) -> Iterator[FactInterval]:
+def _holds_let_go(replay: EpisodeReplay) -> Iterator[FactInterval]:
     """Yield from when to when the fingers held each object; not what they hold at the end.
 
     Fingers that tremble lose an object and hold it again within a few steps: that is no end of a
@@ -167,7 +167,7 @@ def _ended_holds(replay: EpisodeReplay) -> Iterator[FactInterval]:
             yield grip
 
 
-def _raises(replay: EpisodeReplay, hold: FactInterval) -> list[FactInterval]:
+def _lifts_during(replay: EpisodeReplay, hold: FactInterval) -> list[FactInterval]:
     """Return from when to when a held object was lifted, of lifts during this hold."""
     hold_end = replay.end_of(hold)
     lifts: list[FactInterval] = []
@@ -217,7 +217,7 @@ class _Release(NamedTuple):
     @property
     def places(self) -> tuple[str, ...]:
         """The kinds of places to which the object can come."""
-        return _OPEN_PLACES if self.is_in_air else _PLACES
+        return _PLACES_TO_FALL_INTO if self.is_in_air else _PLACES_TO_REST
 
 
 def _lost_objects(replay: EpisodeReplay) -> Iterator[Slip]:
@@ -229,7 +229,7 @@ def _lost_objects(replay: EpisodeReplay) -> Iterator[Slip]:
     for release in _releases(replay):
         can_be_lost = release.is_in_air or FactRole.PLACING in release.roles
         if release.roles and can_be_lost and not _has_landed(replay, release):
-            failure = _failure_of(replay, release)
+            failure = _failure_of_loss(replay, release)
             yield Slip(release.step, failure, frozenset({release.name}))
 
 
@@ -239,8 +239,8 @@ def _releases(replay: EpisodeReplay) -> Iterator[_Release]:
     It was in the air if it was still up, and the hand had not lowered it to put it down. What the
     current stage expects of the object goes with it.
     """
-    for hold in _ended_holds(replay):
-        raises = _raises(replay, hold)
+    for hold in _holds_let_go(replay):
+        raises = _lifts_during(replay, hold)
         if not raises:
             continue
         step = replay.end_of(hold)
@@ -275,7 +275,7 @@ def _has_landed(replay: EpisodeReplay, release: _Release) -> bool:
     return False
 
 
-def _failure_of(replay: EpisodeReplay, release: _Release) -> FailureName:
+def _failure_of_loss(replay: EpisodeReplay, release: _Release) -> FailureName:
     """Return which failure the loss of an object is, by the places next to which it was let go.
 
     Next to the place where it is expected -> ``misplaced``; next to another place ->

@@ -60,7 +60,7 @@ def judge_subgoal(
     index = episode.stages.index(due) if due in episode.stages else 0
     right_things = meant_objects(episode.stages, index, episode.scene, facts)
     right_targets = _places(due) if is_placing else right_things
-    if pointed_at is not None and _is_elsewhere(pointed_at, due, right_targets):
+    if pointed_at is not None and _points_elsewhere(pointed_at, due, right_targets):
         return "wrong_place" if is_placing else "wrong_thing"
 
     if said.words == right.words:
@@ -68,7 +68,7 @@ def judge_subgoal(
     # A stage may point at nothing; None would stand for all that is inside of nothing.
     meant = _objects(episode.scene, {*right_things, due.points_at} - {None})
     # "Pick up the cube" without a color or a point does not name one of several cubes.
-    if pointed_at is None and said.is_vaguer(right) and _have_alike(meant, episode.scene):
+    if pointed_at is None and said.is_vaguer(right) and _has_others_of_kind(meant, episode.scene):
         return "wrong_thing"
     return _judge_words(said, right, meant)
 
@@ -128,7 +128,7 @@ class _Subgoal:
         return ordinal[1] != right_ordinal[1] and self.colors == right.colors
 
 
-def _is_elsewhere(
+def _points_elsewhere(
     pointed_at: Collection[str], due: Stage, right_targets: AbstractSet[str | None]
 ) -> bool:
     """Return whether a point is at none of the objects at which the stage may point."""
@@ -172,7 +172,7 @@ def _objects(scene: Scene, names: Collection[str | None]) -> list[SceneObject]:
     return [item for item in scene.objects if item.name in names or item.inside in names]
 
 
-def _have_alike(meant: Sequence[SceneObject], scene: Scene) -> bool:
+def _has_others_of_kind(meant: Sequence[SceneObject], scene: Scene) -> bool:
     """Return whether the scene has other objects of the same kinds."""
     kinds = {item.kind for item in meant}
     return any(item.kind in kinds and item not in meant for item in scene.objects)

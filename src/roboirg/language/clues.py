@@ -27,13 +27,13 @@ SHARE_BY_SWAPS = {1: (1, 2), 2: (1, 3), 3: (1, 1)}
 Of easy scenes half have one swap and half two, of medium ones half two and half three; two of four
 episodes are easy, one is medium.
 """
-_BETWEEN = (PlaceClass.MIDDLE, PlaceClass.BETWEEN)
+_MIDDLE_PLACES = (PlaceClass.MIDDLE, PlaceClass.BETWEEN)
 """Places for which what stands on both sides is looked at."""
-_ASIDE = (PlaceClass.EXTREME, PlaceClass.FIXTURE, PlaceClass.CORNER)
+_EXCLUDING_PLACES = (PlaceClass.EXTREME, PlaceClass.FIXTURE, PlaceClass.CORNER)
 """Places of the two things that are set aside."""
 _EXCLUSION_SIZE = 3
 """Things of which two are set aside."""
-_SIDES = {1: "left", -1: "right"}
+_SIDE_BY_SIGN = {1: "left", -1: "right"}
 """By the sign of y in the robot base frame."""
 
 
@@ -93,7 +93,7 @@ def thing_clues(scene: Scene, task: Task) -> list[ThingClue]:
     for place in places:
         if place.kind in (PlaceClass.COLOR, PlaceClass.UNUSUAL):
             continue  # no clue names a color, or is what no one says
-        clue_kind: ClueKind = "betweenness" if place.kind in _BETWEEN else "place"
+        clue_kind: ClueKind = "betweenness" if place.kind in _MIDDLE_PLACES else "place"
         clue = Clue(clue_kind, f"the {noun} {place.attributive}")
         clues.append(ThingClue(place.thing, clue))
     return clues
@@ -110,7 +110,7 @@ def _clues_by_exclusion(
     if len(things) != _EXCLUSION_SIZE:
         return []
     clues: list[ThingClue] = []
-    simple_places = [place for place in places if place.kind in _ASIDE]
+    simple_places = [place for place in places if place.kind in _EXCLUDING_PLACES]
     for first, second in itertools.combinations(simple_places, 2):
         remaining = [thing for thing in things if thing not in (first.thing, second.thing)]
         # Two remain if both places are of the same thing.
@@ -198,7 +198,7 @@ def _cubes_on_sides(scene: Scene) -> Iterator[EventClue]:
         return
     for color in colors:
         other_cubes = [cube for cube in cubes if cube.color == color and cube != shown]
-        for sign, side in _SIDES.items():
+        for sign, side in _SIDE_BY_SIGN.items():
             number = _count_on_side(other_cubes, shown, sign)
             if number:  # neither unclear nor zero
                 yield EventClue("repeats", number, _clue_to_side(color, side))

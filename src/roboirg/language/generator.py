@@ -87,7 +87,7 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
         InvalidValueError: the open wording file has no words of the task, or the setting cannot
             express the episode.
     """
-    missing_words = _missing(episode, options)
+    missing_words = _find_missing_words(episode, options)
     if missing_words is not None:
         raise InvalidValueError(f"The {missing_words}.")
     request = request_of(episode, options, variant)
@@ -104,7 +104,7 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
 
 def find_refusal(episode: Episode, options: InstructionOptions) -> str | None:
     """Return why a setting of the task cannot express an episode; None if it can."""
-    missing = _missing(episode, options)
+    missing = _find_missing_words(episode, options)
     return missing or refusal(request_of(episode, options))
 
 
@@ -141,7 +141,7 @@ def request_of(
     return InstructionRequest(episode, task, options, sampler_of(episode, variant))
 
 
-def _missing(episode: Episode, options: InstructionOptions) -> str | None:
+def _find_missing_words(episode: Episode, options: InstructionOptions) -> str | None:
     """Return why a file of wordings has no words for an episode's task; None if it has them.
 
     None also for our own words, which all tasks have. The text follows *The* in an error message.

@@ -31,8 +31,8 @@ def row(episode: Episode, instruction: Instruction) -> ExportRow:
         "form": instruction.form,
         "text": instruction.text,
         "command": instruction.command,
-        "turns": _turns(instruction),
-        "mentions": _mentions(instruction),
+        "turns": _utterance_rows(instruction),
+        "mentions": _mention_rows(instruction),
         "words": len(instruction.text.split()),
         "tokens": count_tokens(instruction.text),
         # As text, because each task has its own slots.
@@ -58,7 +58,7 @@ def _copied(metadata: Mapping[str, Any], *names: str) -> ExportRow:
     return {name: metadata[name] for name in names}
 
 
-def _turns(instruction: Instruction) -> list[ExportRow]:
+def _utterance_rows(instruction: Instruction) -> list[ExportRow]:
     """Return a row for each utterance: its stage, text, and first character in the whole prompt.
 
     The prompt joins utterances by a space: *Red is nice.* starts at 0, and *Lift it.* after it at
@@ -72,12 +72,12 @@ def _turns(instruction: Instruction) -> list[ExportRow]:
     return rows
 
 
-def _mentions(instruction: Instruction) -> list[ExportRow]:
+def _mention_rows(instruction: Instruction) -> list[ExportRow]:
     """Return a row for each mention: words that name a value of the goal or point back at one.
 
     A mention has its characters within its utterance; the row has them within the whole prompt.
     """
-    utterance_starts = [turn["start"] for turn in _turns(instruction)]
+    utterance_starts = [turn["start"] for turn in _utterance_rows(instruction)]
     rows: list[ExportRow] = []
     for mention in instruction.mentions:
         utterance_start = utterance_starts[mention.utterance]

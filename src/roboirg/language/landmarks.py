@@ -131,17 +131,17 @@ def selectors(scene: Scene, kind: ObjectKind, frame: Frame) -> Iterator[Selector
         yield from _sides(candidates, frame)
         return
     ends = [*_extremes(candidates, frame), *_corners(candidates, frame)]
-    ranked = list(_ranks(candidates, frame))
+    ranked = list(_in_rows(candidates, frame))
     yield from ends
     yield from _far_sides(candidates, frame)
     yield from ranked
-    yield from _fixtures(scene, candidates)
-    yield from _other_colors(candidates)
-    yield from _chains(kind, candidates, ends)
-    yield from _chains(kind, candidates, ranked)
-    yield from _chains(kind, candidates, ends, rank=1)
-    yield from _chains(kind, candidates, ends, rank=2)
-    yield from _ranks(candidates, frame, FOURTH)
+    yield from _by_fixtures(scene, candidates)
+    yield from _by_colors(candidates)
+    yield from _by_neighbors(kind, candidates, ends)
+    yield from _by_neighbors(kind, candidates, ranked)
+    yield from _by_neighbors(kind, candidates, ends, rank=1)
+    yield from _by_neighbors(kind, candidates, ends, rank=2)
+    yield from _in_rows(candidates, frame, FOURTH)
 
 
 def candidates_in(scene: Scene, kind: ObjectKind) -> tuple[SceneObject, ...]:
@@ -283,7 +283,7 @@ def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Sele
             yield Selector(Landmark(phrase, is_sided=True), rankings, candidates)
 
 
-def _ranks(
+def _in_rows(
     candidates: tuple[SceneObject, ...],
     frame: Frame,
     ordinals: Mapping[int, str] = ORDINALS,
@@ -311,7 +311,7 @@ def fixtures_in(scene: Scene) -> list[SceneObject]:
     return [of_kind[0] for of_kind in of_kinds if len(of_kind) == 1]
 
 
-def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Selector]:
+def _by_fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Selector]:
     """Yield the nearest to a fixture and the farthest from it: *closest to the button*."""
     for fixture in fixtures_in(scene):
         near = nearness(fixture.position)
@@ -327,14 +327,14 @@ def alone_in_color(things: Sequence[SceneObject]) -> list[SceneObject]:
     return [thing for thing in things if thing.color and colors.count(thing.color) == 1]
 
 
-def _other_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
+def _by_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
     """Yield the nearest to the only cube of a color: *closest to the red cube*."""
     for anchor in alone_in_color(candidates):
         landmark = Landmark(f"closest to the {anchor.color} cube")
         yield Selector(landmark, (nearness(anchor.position),), _without(candidates, anchor))
 
 
-def _chains(
+def _by_neighbors(
     kind: str,
     candidates: Sequence[SceneObject],
     anchors: Sequence[Selector],

@@ -146,7 +146,7 @@ def _term_values(term: Term, field: str, episode: Episode) -> Values:
     if operand is None:
         return frozenset()
     if isinstance(operand, int) and term.operation in ("double", "half", "step"):
-        return frozenset([_reckoned(term, operand)])
+        return frozenset([_computed_number(term, operand)])
     return _operand_values(operand, field, episode)
 
 
@@ -172,7 +172,7 @@ def _is_picked(position: int, term: Term) -> bool:
     return True
 
 
-def _reckoned(term: Term, number: int) -> int:
+def _computed_number(term: Term, number: int) -> int:
     """Return the number that follows from another one."""
     if term.operation == "double":
         return 2 * number

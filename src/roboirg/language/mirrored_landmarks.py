@@ -11,14 +11,19 @@ from roboirg.language.instruction import Instruction
 from roboirg.language.places import things_at
 from roboirg.tasks import get_task
 
-_SIDES = {"left": "right", "right": "left", "leftmost": "rightmost", "rightmost": "leftmost"}
-_SIDE = re.compile(rf"\b({'|'.join(_SIDES)})\b(?! (?:by|next))")
+_OPPOSITE_SIDE = {
+    "left": "right",
+    "right": "left",
+    "leftmost": "rightmost",
+    "rightmost": "leftmost",
+}
+_SIDE = re.compile(rf"\b({'|'.join(_OPPOSITE_SIDE)})\b(?! (?:by|next))")
 """A word for a side; *right by the button* is none."""
 
 
 def exchange_sides(words: str) -> str:
     """Return words with left and right exchanged: *on the left* becomes *on the right*."""
-    return _SIDE.sub(lambda found: _SIDES[found[0]], words)
+    return _SIDE.sub(lambda found: _OPPOSITE_SIDE[found[0]], words)
 
 
 def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str, frozenset[str]]:

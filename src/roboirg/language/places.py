@@ -119,7 +119,7 @@ def _landmarks(scene: Scene, kind: ObjectKind, frame: Frame) -> Iterator[SpokenP
         if landmark.is_in_depth:
             continue  # it may be wrong by distance
         spot = landmark.phrase if is_paired else None
-        yield from _said(PlaceClass.UNUSUAL, selector.select(), landmark.phrase, spot)
+        yield from _place_if_any(PlaceClass.UNUSUAL, selector.select(), landmark.phrase, spot)
 
 
 def _places_of(scene: Scene, things: Things, frame: Frame) -> Iterator[SpokenPlace]:
@@ -150,7 +150,7 @@ def things_at(
     return found
 
 
-def _said(
+def _place_if_any(
     kind: PlaceClass, thing: SceneObject | None, attributive: str | None, spot: str | None = None
 ) -> Iterator[SpokenPlace]:
     """Yield a place if something stands there, and if there are words for it."""
@@ -158,7 +158,7 @@ def _said(
         yield SpokenPlace(kind, thing, attributive, spot)
 
 
-def _only(things: Things, ranking: Ranking, start: float) -> SceneObject | None:
+def _only_beyond(things: Things, ranking: Ranking, start: float) -> SceneObject | None:
     """Return the only thing whose quantity is at least `start`; None if none or several are.
 
     None also if another thing comes closer to `start` than the margin. With the distance to the
@@ -175,19 +175,19 @@ def _only(things: Things, ranking: Ranking, start: float) -> SceneObject | None:
 
 _CENTER = SceneObject("center", "site", Point(-0.05, 0.0, 0.0))
 """The center of the work area."""
-_CLEARLY = 2
+_CLEAR_MARGINS = 2
 """Margins from the center from which a thing is clearly in a direction."""
-_AROUND = 0.09
+_MIDDLE_RADIUS = 0.09
 """Meters from the center up to which a thing is in the middle."""
-_IN_QUARTER = 0.06
+_QUARTER_DISTANCE = 0.06
 """Meters in both directions from the center from which a thing is at the back left, and so on."""
-_IN_CORNER = 0.1
+_CORNER_DISTANCE = 0.1
 """The same from which it is in the back left corner."""
-_FAR = 3
+_FAR_MARGINS = 3
 """Margins from the center from which a thing is on the far side."""
-_FAR_ALONE = 5
+_FAR_MARGINS_ALONE = 5
 """The same for the only thing there is."""
-_DETOUR = 0.03
+_MAX_DETOUR = 0.03
 """Meters that the way from one thing to another is longer over a third one between them."""
 
 
@@ -199,7 +199,7 @@ def _center_of(things: Things) -> SceneObject:
     return replace(_CENTER, position=Point((min(depths) + max(depths)) / 2, 0.0, 0.0))
 
 
-def _past(center: SceneObject, ranking: Ranking) -> Ranking:
+def _distance_past(center: SceneObject, ranking: Ranking) -> Ranking:
     """Return the order of things by how far they are past a center."""
     start = ranking.quantity(center)
     return ranking._replace(quantity=lambda thing: ranking.quantity(thing) - start)
@@ -297,20 +297,20 @@ def _in_direction(things: Things, words: _Words, ranking: Ranking) -> Iterator[S
     They are the first one, *all the way on the left*; one that is far ahead, *on the far left*; the
     only one there, *on the left*; and those after the first, *second from the left*.
     """
-    yield from _said(PlaceClass.EXTREME, ranking.select(things, 0), words.most)
+    yield from _place_if_any(PlaceClass.EXTREME, ranking.select(things, 0), words.most)
 
     # The first one is "on the far left" if it is well ahead of all others, and far from the center.
-    wide_ranking = ranking._replace(margin=_CLEARLY * ranking.margin)
-    past_center = _past(_center_of(things), ranking)
+    wide_ranking = ranking._replace(margin=_CLEAR_MARGINS * ranking.margin)
+    past_center = _distance_past(_center_of(things), ranking)
     thing_ahead = wide_ranking.select(things, 0)
-    margins = _FAR if len(things) > 1 else _FAR_ALONE
+    margins = _FAR_MARGINS if len(things) > 1 else _FAR_MARGINS_ALONE
     if thing_ahead is not None and past_center.quantity(thing_ahead) >= ranking.margin * margins:
-        yield from _said(PlaceClass.EXTREME, thing_ahead, None, words.far)
+        yield from _place_if_any(PlaceClass.EXTREME, thing_ahead, None, words.far)
 
     # The only one past the center is simply "on the left".
-    thing_alone = _only(things, past_center, wide_ranking.margin)
+    thing_alone = _only_beyond(things, past_center, wide_ranking.margin)
     if _is_past_work_center(thing_alone, ranking):
-        yield from _said(PlaceClass.EXTREME, thing_alone, words.alone, words.spot)
+        yield from _place_if_any(PlaceClass.EXTREME, thing_alone, words.alone, words.spot)
 
     if words.row is not None:
         yield from _in_row(things, words, ranking)
@@ -327,7 +327,7 @@ def _in_row(things: Things, words: _Words, ranking: Ranking) -> Iterator[SpokenP
         kind = PlaceClass.RANK
         if rank > 1 and words.row == words.most:
             kind = PlaceClass.UNUSUAL  # no one says "third closest"
-        yield from _said(kind, ranking.select(things, rank), f"{ordinal} {words.row}")
+        yield from _place_if_any(kind, ranking.select(things, rank), f"{ordinal} {words.row}")
 
 
 def _near_others(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
@@ -340,7 +340,9 @@ def _near_others(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
         name = f"the {fixture.kind}"
         yield from _near(fixture, name, things, PlaceClass.FIXTURE)
         farness = nearness(fixture.position).opposite
-        yield from _said(PlaceClass.FIXTURE, farness.select(things, 0), f"farthest from {name}")
+        yield from _place_if_any(
+            PlaceClass.FIXTURE, farness.select(things, 0), f"farthest from {name}"
+        )
     for cube in alone_in_color(things):
         others = [thing for thing in things if thing is not cube]
         if len(others) > 1:  # else only one thing could be meant
@@ -362,16 +364,16 @@ def _near(
         kind: class of the places.
     """
     nearness_to_anchor = nearness(anchor.position)
-    yield from _said(kind, nearness_to_anchor.select(things, 0), f"nearest to {name}")
+    yield from _place_if_any(kind, nearness_to_anchor.select(things, 0), f"nearest to {name}")
 
     reach = anchor.half_width + things[0].half_width + BESIDE
-    neighbor = _only(
+    neighbor = _only_beyond(
         things, nearness_to_anchor, -reach
     )  # the quantity is the distance with a minus sign
     spot = None
     if kind == PlaceClass.FIXTURE:
         spot = f"right by {name}"
-    yield from _said(kind, neighbor, f"next to {name}", spot)
+    yield from _place_if_any(kind, neighbor, f"next to {name}", spot)
 
 
 def _between(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
@@ -379,8 +381,8 @@ def _between(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
     for first, second in itertools.combinations(fixtures_in(scene), 2):
         words = f"between the {first.kind} and the {second.kind}"
         shortest = nearness(first.position).quantity(second)
-        thing = _only(things, _way_between(first, second), shortest - _DETOUR)
-        yield from _said(PlaceClass.BETWEEN, thing, words, words)
+        thing = _only_beyond(things, _way_between(first, second), shortest - _MAX_DETOUR)
+        yield from _place_if_any(PlaceClass.BETWEEN, thing, words, words)
 
 
 def _way_between(first: SceneObject, second: SceneObject) -> Ranking:
@@ -405,7 +407,7 @@ def _in_middle(things: Things) -> Iterator[SpokenPlace]:
     if nearest is None:
         return
     words = "in the middle"
-    is_around = nearest is _only(things, nearness_to_their_center, -_AROUND)
+    is_around = nearest is _only_beyond(things, nearness_to_their_center, -_MIDDLE_RADIUS)
     spot = words if is_around else None
     is_meant = is_around
     if len(things) % 2 == 1:
@@ -436,13 +438,13 @@ class _Corner(NamedTuple):
         """Return the thing that is clearly the nearest to the corner; None if there is none."""
         found: list[SceneObject | None] = []
         for ranking in corner_rankings(self.depth, self.side):
-            clear = ranking._replace(margin=_CLEARLY * MARGIN)
+            clear = ranking._replace(margin=_CLEAR_MARGINS * MARGIN)
             found.append(clear.select(things, 0))
         return agreed(found)
 
     def quarter(self, center: SceneObject) -> Ranking:
         """Return the order of things by how far they are in the corner's quarter of the table."""
-        return _both(_past(center, self.along), _past(center, self.across))
+        return _lesser_of(_distance_past(center, self.along), _distance_past(center, self.across))
 
 
 def _corners(things: Things) -> Iterator[SpokenPlace]:
@@ -471,27 +473,27 @@ def _at_corner(things: Things, corner: _Corner) -> Iterator[SpokenPlace]:
     if nearest is None:
         return
     quarter = corner.quarter(_center_of(things))
-    is_alone = nearest is _only(things, quarter, _IN_QUARTER)
+    is_alone = nearest is _only_beyond(things, quarter, _QUARTER_DISTANCE)
     if not is_alone or not _is_past_work_center(nearest, corner.along, corner.across):
         yield SpokenPlace(PlaceClass.NEAR_CORNER, nearest, f"nearest to the {corner.name} corner")
         return
     there = f"at the {corner.name}"
     yield SpokenPlace(PlaceClass.CORNER, nearest, there, there)
-    if quarter.quantity(nearest) >= _IN_CORNER:
+    if quarter.quantity(nearest) >= _CORNER_DISTANCE:
         words = f"in the {corner.name} corner"
         # One thing alone on the table stands in no corner.
         spot = words if len(things) > 1 else None
         yield SpokenPlace(PlaceClass.CORNER, nearest, words, spot)
 
 
-def _both(along: Ranking, across: Ranking) -> Ranking:
+def _lesser_of(along: Ranking, across: Ranking) -> Ranking:
     """Return the order of things by the lesser of two quantities: how far they are past both."""
 
     def lesser(thing: SceneObject) -> float:
         return min(along.quantity(thing), across.quantity(thing))
 
     # What is hardly outside of a quarter may still pass for being in it.
-    return Ranking(lesser, _CLEARLY * MARGIN)
+    return Ranking(lesser, _CLEAR_MARGINS * MARGIN)
 
 
 def _on_sides(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
@@ -503,7 +505,7 @@ def _on_sides(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
     for fixture in fixtures_in(scene):
         for direction in sideways("robot"):
             order = direction.ranking
-            thing = _only(things, order, order.quantity(fixture))
+            thing = _only_beyond(things, order, order.quantity(fixture))
             if thing and _is_sideways(thing, fixture):
                 words = f"to the {direction.side} of the {fixture.kind}"
                 yield SpokenPlace(PlaceClass.SIDE_OF_FIXTURE, thing, words)

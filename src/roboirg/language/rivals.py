@@ -30,7 +30,7 @@ from roboirg.tasks.splits.splits import split_episodes
 REFERENCE_SPLIT: Split = "train"
 """Its goals show which numbers are usual for a difficulty, and its partners how often each rival
 goes with a value, for episodes outside the splits."""
-_AMOUNT_FIELDS = 2
+_FIELDS_OF_ONE_AMOUNT = 2
 """A goal that counts cubes of one color has two fields: the color and its count."""
 NUMBER_SLOTS = ("repeats", "counts", "visit", "placement")
 
@@ -62,7 +62,7 @@ def pair_refusal(request: InstructionRequest) -> str | None:
     """Return why an episode can have no rival; None if it can."""
     if rival_pairs(request):
         return None
-    if len(request.values_of("amount")) > _AMOUNT_FIELDS:
+    if len(request.values_of("amount")) > _FIELDS_OF_ONE_AMOUNT:
         return "a goal that counts cubes of several colors leaves no rival"
     return "the scene has no second value that the goal could ask for"
 
@@ -91,7 +91,7 @@ def possible_pairs(request: InstructionRequest) -> Iterator[ValuePair]:
     order, the rival is the other order: *first red, then blue* or *first blue, then red*. A goal
     that counts several colors has none.
     """
-    if len(request.values_of("amount")) > _AMOUNT_FIELDS:
+    if len(request.values_of("amount")) > _FIELDS_OF_ONE_AMOUNT:
         return
     for slot, _ in request.episode.goal.slots:
         meant = request.values_in(slot)
@@ -185,7 +185,7 @@ def _likely_rivals(request: InstructionRequest, meant: GoalValue) -> list[str | 
     """
     episode = request.episode
     split = episode.split if episode.split in SPLITS else REFERENCE_SPLIT
-    entries = _entries_in(request.task.name, split)
+    entries = _paired_entries(request.task.name, split)
     entry = entries.get(episode.index)
     if entry is not None and entry.is_of(episode):
         like_episode = [entry]
@@ -199,20 +199,20 @@ def _likely_rivals(request: InstructionRequest, meant: GoalValue) -> list[str | 
 
 
 @functools.cache
-def _entries_in(task: str, split: Split) -> Mapping[int, _SplitEntry]:
+def _paired_entries(task: str, split: Split) -> Mapping[int, _SplitEntry]:
     """Return the episodes of a split that can have a rival value, by index, paired with each other.
 
     The rival of an entry is the meant value of the episode with which it is paired.
     """
     entries: dict[int, _SplitEntry] = {}
     for episode in split_episodes([task], [split]):
-        entry = _entry_of(episode, get_task(task))
+        entry = _unpaired_entry(episode, get_task(task))
         if entry is not None:
             entries[episode.index] = entry
     return {entry.episode.index: entry for entry in _with_partners(entries)}
 
 
-def _entry_of(episode: Episode, task: Task) -> _SplitEntry | None:
+def _unpaired_entry(episode: Episode, task: Task) -> _SplitEntry | None:
     """Return an episode with the values that may be named instead of its own; None without any.
 
     Such a value is a rival. The entry is not paired with another episode yet.

@@ -39,7 +39,7 @@ def tokens_shown(text: str) -> str:
 
     It is exact if the table has all its words or the tokenizer is installed.
     """
-    if split_words(text) <= _pieces().keys():
+    if split_words(text) <= _tokens_by_word().keys():
         return str(count_tokens(text))  # exact, without loading a tokenizer
     number = str(tokens_of(text))
     if _tokenizer() is None:
@@ -67,7 +67,7 @@ def count_tokens(text: str) -> int:
     that the table lacks counts one token for each character and one for the space before it, the
     most that such a vocabulary can need for English.
     """
-    pieces = _pieces()
+    pieces = _tokens_by_word()
     words: list[str] = _WORD.findall(text)
     return ADDED_TOKENS + sum(pieces.get(word, len(word) + 1) for word in words)
 
@@ -78,7 +78,7 @@ def split_words(text: str) -> frozenset[str]:
 
 
 @functools.cache
-def _pieces() -> Mapping[str, int]:
+def _tokens_by_word() -> Mapping[str, int]:
     """Return the number of tokens of every word and mark of the language: ``{"cube": 2, ".": 1}``.
 
     The file has them the other way round: for each number of tokens the words that need so many.

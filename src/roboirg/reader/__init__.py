@@ -24,7 +24,7 @@ from roboirg.tasks import get_task
 
 __all__ = ["Interpretation", "interpret"]
 
-_COUNTING = word_set("time times often many more again each every both half double")
+_COUNTING_WORDS = word_set("time times often many more again each every both half double")
 """Words of a remark that may say how often to do what the command asks for."""
 
 
@@ -68,9 +68,9 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
     for reading in split_text.command:
         acts += reading.acts
     if unread or not _ask_for_something(acts):
-        return _refused(unread)
+        return _without_goals(unread)
     # "Lift it." means once only if nothing before it says how often.
-    is_alone = not any(map(_counts, split_text.remarks))
+    is_alone = not any(map(_speaks_of_number, split_text.remarks))
     try:
         fitting = fitting_goals(acts, goals, scene, is_alone=is_alone)
     except UnfitWordsError as error:
@@ -88,7 +88,7 @@ def _complaints_about(fitting: Sequence[Goal]) -> tuple[str, ...]:
     if not fitting:
         return ("no goal of the task fits everything that the text says",)
     if len(fitting) > 1:
-        return (_left_open(fitting),)
+        return (_complaint_of_open_slots(fitting),)
     return ()
 
 
@@ -131,7 +131,7 @@ def _split_off_command(sentences: Sequence[Sentence]) -> _SplitText:
         # This sentence has words that are not read: the command begins after it or in it.
         remarks = list(sentences[:position])
         if not command:
-            lead_in = _lead_apart(words)
+            lead_in = _split_at_colon(words)
             after_colon = read_command(lead_in.command)
             if lead_in.remark and after_colon.is_command:
                 return _SplitText([after_colon], [*remarks, lead_in.remark])
@@ -148,7 +148,7 @@ class _LeadIn(NamedTuple):
     command: Sentence
 
 
-def _lead_apart(words: Sentence) -> _LeadIn:
+def _split_at_colon(words: Sentence) -> _LeadIn:
     """Return a sentence as the words before its last colon, a remark, and the command after it.
 
     *My task for you: lift the red cube* is split at the colon. A sentence without a colon is all
@@ -169,12 +169,12 @@ def _lead_apart(words: Sentence) -> _LeadIn:
     return _LeadIn(remark, command)
 
 
-def _counts(words: Iterable[str]) -> bool:
+def _speaks_of_number(words: Iterable[str]) -> bool:
     """Return whether a remark has a number, or words such as *again* that may say how often."""
-    return any(word in _COUNTING or word in ADVERBS or number_of(word) for word in words)
+    return any(word in _COUNTING_WORDS or word in ADVERBS or number_of(word) for word in words)
 
 
-def _refused(readings: Sequence[Reading]) -> Interpretation:
+def _without_goals(readings: Sequence[Reading]) -> Interpretation:
     """Return the result for a text that is not understood: no goals, and complaints in sentences.
 
     `readings` are the sentences of the command with words that no rule reads; empty if there is
@@ -201,7 +201,7 @@ def _refused(readings: Sequence[Reading]) -> Interpretation:
     return Interpretation((), tuple(complaints), unknown)
 
 
-def _left_open(goals: Sequence[Goal]) -> str:
+def _complaint_of_open_slots(goals: Sequence[Goal]) -> str:
     """Return the complaint about a command that several goals fit.
 
     *leaves color open: it can be red or blue* names each slot in which the goals differ, and the

@@ -227,7 +227,7 @@ class _Command:
                 numbers.add(self._visit(visit, passed, last))
         if passed and not numbers:  # "let it pass twice" does not say at which visit to act
             raise UnfitWordsError("does not understand when to act")
-        return self._only(numbers, "visit")
+        return self._only_value(numbers, "visit")
 
     def _visit(self, visit: Visit, passed: Sequence[int], last: int) -> int:
         """Return the number of the visit that words name, from 1.
@@ -277,7 +277,7 @@ class _Command:
             if act.verb in _REPEATABLE_VERBS:
                 is_first = False
 
-        self._only(totals, "number of times")  # refuses two that differ
+        self._only_value(totals, "number of times")  # refuses two that differ
         if totals:
             return {sum(totals) + more}
         if not more and not is_alone:
@@ -287,12 +287,12 @@ class _Command:
     def relations(self) -> Values:
         """Return the possible relations to the press of the button."""
         relations = [target.relation for target in self._targets() if target.relation is not None]
-        return self._only(relations, "target")
+        return self._only_value(relations, "target")
 
     def placements(self, last: int) -> Values:
         """Return the possible placements; `last` is the last one."""
         ranks = [target.rank for target in self._targets() if target.rank is not None]
-        return self._only([_from_start(rank, last) for rank in ranks], "target")
+        return self._only_value([_from_start(rank, last) for rank in ranks], "target")
 
     def colors(self) -> Values:
         """Return the colors of the thing that a command means, by all words about it; None for any.
@@ -305,7 +305,7 @@ class _Command:
         for thing in self._things_to_choose(kind):
             if thing.noun not in (kind, "one") or thing.number not in (None, 1):
                 raise UnfitWordsError(f'does not understand "{thing.noun}" and its number')
-            colors = self._present(thing)
+            colors = self._colors_in_scene(thing)
             if possible_colors is not None:
                 colors = colors & possible_colors
             possible_colors = colors
@@ -337,7 +337,7 @@ class _Command:
                 continue
             if thing.noun not in ("container", "cube", "one") or thing.number not in (None, 1):
                 raise UnfitWordsError(f'does not understand "{thing.noun}" and its number')
-            colors = self._present(thing)
+            colors = self._colors_in_scene(thing)
             # "Lift the red cube, then put the red cube down" is about one thing.
             is_again = thing.is_definite and bool(colors_in_order) and colors_in_order[-1] == colors
             if act.verb == "put" and not is_again:
@@ -409,7 +409,7 @@ class _Command:
                 raise UnfitWordsError("does not understand how many cubes are meant")
             colors = self._referents.colors
         else:
-            colors = self._present(thing)
+            colors = self._colors_in_scene(thing)
         return [_Amount(color, self._count(thing, color)) for color in sorted(colors)]
 
     def _count(self, thing: Description, color: str) -> int:
@@ -459,7 +459,7 @@ class _Command:
                     found.append(part.value.side)
         return found
 
-    def _present(self, thing: Description) -> set[str]:
+    def _colors_in_scene(self, thing: Description) -> set[str]:
         """Return the colors that a description can mean, of things that the scene has.
 
         Raises `UnfitWordsError` if it fits none.
@@ -472,7 +472,7 @@ class _Command:
             raise UnfitWordsError(f"there is nothing {described.color} in the scene")
         raise UnfitWordsError("there is nothing to handle at the place that the text names")
 
-    def _only(self, values: Iterable[str | int], name: str) -> Values:
+    def _only_value(self, values: Iterable[str | int], name: str) -> Values:
         """Return the only value that is named, as a set; None if there is none.
 
         Two values that differ are refused. `name` is what the values are of, for the complaint.

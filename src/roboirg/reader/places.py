@@ -24,9 +24,9 @@ _WORK_AREA = {"front": -0.3, "back": 0.2, "left": 0.25, "right": -0.25}
 """The same of the area where things stand."""
 _CENTER_X = -0.05
 """Of the center of the work area."""
-_ASIDE = 0.03
+_SIDE_DISTANCE = 0.03
 """Meters from the center from which on more than the first thing may be *on the left*."""
-_TANGENT_ASIDE = 6 / 128
+_SIDE_TANGENT = 6 / 128
 """The same as a tangent: six pixels."""
 _CAMERA = (0.3, 0.0, 0.4)
 _VIEW = (-0.3, 0.0, -0.6)
@@ -98,9 +98,9 @@ class _Nearness(NamedTuple):
         """
         # The center counts as a thing, so that it is measured like one.
         center = SceneObject("center", "site", Point(_center_x(self.things), 0.0, _CUBE_HEIGHT))
-        aside = _ASIDE
+        aside = _SIDE_DISTANCE
         if self.tie == _TANGENT_TIE:
-            aside = _TANGENT_ASIDE
+            aside = _SIDE_TANGENT
         start = self.measure(center) - aside
         return [thing for thing in self.things if self.measure(thing) <= start]
 
@@ -174,7 +174,7 @@ def _orders(place: Place, candidates: Things, find_anchors: FindAnchors) -> Iter
             for other in other_anchors[0]:
                 yield _order_between(anchor, other, candidates)
         elif place.kind == "aside":
-            yield _order_aside(place, anchor, candidates)
+            yield _on_side_of(place, anchor, candidates)
         else:
             yield _order_by_distance(place, anchor, candidates)
 
@@ -185,7 +185,7 @@ def _order_between(anchor: SceneObject, other: SceneObject, candidates: Things) 
     return _Nearness(others, _detour(anchor, other), _WIDE_TIE)
 
 
-def _order_aside(place: Place, anchor: SceneObject, candidates: Things) -> _Nearness:
+def _on_side_of(place: Place, anchor: SceneObject, candidates: Things) -> _Nearness:
     """Return the things on one side of another thing, all alike: any of them may be meant."""
     across = _sideways(place)
     aside: list[SceneObject] = []

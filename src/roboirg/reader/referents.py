@@ -10,7 +10,7 @@ from roboirg.reader.places import Place, Things, find_objects, things_of
 from roboirg.reader.things import Description
 from roboirg.tasks.shared.swapping import places_at_last
 
-_CHOSEN = ("box", "tape", "cube")
+_CHOOSABLE_KINDS = ("box", "tape", "cube")
 """Of these kinds, the first that a scene has is the one among which goals choose."""
 MIN_TO_CHOOSE = 2
 """Things of a kind from which on goals choose among them."""
@@ -26,7 +26,7 @@ class Referents:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self.chosen = "cube"
-        for kind in _CHOSEN:
+        for kind in _CHOOSABLE_KINDS:
             if len(things_of(scene, kind)) >= MIN_TO_CHOOSE:
                 self.chosen = kind
                 break
@@ -79,13 +79,15 @@ class Referents:
         """
         names: dict[str, None] = {}  # each once, in order
         if thing.moment in ("first", None):
-            names |= dict.fromkeys(item.name for item in self._find(thing, place, self._scene))
+            names |= dict.fromkeys(
+                item.name for item in self._find_at_place(thing, place, self._scene)
+            )
         if thing.moment in ("last", None):
             at_last = scene_at_last(self._scene)
-            names |= dict.fromkeys(item.name for item in self._find(thing, place, at_last))
+            names |= dict.fromkeys(item.name for item in self._find_at_place(thing, place, at_last))
         return [self._scene[name] for name in names]
 
-    def _find(self, thing: Description, place: Place, scene: Scene) -> Things:
+    def _find_at_place(self, thing: Description, place: Place, scene: Scene) -> Things:
         """Return the things that a description can mean at its place, as they stand in `scene`.
 
         Where several have its color, they are compared with each other, and with no others: *the
@@ -99,19 +101,19 @@ class Referents:
 
         def find_anchors(anchor: object) -> Things:
             if isinstance(anchor, Description):
-                return self._anchors(anchor, scene)
+                return self._find_anchor(anchor, scene)
             fixtures = scene.of_kind(str(anchor))
             return fixtures if len(fixtures) == 1 else ()
 
         return find_objects(place, candidates, find_anchors)
 
-    def _anchors(self, thing: Description, scene: Scene) -> Things:
+    def _find_anchor(self, thing: Description, scene: Scene) -> Things:
         """Return the things that words like *next to the red cube* may name: here the red cube.
 
         By its color it must be the only one; else none is returned.
         """
         if thing.place is not None:
-            return self._find(thing, thing.place, scene)
+            return self._find_at_place(thing, thing.place, scene)
         kind = "cube" if thing.noun == "one" else thing.noun
         of_color = _of_color(things_of(scene, kind), thing.color)
         return of_color if len(of_color) == 1 else ()

@@ -48,7 +48,7 @@ class Target(NamedTuple):
     relation: Relation | None = None
 
 
-_ENDS = {
+_RANK_FROM_END = {
     "last": LAST, "very last": LAST, "final": LAST, "penultimate": LAST_BUT_ONE,
     "second to last": LAST_BUT_ONE, "next to last": LAST_BUT_ONE, "last but one": LAST_BUT_ONE,
 }  # fmt: skip
@@ -169,7 +169,7 @@ def _rank(words: list[str]) -> int | None:
 
     None if they name none or two that differ.
     """
-    ranks = {_ENDS.get(word) or ordinal_of(word) for word in words if word}
+    ranks = {_RANK_FROM_END.get(word) or ordinal_of(word) for word in words if word}
     return ranks.pop() if len(ranks) == 1 else None
 
 

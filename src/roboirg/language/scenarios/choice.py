@@ -78,11 +78,11 @@ def choose(
     matches = list(_matches(request, setting, scenarios))
     if not matches:
         return None
-    scenario, offer = _drawn(request, setting, matches)
+    scenario, offer = _drawn_match(request, setting, matches)
     values = {**goal_values(request), **offer.values}
     if offer.listed is None and scenario.fields.list:
-        values |= several("list", _list(request, scenario))
-    values |= _people(request, scenario)
+        values |= several("list", _drawn_list(request, scenario))
+    values |= _drawn_people(request, scenario)
     return Chosen(scenario, offer, Introduced(values))
 
 
@@ -96,15 +96,15 @@ def _matches(
     """
     scenarios_by_hidden: dict[frozenset[str], list[Scenario]] = {}
     for scenario in scenarios:
-        if _fits(scenario, request):
+        if _fits_episode(scenario, request):
             scenarios_by_hidden.setdefault(_hidden_by(scenario, request), []).append(scenario)
     for offer in _offers_of(setting)(request):
         for scenario in scenarios_by_hidden.get(frozenset(offer.fields), []):
-            if _says(scenario, offer):
+            if _can_say(scenario, offer):
                 yield _Match(scenario, offer)
 
 
-def _drawn(request: InstructionRequest, setting: str, matches: Sequence[_Match]) -> _Match:
+def _drawn_match(request: InstructionRequest, setting: str, matches: Sequence[_Match]) -> _Match:
     """Draw a scenario, with the first of the offers, ways to lead to the goal, that it can say.
 
     In reasoning, the way is drawn first, so that all kinds of reasoning get their turn.
@@ -168,7 +168,7 @@ def in_turn(episode: Episode, patterns: Sequence[str]) -> str:
     return patterns[(episode.index + episode.index // BLOCK) % len(patterns)]
 
 
-def _people(request: InstructionRequest, scenario: Scenario) -> Values:
+def _drawn_people(request: InstructionRequest, scenario: Scenario) -> Values:
     """Return two different people and their pronouns, by slot; empty if a scenario names none.
 
     The slots of the first are ``person``, ``he`` ..., those of the second ``person.2``, ``he.2``
@@ -187,7 +187,7 @@ def _people(request: InstructionRequest, scenario: Scenario) -> Values:
     return values
 
 
-def _fits(scenario: Scenario, request: InstructionRequest) -> bool:
+def _fits_episode(scenario: Scenario, request: InstructionRequest) -> bool:
     """Return whether an episode has the numbers of colors and values that a scenario needs."""
     needs = scenario.fields.needs
     if needs.colors and len(request.color_values) not in needs.colors:
@@ -195,7 +195,7 @@ def _fits(scenario: Scenario, request: InstructionRequest) -> bool:
     if needs.shown and len(request.scene_colors) not in needs.shown:
         return False
     # A scenario with a list needs enough values for it.
-    return not scenario.fields.list or bool(_lengths(request, scenario))
+    return not scenario.fields.list or bool(_possible_lengths(request, scenario))
 
 
 def _hidden_by(scenario: Scenario, request: InstructionRequest) -> frozenset[str]:
@@ -206,7 +206,7 @@ def _hidden_by(scenario: Scenario, request: InstructionRequest) -> frozenset[str
     return frozenset(hidden)
 
 
-def _says(scenario: Scenario, offer: Offer) -> bool:
+def _can_say(scenario: Scenario, offer: Offer) -> bool:
     """Return whether a scenario has the words for an offer, a way to lead to the goal.
 
     It has to introduce the list of the offer, if that has one, derive the goal as the offer does,
@@ -238,7 +238,7 @@ def _has_words(slot: Slot, offer: Offer) -> bool:
     return values[0].kind != "place" or slot.form in (_ANY, values[0].form)
 
 
-def _lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
+def _possible_lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
     """Return the possible numbers of values in the list that a scenario introduces: ``[2, 3]``.
 
     It holds all values of the goal and perhaps others: with one color of three in the scene, 1 to
@@ -253,7 +253,7 @@ def _lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
     return [length for length in wanted if num_in_goal <= length <= num_in_scene]
 
 
-def _list(request: InstructionRequest, scenario: Scenario) -> Sequence[IntroducedValue]:
+def _drawn_list(request: InstructionRequest, scenario: Scenario) -> Sequence[IntroducedValue]:
     """Draw the values that a scenario lists: the goal's among others of the scene, in any order.
 
     For the goal red it may be *blue, red*.
@@ -261,7 +261,7 @@ def _list(request: InstructionRequest, scenario: Scenario) -> Sequence[Introduce
     slot = scenario.fields.list
     members = list(goal_values(request)[slot])
     kind = members[0].kind
-    size = request.sampler.pick("list length", _lengths(request, scenario))
+    size = request.sampler.pick("list length", _possible_lengths(request, scenario))
     choices = list(itertools.permutations(_others(request, slot), size - len(members)))
     for other in request.sampler.pick("listed others", choices):
         members.append(IntroducedValue(REFERENCE, kind, other))

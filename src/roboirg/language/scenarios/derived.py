@@ -64,7 +64,7 @@ def _neighboring(moment: GoalValue) -> Offer:
     (other,) = [name for name in MOMENTS if name != moment.value]
     reference = IntroducedValue(REFERENCE, "relation", other)
     values = {"reference": (reference,)}
-    return _derived("sequential relation", [moment.field], values, NEIGHBOR.name)
+    return _offer_of("sequential relation", [moment.field], values, NEIGHBOR.name)
 
 
 def _deduced(request: InstructionRequest) -> Iterator[Offer]:
@@ -86,7 +86,7 @@ def _deduced(request: InstructionRequest) -> Iterator[Offer]:
         if relation.spells in results and not is_unsaid:
             continue
         values = _counted(first, references, relation.offset)
-        yield _derived("number deduction", fields, values, relation.name)
+        yield _offer_of("number deduction", fields, values, relation.name)
 
 
 class Deduction(NamedTuple):
@@ -159,7 +159,7 @@ def _stepped(
     for step, references in deductions([value.number], choices, known, length):
         if step.spells != value.number:
             values = _counted(value, references, step.offset)
-            yield _derived(pattern, [value.field], values, step.name)
+            yield _offer_of(pattern, [value.field], values, step.name)
 
 
 def series_length(request: InstructionRequest, value: GoalValue) -> int:
@@ -201,14 +201,14 @@ def _colored(request: InstructionRequest) -> Iterator[Offer]:
 def _remaining(request: InstructionRequest, color: GoalValue) -> Offer:
     """Return the color that is left when others are excluded."""
     excluded = [IntroducedValue(REFERENCE, "color", name) for name in excluded_colors(request)]
-    return _derived("color exclusion", [color.field], several("excluded", excluded))
+    return _offer_of("color exclusion", [color.field], several("excluded", excluded))
 
 
 def _second_of(request: InstructionRequest, colors: GoalValues) -> Offer:
     """Return the two colors of a goal, of which the first one is taken."""
     both = [named(color) for color in colors]
     fields = [color.field for color in colors]
-    return _one_of(request, both, both[0], fields, colors[0].slot)
+    return _offer_of_two(request, both, both[0], fields, colors[0].slot)
 
 
 def excluded_colors(request: InstructionRequest) -> tuple[str, ...]:
@@ -243,10 +243,10 @@ def _complement(request: InstructionRequest, pair: ValuePair) -> Offer:
     kind = pair.meant.slot_type
     meant = IntroducedValue(REFERENCE, kind, pair.meant.value)
     rival = IntroducedValue(REFERENCE, kind, pair.rival.value)
-    return _one_of(request, [meant, rival], rival, [pair.meant.field], pair.slot)
+    return _offer_of_two(request, [meant, rival], rival, [pair.meant.field], pair.slot)
 
 
-def _one_of(
+def _offer_of_two(
     request: InstructionRequest,
     both: list[IntroducedValue],
     taken: IntroducedValue,
@@ -270,10 +270,10 @@ def _one_of(
         orders = [tuple(sorted(both, key=lambda introduced: introduced.value))]
     order = request.sampler.pick("complement order", orders)
     values = {**several("list", order), "taken": (taken,)}
-    return _derived("contextual logic", fields, values, listed=slot)
+    return _offer_of("contextual logic", fields, values, listed=slot)
 
 
-def _derived(
+def _offer_of(
     pattern: str,
     fields: list[str],
     values: Values,

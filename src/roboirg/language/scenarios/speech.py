@@ -52,7 +52,7 @@ from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.scenario_file import general
 from roboirg.language.settings import all_settings
 
-_LOOKING = ("spatial", "grounded")
+_WAYS_BY_SIGHT = ("spatial", "grounded")
 """Ways to the goal on which the scene gives a value; the resolved form says where to look."""
 _ALWAYS_CAPITAL = re.compile(r"I\b|[A-Z]{2}")
 """*I*, *I'd*, and words in capitals: they stay as they are within a sentence."""
@@ -229,7 +229,7 @@ class Speech:
     def _is_stated(self, words: Text, scenario: Scenario) -> bool:
         """Return whether the resolved form states the value for which some words stand."""
         way = all_settings()[scenario.fields.setting].offers
-        if way not in _LOOKING:
+        if way not in _WAYS_BY_SIGHT:
             return way != "reasoning"
         fields = [value.field for value in self._request.goal_values]
         return all(pointer.of in fields for pointer in pointers_in(words))
@@ -259,10 +259,10 @@ class Speech:
         skeleton = self._skeleton(fields)
         if lead:
             # After "So," the command goes on in small letters; after "All right." it does not.
-            lead = _begun(lead, str.upper)
+            lead = _with_first_letter(lead, str.upper)
             is_sentence = lead[-1].text.endswith((". ", "! ", "? "))
             if not is_sentence and not _ALWAYS_CAPITAL.match(skeleton[0].text):
-                skeleton = _begun(skeleton, str.lower)
+                skeleton = _with_first_letter(skeleton, str.lower)
         return (*lead, *skeleton)
 
     def _skeleton(self, fields: Mapping[str, Phrase]) -> Phrase:
@@ -346,7 +346,7 @@ def _named_values(words: Phrase) -> set[PointedValue]:
     return found
 
 
-def _begun(words: Phrase, case: Callable[[str], str]) -> Phrase:
+def _with_first_letter(words: Phrase, case: Callable[[str], str]) -> Phrase:
     """Return words whose first letter is made a capital, or small."""
     first, *rest = words
     text = case(first.text[:1]) + first.text[1:]
