@@ -167,10 +167,10 @@ def entry(table, key, value):
 
 
 FAULTS = {
-    "minus adds": entry(declared._DIRECTIONS, "minus", 1),
-    "earlier is later": entry(declared._DIRECTIONS, "earlier", 1),
+    "minus adds": entry(declared._STEP_SIGNS, "minus", 1),
+    "earlier is later": entry(declared._STEP_SIGNS, "earlier", 1),
     "right after is two after": entry(declared._STEPS, "after", 2),
-    "the former is the second": entry(declared._RANKS, "former", 2),
+    "the former is the second": entry(declared._RANK_BY_EXPRESSION, "former", 2),
     "a rank is the next one": change(declared, "_rank_of", lambda rank, *given: rank(*given) + 1),
     "the other one is the one that was taken": change(
         declared, "_taken_rank", lambda rank, *given: 3 - rank(*given)
@@ -185,7 +185,7 @@ FAULTS = {
     ),
     "twice as often is half as often": change(
         meaning,
-        "_reckoned",
+        "_computed_number",
         lambda reckon, term, number: reckon(term._replace(operation="half"), number),
     ),
     "a list is heard backwards": change(

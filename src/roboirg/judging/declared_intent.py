@@ -9,7 +9,7 @@ from roboirg.core.episode import Episode, SlotValue, describe_goal, values_in
 from roboirg.core.failures import FailureName
 from roboirg.judging.failure_attribution import FailureAttribution
 
-_FAILURES: Mapping[str, FailureName] = {
+_FAILURE_BY_VERDICT: Mapping[str, FailureName] = {
     "wrong_thing": "wrong_object",
     "wrong_place": "wrong_place",
     "wrong_count": "wrong_count",
@@ -33,7 +33,7 @@ class DeclaredIntent:
     verdicts: tuple[tuple[int, str], ...] = ()
 
     def revise(self, found: FailureAttribution, episode: Episode) -> FailureAttribution:
-        """Return what the declaration makes of a failure that the acts show.
+        """Return the failure that the acts show, corrected by what the policy declared it would do.
 
         Who declared something wrong failed by grounding, whatever the hands did; who declared the
         right thing did not: then the hands did not follow. A subgoal that was not due at all
@@ -41,12 +41,14 @@ class DeclaredIntent:
         """
         if self.listens:
             return self._revise_listener(found, episode)
-        last = self._last_verdict(found.step)
-        if last == "right":
+        last_verdict = self._last_verdict(found.step)
+        if last_verdict == "right":
             return _not_followed(found)
-        if last in _FAILURES and found.kind != "grounding":
+        if last_verdict in _FAILURE_BY_VERDICT and found.kind != "grounding":
             words = f"named something else than what was due: {found.sentence[:-1]}"
-            return FailureAttribution.of(_FAILURES[last], found.subject, found.step, words)
+            return FailureAttribution.of(
+                _FAILURE_BY_VERDICT[last_verdict], found.subject, found.step, words
+            )
         return found
 
     def _last_verdict(self, step: int) -> str:
@@ -55,7 +57,11 @@ class DeclaredIntent:
         return verdicts[-1] if verdicts else ""
 
     def _revise_listener(self, found: FailureAttribution, episode: Episode) -> FailureAttribution:
-        """Return the failure by the goal that a listener named: none, a wrong one, or the right."""
+        """Return the failure of a policy whose model named the goal that it understood.
+
+        It named no goal, ``no_answer``; a wrong one, ``misunderstood``; or the right one, which its
+        hands did not follow.
+        """
         if self.understood is None:
             return FailureAttribution.of("no_answer", None, 0, "the model named no goal")
         meant = episode.goal.as_mapping()

@@ -34,7 +34,7 @@ that may have been meant for that moment."""
 _PAUSE_FACTOR = 1.5
 """How many times as long as any pause before it a rest must be to count as stopping."""
 
-_WORDS: Mapping[FailureName, str] = {
+_FAILURE_WORDS: Mapping[FailureName, str] = {
     "missed_grasp": "did not get hold of {}",
     "missed_press": "came down next to {} without pressing it",
     "dropped": "dropped {}",
@@ -88,7 +88,7 @@ explain it |
 
 
 def _is_in_hand(replay: EpisodeReplay, facts: Sequence[Fact]) -> bool:
-    """Return whether the object of any of some facts is in the hand at the end."""
+    """Return whether the object of any of some facts is in the hand at the end of the episode."""
     held = {fact.subject for fact in replay.facts[-1] if fact.traits.grips}
     return any(fact.subject in held for fact in facts)
 
@@ -96,18 +96,19 @@ def _is_in_hand(replay: EpisodeReplay, facts: Sequence[Fact]) -> bool:
 def explain_early_act(
     replay: EpisodeReplay, slips: Sequence[Slip], act: Fact
 ) -> FailureAttribution | None:
-    """Return the slips or tries before an act that a later stage expects, if they explain it.
+    """Return the failed tries that explain why an act was done before its time; else None.
 
     The button is pressed although two of three cubes are in the bin: a grasp that was missed
-    unnoticed explains it (execution), and so do tries at a wrong cube (grounding). None otherwise.
+    unnoticed explains it (the hands failed), and so do tries at a wrong cube (the words were
+    misunderstood). None also if no later stage expects the act.
     """
-    current = replay.expected_stage
-    stage_of_act = next_stage_with(act, replay.stages, current)
+    current_stage = replay.expected_stage
+    stage_of_act = next_stage_with(act, replay.stages, current_stage)
     if stage_of_act is None:
         return None
-    explained = explain_missing(replay, slips, range(current, stage_of_act))
-    if explained is not None:
-        return explained
+    missed_unnoticed = explain_missing(replay, slips, range(current_stage, stage_of_act))
+    if missed_unnoticed is not None:
+        return missed_unnoticed
     # A failed try at the right object is no reason to go on with a later act.
     failed_try = judge_tries(replay, slips)
     return failed_try if failed_try is not None and failed_try.kind == "grounding" else None
@@ -116,16 +117,16 @@ def explain_early_act(
 def explain_missing(
     replay: EpisodeReplay, slips: Sequence[Slip], skipped: range
 ) -> FailureAttribution | None:
-    """Return the first of the unnoticed slips if they account for all acts that are missing.
+    """Return the first of the unnoticed failed tries if these explain all acts that are missing.
 
     Two cubes are missing in the bin and two grasps were missed unnoticed: the first of them is the
     failure. With one missed grasp, the other cube was left out on purpose: None.
 
-    A slip accounts for one object that was to be handled, from its pick on. Where the object in the
-    hand is to be carried over several places, a pass next to one of them accounts for that place
-    only. `skipped` has the indices of the stages that are missing.
+    A try explains one object that was to be handled, from its pick on. Where the object in the hand
+    is to be carried over several places, a pass next to one of them explains that place only.
+    `skipped` has the indices of the stages whose acts are missing.
     """
-    meant = _meant_by_any(replay, skipped)
+    meant = _objects_meant_by_any(replay, skipped)
     unnoticed = [
         slip for slip in slips if slip.subjects <= meant and not is_noticed(replay, slip, slips)
     ]
@@ -157,13 +158,14 @@ class _Missing(NamedTuple):
 
 
 def _missing_acts(replay: EpisodeReplay, skipped: range) -> _Missing:
-    """Return what some stages ask for, without those whose object was picked up before.
+    """Return how many objects and places the skipped stages were still to handle.
 
     Of *pick the red cube, put it in, pick the blue one, put it in*, two objects are missing; of
-    *put it in, pick the blue one, put it in*, two as well, the first of them in the hand.
+    *put it in, pick the blue one, put it in*, two as well, the first of them in the hand. Stages of
+    an object that was picked up before do not count.
     """
-    since = replay.acted_since
-    picked_up = {interval.fact for interval in replay.started(FactRole.RAISE, after=since)}
+    last_act_step = replay.acted_since
+    picked_up = {interval.fact for interval in replay.started(FactRole.RAISE, after=last_act_step)}
     picks = 0
     visits = 0
     has_one_in_hand = False
@@ -171,7 +173,7 @@ def _missing_acts(replay: EpisodeReplay, skipped: range) -> _Missing:
         stage = replay.stages[index]
         if not picked_up.isdisjoint(facts_of(stage.expects)):
             continue
-        roles = _roles(stage)
+        roles = _expected_roles(stage)
         if FactRole.RAISE in roles:
             picks += 1
         elif picks == 0 and roles - {FactRole.RELEASE}:
@@ -181,7 +183,7 @@ def _missing_acts(replay: EpisodeReplay, skipped: range) -> _Missing:
     return _Missing(picks + has_one_in_hand, visits)
 
 
-def _roles(stage: Stage) -> set[FactRole]:
+def _expected_roles(stage: Stage) -> set[FactRole]:
     """Return the roles of the facts that a stage expects; none if it only waits."""
     return {fact.traits.role for fact in facts_of(stage.expects)}
 
@@ -199,7 +201,7 @@ def judge_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> FailureAttribut
     tries = [slip for slip in slips if slip.step >= replay.acted_since]
     if not tries:
         return None
-    right_objects = _meant_at_end(replay)
+    right_objects = _objects_meant_at_end(replay)
     # What can have been about a right object or about another one is in neither list.
     at_right = [slip for slip in tries if slip.subjects <= right_objects]
     at_wrong = [slip for slip in tries if slip.subjects.isdisjoint(right_objects)]
@@ -212,18 +214,18 @@ def judge_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> FailureAttribut
         return describe_slip(replay, tries[-1], "ambiguous_act")
 
     stages_left = range(replay.expected_stage, len(replay.stages))
-    if at_wrong[-1].subjects.isdisjoint(_meant_by_any(replay, stages_left)):
+    if at_wrong[-1].subjects.isdisjoint(_objects_meant_by_any(replay, stages_left)):
         return describe_slip(replay, at_wrong[-1], "wrong_object")
     return describe_slip(replay, at_wrong[-1], "wrong_order")
 
 
-def _meant_at_end(replay: EpisodeReplay) -> frozenset[str]:
+def _objects_meant_at_end(replay: EpisodeReplay) -> frozenset[str]:
     """Return the names of the objects that the stage means that is current at the end."""
     current = replay.expected_stage
     return meant_objects(replay.stages, current, replay.episode.scene, replay.facts[-1])
 
 
-def _meant_by_any(replay: EpisodeReplay, indices: range) -> set[str]:
+def _objects_meant_by_any(replay: EpisodeReplay, indices: range) -> set[str]:
     """Return the names of the objects that any of some stages means."""
     names: set[str] = set()
     for index in indices:
@@ -234,10 +236,11 @@ def _meant_by_any(replay: EpisodeReplay, indices: range) -> set[str]:
 def describe_slip(
     replay: EpisodeReplay, slip: Slip, failure: FailureName | None = None
 ) -> FailureAttribution:
-    """Return a slip as a failure in words, by default that of the slip.
+    """Return a failed try as the failure of an episode, with a sentence about it.
 
-    A drop of the red cube -> ``dropped``, *Dropped the red cube; expected: put it into the bin.* A
-    press that missed the button at a wrong moment is the failure of the moment.
+    A drop of the red cube -> ``dropped``, *Dropped the red cube; expected: put it into the bin.*
+    Without a `failure` it is that of the try. A press that missed the button at a wrong moment is
+    the failure of the moment.
     """
     if failure is None:
         failure = slip.failure
@@ -248,28 +251,29 @@ def describe_slip(
             failure = moment
 
     subject = min(slip.subjects)
-    words = _WORDS[failure].format(describe_object(subject, replay.episode.scene))
+    words = _FAILURE_WORDS[failure].format(describe_object(subject, replay.episode.scene))
     expected = describe_expected(replay.stage_at(slip.step))
     return FailureAttribution.of(failure, subject, slip.step, f"{words}; {expected}")
 
 
 def judge_moment(replay: EpisodeReplay, step: int) -> FailureName | None:
-    """Return which failure a press at a step is, in a task that asks for a moment; else None.
+    """Return which failure a press is in a task that asks for a moment; None in other tasks.
 
-    The right moment is that of the oracle's press, the middle of a pass of the moving object.
-    Within half a pass of it, the press is ``mistimed``; when the object is at its place on another
-    pass, ``wrong_time``; and elsewhere ``ambiguous_act``.
+    An object passes its place several times, and the press is to stop it there. The right step is
+    that of the oracle's press, the middle of a pass. Within half a pass of it, the press is
+    ``mistimed``; when the object is at its place on another pass, ``wrong_time``; and elsewhere
+    ``ambiguous_act``. Steps count since the world began.
     """
     press = replay.stages[-1].primitive
-    runs = replay.episode.scene.motions_of(Shuttle)
-    if not runs or press.kind != "press_below":
+    moving_objects = replay.episode.scene.motions_of(Shuttle)
+    if not moving_objects or press.kind != "press_below":
         return None
-    (run,) = runs
-    if abs(step - press.steps) <= run.interval / 2:
+    (moving_object,) = moving_objects
+    if abs(step - press.steps) <= moving_object.interval / 2:
         return "mistimed"
     for facts in replay.facts[step : step + _SOON_STEPS]:
         for fact in facts:
-            is_at_place = fact.subject == run.subject and fact.place is not None
+            is_at_place = fact.subject == moving_object.subject and fact.place is not None
             if is_at_place:
                 return "wrong_time"
     return "ambiguous_act"
@@ -299,28 +303,29 @@ class _UnexpectedAct(NamedTuple):
 
 
 def _unexpected_act(replay: EpisodeReplay, unmet: Sequence[Fact]) -> _UnexpectedAct | None:
-    """Return the last act that has not been undone and is not expected; None without any.
+    """Return the last act that still stands and that the current stage does not expect; else None.
 
-    `unmet` are the facts that the stage expects and that do not hold.
+    `unmet` has the facts that the stage expects and that do not hold yet.
     """
     acts = list(_standing_acts(replay))
     for act in reversed(acts):
-        failure = _failure_of(replay, act.fact, unmet)
+        failure = _failure_of_act(replay, act.fact, unmet)
         if failure is not None:
             return _UnexpectedAct(act, failure)
     return None
 
 
-def _failure_of(replay: EpisodeReplay, fact: Fact, unmet: Sequence[Fact]) -> FailureName | None:
-    """Return the failure that an act is; None if it may lead to what the stage expects.
+def _failure_of_act(replay: EpisodeReplay, fact: Fact, unmet: Sequence[Fact]) -> FailureName | None:
+    """Return the failure that an act is; None if it may lead to what the current stage expects.
 
     With *put the red cube on the target* unmet: a red cube in the hand -> None, on the wrong target
-    -> ``wrong_place``; a green cube in the hand -> as `classify_grounding_error` says.
+    -> ``wrong_place``; a green cube in the hand -> as `classify_grounding_error` says. `unmet` has
+    the facts that the stage expects and that do not hold yet.
     """
-    if all(fact.subject != other.subject for other in unmet):
+    if all(fact.subject != expected.subject for expected in unmet):
         return _classify(replay, fact)
     # A stage may expect any cube, of which only some are meant.
-    if fact.traits.grips and fact.subject not in _meant_at_end(replay):
+    if fact.traits.grips and fact.subject not in _objects_meant_at_end(replay):
         return "wrong_object"
     if fact.traits.role is FactRole.PLACING and fact not in unmet:
         return "wrong_place"
@@ -328,9 +333,9 @@ def _failure_of(replay: EpisodeReplay, fact: Fact, unmet: Sequence[Fact]) -> Fai
 
 
 def _standing_acts(replay: EpisodeReplay) -> Iterator[FactInterval]:
-    """Yield the acts that have not been undone.
+    """Yield what the policy did and did not undo, as intervals of the facts that it made.
 
-    They are what is in the hand, and what was done in the current stage: looking under a container
+    That is what is in the hand, and what was done in the current stage: looking under a container
     that a later stage expects, a press where the stage expects another button, and placing an
     object that was picked up.
     """
@@ -343,14 +348,19 @@ def _standing_acts(replay: EpisodeReplay) -> Iterator[FactInterval]:
 
 
 def _is_not_undone(replay: EpisodeReplay, act: FactInterval) -> bool:
-    """Return whether an act of the current stage, other than holding an object, still counts."""
-    current = replay.expected_stage
-    is_due_later = act.fact in _expected_facts(replay.stages[current + 1 :])
+    """Return whether an act of the current stage has not been undone.
+
+    A lift counts if a later stage expects it and letting go does not undo it; a press, if a later
+    stage expects it, or the current one any press; a placed object, if it still lies there and was
+    picked up before.
+    """
+    current_stage = replay.expected_stage
+    is_due_later = act.fact in _expected_facts(replay.stages[current_stage + 1 :])
     match act.role:
         case FactRole.RAISE:
             return is_due_later and not act.fact.traits.undone_by_release
         case FactRole.PRESS:
-            return is_due_later or FactRole.PRESS in _roles(replay.stages[current])
+            return is_due_later or FactRole.PRESS in _expected_roles(replay.stages[current_stage])
         case FactRole.PLACING:
             # An object that was not picked up was there before and has only been touched.
             raised = {raised.subject for raised in replay.started(FactRole.RAISE)}
@@ -385,25 +395,25 @@ def _stopped_short(replay: EpisodeReplay) -> FailureAttribution | None:
     all alone for a time could have ended after any stage.
     """
     stopped_at = _stopped_since(replay)
-    completed = [_roles(stage) for stage in replay.stages[: replay.expected_stage]]
-    acts = [roles for roles in completed if roles != {FactRole.RELEASE}]
-    if stopped_at is None or not acts:
+    completed_roles = [_expected_roles(stage) for stage in replay.stages[: replay.expected_stage]]
+    act_roles = [roles for roles in completed_roles if roles != {FactRole.RELEASE}]
+    if stopped_at is None or not act_roles:
         return None
-    last = replay.stages[-1]
-    ends_alone = isinstance(last.expects, Elapsed)
-    if ends_alone or acts[-1] == _roles(last):
+    last_stage = replay.stages[-1]
+    ends_alone = isinstance(last_stage.expects, Elapsed)
+    if ends_alone or act_roles[-1] == _expected_roles(last_stage):
         return _describe(replay, "wrong_count", None, stopped_at, "came to rest")
     return None
 
 
 def _done_too_early(replay: EpisodeReplay) -> FailureAttribution | None:
-    """Return ``wrong_order`` if what the stage expects was done before it was expected; else None.
+    """Return ``wrong_order`` if the robot did what is expected now before its time; else None.
 
-    Facts that an earlier stage expected, too, were done for that stage.
+    Acts that an earlier stage expected, too, were done for that stage.
     """
-    current = replay.expected_stage
-    expected = facts_of(replay.stages[current].expects)
-    first_due_now = set(expected) - _expected_facts(replay.stages[:current])
+    current_stage = replay.expected_stage
+    expected = facts_of(replay.stages[current_stage].expects)
+    first_due_now = set(expected) - _expected_facts(replay.stages[:current_stage])
     stage_began = replay.acted_since
     for act in replay.started(FactRole.RAISE, FactRole.PRESS):
         if act.fact in first_due_now and act.start < stage_began:
@@ -412,25 +422,29 @@ def _done_too_early(replay: EpisodeReplay) -> FailureAttribution | None:
 
 
 def _stopped_since(replay: EpisodeReplay) -> int | None:
-    """Return the step since which the hand rests at the end; None if it may only have paused.
+    """Return the step since which the hand rests for good; None if it may only have paused.
 
     The rest must take 150 steps, and one and a half times as long as any pause before: after a
-    pause of 200 steps, a rest of 300.
+    pause of 200 steps, a rest of 300. Steps count since the world began.
     """
     rests = list(replay.tried("lingering"))
     if not rests or rests[-1].end is not None:
         return None
 
     longest_pause = max((replay.end_of(rest) - rest.start for rest in rests[:-1]), default=0)
-    least_steps = max(STOPPED_STEPS, _PAUSE_FACTOR * longest_pause)
+    min_rest_steps = max(STOPPED_STEPS, _PAUSE_FACTOR * longest_pause)
     if replay.judge.violation is not None:
-        least_steps = 0  # a deadline ended the episode, which leaves no time for a long rest
+        min_rest_steps = 0  # a deadline ended the episode, which leaves no time for a long rest
     start = rests[-1].start
-    return start if replay.last_step - start >= least_steps else None
+    return start if replay.last_step - start >= min_rest_steps else None
 
 
 def _at_rest(replay: EpisodeReplay) -> FailureAttribution:
-    """Return ``stopped``, ``no_attempt`` or ``out_of_time``, as `describe_end_state` defines."""
+    """Return the failure of an episode in which nothing wrong was done, by how it ended.
+
+    The hand did nothing of what the task needs, ``no_attempt``; it stopped, ``stopped``; or it was
+    still moving, ``out_of_time``.
+    """
     stopped_at = _stopped_since(replay)
     step = replay.last_step
     failure: FailureName = "out_of_time"
@@ -439,15 +453,15 @@ def _at_rest(replay: EpisodeReplay) -> FailureAttribution:
         failure = "stopped"
     if not _has_begun(replay):
         failure = "no_attempt"
-    return _describe(replay, failure, None, step, _WORDS[failure])
+    return _describe(replay, failure, None, step, _FAILURE_WORDS[failure])
 
 
 def _has_begun(replay: EpisodeReplay) -> bool:
-    """Return whether the hand has done anything, or was at an object that any stage means."""
+    """Return whether the hand has done any act, or was at an object that the task is about."""
     acts = replay.started(FactRole.GRIP, FactRole.RAISE, FactRole.PRESS)
     if replay.expected_stage > 0 or any(acts):
         return True
     places = {approach.fact.place for approach in replay.started(FactRole.APPROACH)}
     places |= {above.fact.place for above in replay.tried("above")}
-    meant = _meant_by_any(replay, range(len(replay.stages)))
+    meant = _objects_meant_by_any(replay, range(len(replay.stages)))
     return not places.isdisjoint(meant)

@@ -115,7 +115,7 @@ class EpisodeReplay:
         return since
 
     def completions(self) -> Iterator[Completion]:
-        """Yield the completed stages of the policy, in order.
+        """Yield each completed stage of the policy, by its index, with the step that completed it.
 
         Expected stages 0, 0, 1 at steps 0, 1, 2 -> stage 0 was completed at step 1.
         """
@@ -125,9 +125,10 @@ class EpisodeReplay:
                 yield Completion(stage, step)
 
     def started(self, *roles: FactRole, after: int | None = None) -> Iterator[FactInterval]:
-        """Yield the intervals of facts with some roles that start later than a step.
+        """Yield when facts of some roles held: of those that began later than a step.
 
-        By default, those that start in the policy's turn.
+        The roles say what a fact is about, such as the grip of the hand. By default, yields the
+        facts that began in the policy's turn.
         """
         if after is None:
             after = self.policy_start_step
@@ -153,9 +154,10 @@ class EpisodeReplay:
         return self.stages[min(index, len(self.stages) - 1)]
 
     def unmet(self) -> tuple[Fact, ...]:
-        """Return the facts in all parts of the expected condition that are not met at the end.
+        """Return the facts that the current stage expects and that do not hold at the end.
 
-        If *both buttons have been pressed* is expected and the left one was, that on the right.
+        If it expects that both buttons have been pressed and the left one was, that is the press of
+        the right one.
         """
         history = FactHistory()
         for step, facts in enumerate(self.facts):
@@ -177,19 +179,20 @@ def rejudge(
     elapsed_steps: int,
     attempts: Sequence[Event] = (),
 ) -> EpisodeReplay:
-    """Judge an episode again by all its events, in order; steps count since the world began.
+    """Judge an episode again by all its events, in order, and return what held at each step.
 
-    The judge evaluates only steps at which something may change; between two of them, every step
-    has the same expected stage.
+    Events are facts that began or ceased to hold; all steps count since the world began. The judge
+    evaluates only steps at which something may change; between two of them, every step has the same
+    expected stage.
     """
     judge = Judge.of(episode)
-    expected = -len(episode.demonstration)
+    expected_stage = -len(episode.demonstration)
     expected_stages: list[int] = []
-    for step in _evaluate(judge, events, elapsed_steps):
+    for step in _evaluated_steps(judge, events, elapsed_steps):
         # The evaluation at the step itself still tests the stage that was expected before.
-        expected_stages += [expected] * (step + 1 - len(expected_stages))
-        expected = judge.index - len(episode.demonstration)
-    expected_stages += [expected] * (elapsed_steps + 1 - len(expected_stages))
+        expected_stages += [expected_stage] * (step + 1 - len(expected_stages))
+        expected_stage = judge.index - len(episode.demonstration)
+    expected_stages += [expected_stage] * (elapsed_steps + 1 - len(expected_stages))
 
     return EpisodeReplay(
         episode,
@@ -205,7 +208,7 @@ def rejudge(
 def decide(episode: Episode, events: Sequence[Event], elapsed_steps: int) -> Decision:
     """Judge an episode again up to its verdict; faster than `rejudge`."""
     judge = Judge.of(episode)
-    for step in _evaluate(judge, events, elapsed_steps):
+    for step in _evaluated_steps(judge, events, elapsed_steps):
         if judge.status is not Status.ONGOING:
             return Decision(judge, step)
     return Decision(judge, elapsed_steps)
@@ -214,20 +217,24 @@ def decide(episode: Episode, events: Sequence[Event], elapsed_steps: int) -> Dec
 def completed_stages(
     episode: Episode, events: Sequence[Event], elapsed_steps: int
 ) -> dict[int, int]:
-    """Return the steps that completed stages of the policy, by index; faster than `rejudge`."""
+    """Return the step that completed each stage of the policy: ``{0: 40, 1: 95}``.
+
+    Keys are indices of stages. Faster than `rejudge`.
+    """
     judge = Judge.of(episode)
     steps: dict[int, int] = {}
-    for step in _evaluate(judge, events, elapsed_steps):
+    for step in _evaluated_steps(judge, events, elapsed_steps):
         last_completed = judge.index - len(episode.demonstration) - 1
         if last_completed >= 0:
             steps.setdefault(last_completed, step)
     return steps
 
 
-def _evaluate(judge: Judge, events: Sequence[Event], elapsed_steps: int) -> Iterator[int]:
+def _evaluated_steps(judge: Judge, events: Sequence[Event], elapsed_steps: int) -> Iterator[int]:
     """Let a judge evaluate each step at which anything may change, and yield the step.
 
-    These are the steps with an event, and those at which a time that a condition asks for is over.
+    These are the steps with an event, a fact that begins or ceases to hold, and those at which a
+    time that a condition asks for is over.
     """
     for span in _spans(events, elapsed_steps):
         next_step: float = span.start
@@ -239,9 +246,9 @@ def _evaluate(judge: Judge, events: Sequence[Event], elapsed_steps: int) -> Iter
 
 
 def facts_by_step(events: Sequence[Event], elapsed_steps: int) -> tuple[frozenset[Fact], ...]:
-    """Return all facts that hold after 0, 1, ... `elapsed_steps` steps.
+    """Return all facts that hold after 0, 1, ... `elapsed_steps` steps, a set for each.
 
-    Steps without an event share one set.
+    Steps without an event, a fact that begins or ceases to hold, share one set.
     """
     all_facts: list[frozenset[Fact]] = []
     for span in _spans(events, elapsed_steps):
@@ -264,21 +271,22 @@ class _Span(NamedTuple):
 
 
 def _spans(events: Sequence[Event], elapsed_steps: int) -> list[_Span]:
-    """Divide all steps, from 0 to `elapsed_steps`, at those with an event.
+    """Return the spans of steps in which the same facts hold, from step 0 to `elapsed_steps`.
 
-    Events at 3 and 7 of 10 steps -> the spans 0 to 2, 3 to 6 and 7 to 10.
+    A new span begins at each step with an event, a fact that begins or ceases to hold. Events at 3
+    and 7 of 10 steps -> the spans 0 to 2, 3 to 6 and 7 to 10.
     """
-    by_step = _events_by_step(events)
-    starts = sorted(step for step in by_step if 0 <= step <= elapsed_steps)
-    facts: set[Fact] = set()
+    events_by_step = _events_by_step(events)
+    starts = sorted(step for step in events_by_step if 0 <= step <= elapsed_steps)
+    facts_now: set[Fact] = set()
     spans: list[_Span] = []
     for start, end in pairwise((*starts, elapsed_steps + 1)):
-        for event in by_step[start]:
+        for event in events_by_step[start]:
             if event.holds:
-                facts.add(event.fact)
+                facts_now.add(event.fact)
             else:
-                facts.remove(event.fact)
-        spans.append(_Span(start, end, frozenset(facts)))
+                facts_now.remove(event.fact)
+        spans.append(_Span(start, end, frozenset(facts_now)))
     return spans
 
 
@@ -291,18 +299,19 @@ def _events_by_step(events: Sequence[Event]) -> dict[int, list[Event]]:
 
 
 def _intervals(events: Sequence[Event]) -> tuple[FactInterval, ...]:
-    """Return from when to when each fact held, in the order of the starts.
+    """Return from when to when each fact held, in the order of the first steps.
 
-    A fact that starts at step 3 and ceases at 7 -> 3 to 7; one that never ceases ends with None.
+    An event is a fact that begins or ceases to hold at a step. A fact that begins at step 3 and
+    ceases at 7 -> 3 to 7; one that never ceases ends with None.
     """
-    starts: dict[Fact, int] = {}
+    start_by_fact: dict[Fact, int] = {}
     intervals: list[FactInterval] = []
     for event in events:
         if event.holds:
-            starts[event.fact] = event.step
+            start_by_fact[event.fact] = event.step
         else:
-            intervals.append(FactInterval(event.fact, starts.pop(event.fact), event.step))
-    intervals += [FactInterval(fact, start, None) for fact, start in starts.items()]
+            intervals.append(FactInterval(event.fact, start_by_fact.pop(event.fact), event.step))
+    intervals += [FactInterval(fact, start, None) for fact, start in start_by_fact.items()]
     return tuple(sorted(intervals, key=lambda interval: (interval.start, interval.fact.kind)))
 
 

@@ -36,7 +36,11 @@ class FactHistory:
         self._timers.setdefault(name, self.step)
 
     def holds(self, condition: Condition) -> bool:
-        """Return whether a condition is met at the last evaluation."""
+        """Return whether a condition is met at the last step that was recorded.
+
+        A condition is a fact; a number of facts that hold; how often facts began to hold, up to a
+        step if one is given; a time since a timer or the reset; or several of these together.
+        """
         match condition:
             case Fact():
                 return condition in self.facts
@@ -51,20 +55,21 @@ class FactHistory:
                 return all(self.holds(part) for part in parts)
 
     def next_change(self, condition: Elapsed) -> float:
-        """Return the next step at which the condition begins or ceases to be met; or infinity.
+        """Return the next step at which a time begins or ceases to be met; or infinity.
 
-        50 to 60 steps after reset: at step 10 -> 50, at step 55 -> 61, at step 70 -> infinity.
+        50 to 60 steps after reset: at step 10 -> 50, at step 55 -> 61, at step 70 -> infinity. A
+        timer that has not started gives infinity.
         """
         start = self._timer_start(condition.timer)
         if start is None:
             return math.inf
-        begin = start + condition.least
-        if begin > self.step:
-            return begin
+        first_step = start + condition.least
+        if first_step > self.step:
+            return first_step
         if condition.most is None:
             return math.inf
-        end = start + condition.most + 1
-        return end if end > self.step else math.inf
+        first_step_after = start + condition.most + 1
+        return first_step_after if first_step_after > self.step else math.inf
 
     def _count_holding(self, facts: tuple[Fact, ...]) -> int:
         """Return how many of some facts hold at the last evaluation."""

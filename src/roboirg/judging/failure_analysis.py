@@ -74,7 +74,10 @@ def attribute_failure(
     attempts: Sequence[Event] = (),
     intent: DeclaredIntent | None = None,
 ) -> FailureAttribution | None:
-    """Return why an episode failed; None if it did not fail.
+    """Return why an episode failed, as one failure with a sentence; None if it did not fail.
+
+    The first act, or lapse of time, after which it could no longer succeed decides; if there is
+    none, the end of the episode does.
 
     Args:
         episode: the episode.
@@ -99,25 +102,26 @@ def attribute_failure(
     deviation = min(_deviations(replay), key=lambda deviation: deviation.step, default=None)
     act = None if deviation is None else deviation.act
     if deviation is None:
-        found = _attribute_end(replay, timed_out=timed_out, cause=cause)
+        failure = _attribute_end(replay, timed_out=timed_out, cause=cause)
     elif act is None:
-        found = _attribute_time(replay, deviation)
+        failure = _attribute_time(replay, deviation)
     else:
-        found = _attribute_act(replay, deviation, act)
+        failure = _attribute_act(replay, deviation, act)
 
     place = None if act is None else act.place
-    found = refine_wrong_object(found, replay, mirrored or {}, place)
+    failure = refine_wrong_object(failure, replay, mirrored or {}, place)
     # Up to here, steps count since the world began; a declaration counts them in the policy's turn.
-    found = found._replace(step=found.step - policy_start_step)
-    return found if intent is None else intent.revise(found, episode)
+    failure = failure._replace(step=failure.step - policy_start_step)
+    return failure if intent is None else intent.revise(failure, episode)
 
 
 def _attribute_end(
     replay: EpisodeReplay, *, timed_out: bool, cause: str | None
 ) -> FailureAttribution:
-    """Return the failure of an episode without a deviation: what the policy had not done yet.
+    """Return the failure of an episode that ended while it could still succeed.
 
-    If the time was not over, the environment ended the episode, with a cause.
+    If the policy used up its steps, that is what it had not done yet; if not, the environment ended
+    the episode with a cause, for example a pose that the arm cannot reach.
     """
     if timed_out:
         return describe_end_state(replay)
@@ -127,15 +131,15 @@ def _attribute_end(
 
 def _attribute_time(replay: EpisodeReplay, deviation: _Deviation) -> FailureAttribution:
     """Return the failure of letting time pass: what was tried until then, if anything was."""
-    found = describe_end_state(replay)
-    if found.failure != "out_of_time":
-        return found
+    end_failure = describe_end_state(replay)
+    if end_failure.failure != "out_of_time":
+        return end_failure
     words = _describe_deviation(replay, deviation)
     return FailureAttribution.of(deviation.failure or "out_of_time", None, deviation.step, words)
 
 
 def _attribute_act(replay: EpisodeReplay, deviation: _Deviation, act: Fact) -> FailureAttribution:
-    """Return the failure of a forbidden act, or the slips that explain it.
+    """Return the failure of a forbidden act, or the failed tries that explain it.
 
     A red cube on the wrong disc -> ``wrong_place``; if it fell there -> ``dropped``. A failure that
     the violated rule names stays, but for presses: these depend on their moment, and on whether the
@@ -172,7 +176,10 @@ def _is_pressed_by_held(replay: EpisodeReplay, step: int) -> bool:
 
 
 def _deviations(replay: EpisodeReplay) -> Iterator[_Deviation]:
-    """Yield the violations that became certain, then the one that occurred."""
+    """Yield each moment from which on a rule was sure to be violated, then that of the violation.
+
+    The last one is yielded only if the judge found a violation.
+    """
     yield from _lasting_deviations(replay)
     for rule in _last_stages(replay):
         yield from _wasted_occurrences(replay, rule)
@@ -183,10 +190,11 @@ def _deviations(replay: EpisodeReplay) -> Iterator[_Deviation]:
 
 
 def _lasting_deviations(replay: EpisodeReplay) -> Iterator[_Deviation]:
-    """Yield the rules of current and later stages whose conditions come to hold for good.
+    """Yield the moments from which on what a rule forbids holds for good, once for each rule.
 
     A third red cube falls into the bin where the goal has two: a cube never leaves the bin, so the
-    rule of the last stage is already sure to be violated. Each rule is yielded once.
+    rule of the last stage is already sure to be violated. Only rules of current and later stages
+    count.
     """
     history = FactHistory()
     open_rules = _last_stages(replay)
@@ -203,7 +211,7 @@ def _lasting_deviations(replay: EpisodeReplay) -> Iterator[_Deviation]:
 
 
 def _wasted_occurrences(replay: EpisodeReplay, rule: Rule) -> Iterator[_Deviation]:
-    """Yield the first occurrence too many for a limit, given those that the stages need.
+    """Yield the first occurrence of an act that is too many for a limit; at most one.
 
     A rule that fails at five swings over a target, where the stages need three, leaves one to
     waste: four are allowed. The second swing that completes no stage is the first too many, since
@@ -225,7 +233,10 @@ def _wasted_occurrences(replay: EpisodeReplay, rule: Rule) -> Iterator[_Deviatio
 
 
 def _completes_stage(replay: EpisodeReplay, interval: FactInterval) -> bool:
-    """Return whether a fact that a stage expected completed it while it held."""
+    """Return whether a fact completed a stage that expected it, while it held.
+
+    The interval has the fact with its first step and the first step at which it no longer held.
+    """
     for stage, step in replay.completions():
         is_expected = replay.stages[stage].expects == interval.fact
         # At the step at which it ends, the fact no longer holds.
@@ -235,7 +246,7 @@ def _completes_stage(replay: EpisodeReplay, interval: FactInterval) -> bool:
 
 
 def _last_stages(replay: EpisodeReplay) -> dict[Rule, int]:
-    """Return all rules, each with the index of the last stage in which it is in force."""
+    """Return the rules of all stages, each with the index of the last stage that forbids it."""
     last_stages: dict[Rule, int] = {}
     for index, stage in enumerate(replay.stages):
         for forbidden in stage.forbids:
@@ -245,7 +256,11 @@ def _last_stages(replay: EpisodeReplay) -> dict[Rule, int]:
 
 
 def _lasts(condition: Condition) -> bool:
-    """Return whether a condition, once an act has met it, holds for good."""
+    """Return whether a condition, once an act has met it, can never be undone.
+
+    A cube in the bin lasts, as do two cubes in the bin; a cube in the hand and a span of time do
+    not.
+    """
     match condition:
         case Fact():
             return condition.traits.lasts
@@ -260,9 +275,9 @@ def _lasts(condition: Condition) -> bool:
 
 
 def _latest_act(replay: EpisodeReplay, violation: Fact | Rule, step: int) -> Fact | None:
-    """Return the latest of the acts that make a violation; None if it is only the time.
+    """Return the latest of the acts that violate a rule, or a fact, up to a step.
 
-    Acts whose fact still holds at the step come first.
+    Acts whose fact still holds at the step come first. None if no act does it: it is only the time.
     """
     facts = facts_of(violation)
     acts = [act for act in replay.intervals if act.fact in facts and act.start <= step]

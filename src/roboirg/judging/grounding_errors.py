@@ -62,7 +62,11 @@ def _repeats(fact: Fact, now: tuple[Fact, ...], past: Sequence[tuple[Fact, ...]]
 
 
 def _classify_early(fact: Fact, skipped: Sequence[tuple[Fact, ...]]) -> FailureName:
-    """Classify an act before its time by the expected acts that it skips."""
+    """Return the failure of an act before its time, by the expected acts that it skips.
+
+    A press that skips any act other than letting go is ``wrong_count``; everything else is
+    ``wrong_order``. `skipped` has the facts that each skipped stage expects.
+    """
     if fact.traits.role is not FactRole.PRESS:
         return "wrong_order"
     # A press often ends the task, so what it skips is never done.

@@ -20,7 +20,7 @@ from roboirg.core.conditions import All, Condition, Elapsed, Fact, Rule
 from roboirg.core.episode import Episode, Scene, Stage
 from roboirg.judging.fact_history import FactHistory
 
-_PLAINER = {"remain static": "wait"}
+_PLAINER_SUBGOALS = {"remain static": "wait"}
 """Subgoals of RoboMME, and what a cause says instead."""
 
 
@@ -51,6 +51,7 @@ class Judge:
     """
 
     def __init__(self, stages: Sequence[Stage], scene: Scene | None = None) -> None:
+        """Begin with the first stage: ``ongoing``, or ``success`` if there are no stages."""
         self.stages = tuple(stages)
         self.status = Status.SUCCESS if not self.stages else Status.ONGOING
         self.index = 0
@@ -72,10 +73,10 @@ class Judge:
         return self.stages[self.index] if self.index < len(self.stages) else None
 
     def next_change(self) -> float:
-        """Return the next step at which an evaluation may change something though no fact does.
+        """Return the next step at which the time alone may complete or violate the current stage.
 
         A stage that expects 100 steps to pass, evaluated at step 20 -> 100. Infinity if only facts
-        can change anything.
+        can change anything, or if the episode is over; the next step if the stage has just begun.
         """
         if self.status is not Status.ONGOING:
             return math.inf
@@ -84,10 +85,11 @@ class Judge:
         return self._watch.next_change(self._history)
 
     def update(self, step: int, facts: AbstractSet[Fact]) -> Status:
-        """Evaluate the facts that hold `step` control steps after reset, and return the status.
+        """Move the episode on by the facts that hold at a step, and return its status.
 
-        What the stage forbids is tested first: who does what is expected and what is forbidden in
-        the same step fails.
+        `step` counts control steps since reset. What the current stage forbids is tested first,
+        then what it expects: who does both in the same step fails. At most one stage is completed
+        in a step.
         """
         stage = self.current
         if self.status is not Status.ONGOING or stage is None:
@@ -126,7 +128,7 @@ class _StageWatch:
     def __init__(self, stage: Stage, first_step: int) -> None:
         self._stage = stage
         self._first_step = first_step
-        self._elapsed = tuple(_elapsed_parts(stage))
+        self._elapsed = tuple(_time_conditions(stage))
         # Since which step all evaluations have met what the stage expects; None if the last one
         # did not. Only of a stage that has to last.
         self._met_since: int | None = None
@@ -148,7 +150,8 @@ class _StageWatch:
     def completes(self, history: FactHistory) -> bool:
         """Return whether the stage is complete, and remember since when it has been met.
 
-        A stage with `lasting` is complete when what it expects has held for so many steps on end.
+        A stage with `lasting` is complete when what it expects has held for so many steps on end;
+        any other, at once.
         """
         is_met = history.holds(self._stage.expects)
         if self._stage.lasting == 0:
@@ -167,8 +170,8 @@ def _condition_of(forbidden: Fact | Rule) -> Condition:
     return forbidden.condition if isinstance(forbidden, Rule) else forbidden
 
 
-def _elapsed_parts(stage: Stage) -> Iterator[Elapsed]:
-    """Yield the parts of a stage's conditions that depend on the time."""
+def _time_conditions(stage: Stage) -> Iterator[Elapsed]:
+    """Yield the conditions on time in what a stage expects and forbids: *100 steps passed*."""
     conditions: list[Condition] = [stage.expects]
     conditions += [_condition_of(forbidden) for forbidden in stage.forbids]
     for condition in conditions:
@@ -188,7 +191,7 @@ def describe_violation(violation: Fact | Rule, stage: Stage, scene: Scene) -> st
 def describe_expected(stage: Stage) -> str:
     """Return what the stage expects, to follow an act: ``"expected: press the button"``."""
     words = plain_subgoal(stage)
-    return f"expected: {_PLAINER.get(words, words)}"
+    return f"expected: {_PLAINER_SUBGOALS.get(words, words)}"
 
 
 def describe_act(fact: Fact, scene: Scene) -> str:

@@ -20,7 +20,7 @@ _Look = tuple[ObjectKind, Color | None]
 def meant_objects(
     stages: Sequence[Stage], index: int, scene: Scene, facts: AbstractSet[Fact] = frozenset()
 ) -> frozenset[str]:
-    """Return the names of the objects with which a stage can rightly be completed.
+    """Return the names of the objects with which a stage can still rightly be completed.
 
     BinFill with *two red cubes, one blue one*: at first every red and blue cube; when both red ones
     are in the bin, every blue one.

@@ -29,9 +29,9 @@ TREMOR_STEPS = 10
 MISSES = ("missed_grasp", "missed_press")
 """Slips at which the hand did not reach its object; at all others it lost it, or passed a place."""
 
-_OPEN_PLACES = ("bin", "box")
+_PLACES_TO_FALL_INTO = ("bin", "box")
 """Kinds of places into which an object falls that is let go in the air."""
-_PLACES = ("target", "site", *_OPEN_PLACES)
+_PLACES_TO_REST = ("target", "site", *_PLACES_TO_FALL_INTO)
 """Kinds of places at which an object comes to rest that is put down."""
 
 
@@ -71,11 +71,11 @@ def drop_before(slips: Sequence[Slip], act: FactInterval) -> Slip | None:
 
 
 def is_noticed(replay: EpisodeReplay, slip: Slip, slips: Sequence[Slip]) -> bool:
-    """Return whether the next that the hands did after a miss was to try the same again.
+    """Return whether the hands, after they missed something, next tried the same again.
 
     Missed the red cube, then took it: noticed. Missed it, then opened an empty hand at the bin,
-    pressed, or took another object: not noticed. A loss never counts as noticed: where an object is
-    handled several times, a new pick may be the next one that is due.
+    pressed, or took another object: not noticed. The loss of an object never counts as noticed:
+    where one is handled several times, a new pick may be the next one that is due.
     """
     if slip.failure not in MISSES:
         return False
@@ -94,7 +94,10 @@ class _Act(NamedTuple):
 
 
 def _acts_and_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> Iterator[_Act]:
-    """Yield all that the hands did or tried, in no order; an empty hand is about no object."""
+    """Yield all that the hands did or tried, with the objects it was about, in no order.
+
+    An empty hand that opens is an act about no object.
+    """
     for act in replay.started(FactRole.RAISE, FactRole.PRESS):
         yield _Act(act.start, frozenset({act.subject}))
     for slip in slips:
@@ -104,7 +107,7 @@ def _acts_and_tries(replay: EpisodeReplay, slips: Sequence[Slip]) -> Iterator[_A
 
 
 def _missed_grasps(replay: EpisodeReplay) -> Iterator[Slip]:
-    """Yield where the hands meant to take something, and did not lift it.
+    """Yield the failed tries to take something: it was not lifted.
 
     The fingers closed on nothing next to it, they held it for a while without lifting it, or they
     were at what is expected and did not close.
@@ -125,15 +128,16 @@ def _missed_grasps(replay: EpisodeReplay) -> Iterator[Slip]:
 
 def _fruitless_holds(replay: EpisodeReplay) -> Iterator[FactInterval]:
     """Yield when the fingers held something that did not come up."""
-    for hold in _ended_holds(replay):
-        if not _raises(replay, hold):
+    for hold in _holds_let_go(replay):
+        if not _lifts_during(replay, hold):
             yield hold
 
 
 def _idle_touches(replay: EpisodeReplay, closing_steps: Sequence[int]) -> Iterator[FactInterval]:
-    """Yield when the hand was at an expected object, and the fingers did not close then or soon.
+    """Yield when the hand was at an object that was expected, and the fingers did not close.
 
-    `closing_steps` are those at which they closed, on an object or on nothing.
+    They close neither then nor in the `SETTLED_STEPS` after it. `closing_steps` are all steps at
+    which they closed, on an object or on nothing.
     """
     for touch in replay.started(FactRole.TOUCH):
         end = replay.last_step
@@ -146,10 +150,11 @@ def _idle_touches(replay: EpisodeReplay, closing_steps: Sequence[int]) -> Iterat
             yield touch
 
 
-def _ended_holds(replay: EpisodeReplay) -> Iterator[FactInterval]:
-    """Yield when the fingers held something until they let it go; not what they still hold.
+def _holds_let_go(replay: EpisodeReplay) -> Iterator[FactInterval]:
+    """Yield from when to when the fingers held each object; not what they hold at the end.
 
-    Fingers that tremble lose an object and hold it again within a few steps: that is no end.
+    Fingers that tremble lose an object and hold it again within a few steps: that is no end of a
+    hold.
     """
     grips = list(replay.started(FactRole.GRIP))
     grip_starts = {(grip.subject, grip.start) for grip in grips}
@@ -162,22 +167,23 @@ def _ended_holds(replay: EpisodeReplay) -> Iterator[FactInterval]:
             yield grip
 
 
-def _raises(replay: EpisodeReplay, hold: FactInterval) -> list[FactInterval]:
-    """Return the intervals in which a held object was up: those that meet the hold in time."""
+def _lifts_during(replay: EpisodeReplay, hold: FactInterval) -> list[FactInterval]:
+    """Return from when to when a held object was lifted, of lifts during this hold."""
     hold_end = replay.end_of(hold)
-    raises: list[FactInterval] = []
-    for raised in replay.started(FactRole.RAISE, after=0):
-        is_same_object = raised.subject == hold.subject
-        is_meanwhile = raised.start <= hold_end and raised.lasts_until(hold.start)
+    lifts: list[FactInterval] = []
+    for lift in replay.started(FactRole.RAISE, after=0):
+        is_same_object = lift.subject == hold.subject
+        is_meanwhile = lift.start <= hold_end and lift.lasts_until(hold.start)
         if is_same_object and is_meanwhile:
-            raises.append(raised)
-    return raises
+            lifts.append(lift)
+    return lifts
 
 
 def _missed_presses(replay: EpisodeReplay) -> Iterator[Slip]:
-    """Yield where closed fingers came down next to a button that was not pressed about then.
+    """Yield each try to press a button next to which closed fingers came down without pressing it.
 
-    *About then* is from `SETTLED_STEPS` before they came down until they are up again.
+    The button counts as pressed if it was from `SETTLED_STEPS` before they came down until they are
+    up again.
     """
     presses = list(replay.started(FactRole.PRESS))
     for attempt in replay.tried("pressed_beside"):
@@ -211,11 +217,11 @@ class _Release(NamedTuple):
     @property
     def places(self) -> tuple[str, ...]:
         """The kinds of places to which the object can come."""
-        return _OPEN_PLACES if self.is_in_air else _PLACES
+        return _PLACES_TO_FALL_INTO if self.is_in_air else _PLACES_TO_REST
 
 
 def _lost_objects(replay: EpisodeReplay) -> Iterator[Slip]:
-    """Yield where an object that had been up was let go and did not come to an expected place.
+    """Yield each object that was lifted, let go, and did not come to a place where it was expected.
 
     Letting go is no loss if the stage expects nothing more of the object, or if the object was put
     down and is not to come to a place.
@@ -223,17 +229,18 @@ def _lost_objects(replay: EpisodeReplay) -> Iterator[Slip]:
     for release in _releases(replay):
         can_be_lost = release.is_in_air or FactRole.PLACING in release.roles
         if release.roles and can_be_lost and not _has_landed(replay, release):
-            failure = _failure_of(replay, release)
+            failure = _failure_of_loss(replay, release)
             yield Slip(release.step, failure, frozenset({release.name}))
 
 
 def _releases(replay: EpisodeReplay) -> Iterator[_Release]:
-    """Yield the moments at which an object that had been up was let go.
+    """Yield the moments at which the hand let go of an object that it had lifted.
 
-    It was in the air if it was still up, and the hand had not lowered it to put it down.
+    It was in the air if it was still up, and the hand had not lowered it to put it down. What the
+    current stage expects of the object goes with it.
     """
-    for hold in _ended_holds(replay):
-        raises = _raises(replay, hold)
+    for hold in _holds_let_go(replay):
+        raises = _lifts_during(replay, hold)
         if not raises:
             continue
         step = replay.end_of(hold)
@@ -253,7 +260,11 @@ def _is_lowered(replay: EpisodeReplay, name: str, step: int) -> bool:
 
 
 def _has_landed(replay: EpisodeReplay, release: _Release) -> bool:
-    """Return whether an object soon lies at an expected place, or at one to which it can come."""
+    """Return whether an object that was let go soon lies at a place that is good for it.
+
+    That is an expected place, or one of a kind to which it can come. Soon is within
+    `SETTLED_STEPS`.
+    """
     for facts in replay.facts[release.step : release.step + SETTLED_STEPS]:
         for fact in facts:
             if fact.subject != release.name or fact.traits.role is not FactRole.PLACING:
@@ -264,7 +275,7 @@ def _has_landed(replay: EpisodeReplay, release: _Release) -> bool:
     return False
 
 
-def _failure_of(replay: EpisodeReplay, release: _Release) -> FailureName:
+def _failure_of_loss(replay: EpisodeReplay, release: _Release) -> FailureName:
     """Return which failure the loss of an object is, by the places next to which it was let go.
 
     Next to the place where it is expected -> ``misplaced``; next to another place ->
@@ -284,9 +295,9 @@ def _failure_of(replay: EpisodeReplay, release: _Release) -> FailureName:
 
 
 def _missed_passes(replay: EpisodeReplay) -> Iterator[Slip]:
-    """Yield where an object was carried past a place over which it was expected.
+    """Yield each try to carry an object over a place that only came next to it.
 
-    It was next to the place, and not over it before it was away again.
+    It was expected over the place, and did not get over it before it was away again.
     """
     carries = list(replay.started(FactRole.CARRY))
     for attempt in replay.tried("beside"):
@@ -298,7 +309,10 @@ def _missed_passes(replay: EpisodeReplay) -> Iterator[Slip]:
 
 
 def _expected_carries(replay: EpisodeReplay, attempt: FactInterval) -> set[Fact]:
-    """Return the facts, expected at an attempt, that its object is carried over its place."""
+    """Return the facts that the stage expected when an object was next to a place: it gets over it.
+
+    Empty if it was not expected over this place.
+    """
     expected: set[Fact] = set()
     for fact in facts_of(replay.stage_at(attempt.start).expects):
         is_same_object = fact.subject == attempt.subject

@@ -34,7 +34,7 @@ def judge_subgoal(
     episode: Episode,
     facts: AbstractSet[Fact] = frozenset(),
 ) -> SubgoalVerdict:
-    """Compare a subgoal with the stage that is due.
+    """Return whether a planner's subgoal, in words, is what is due next, or how it is wrong.
 
     Where *pick up the red cube* is due: itself -> ``right``, *pick up the green cube* ->
     ``wrong_thing``, *press the button* -> ``lost``. Ordinals may be left out, objects that look
@@ -60,7 +60,7 @@ def judge_subgoal(
     index = episode.stages.index(due) if due in episode.stages else 0
     right_things = meant_objects(episode.stages, index, episode.scene, facts)
     right_targets = _places(due) if is_placing else right_things
-    if pointed_at is not None and _is_elsewhere(pointed_at, due, right_targets):
+    if pointed_at is not None and _points_elsewhere(pointed_at, due, right_targets):
         return "wrong_place" if is_placing else "wrong_thing"
 
     if said.words == right.words:
@@ -68,7 +68,7 @@ def judge_subgoal(
     # A stage may point at nothing; None would stand for all that is inside of nothing.
     meant = _objects(episode.scene, {*right_things, due.points_at} - {None})
     # "Pick up the cube" without a color or a point does not name one of several cubes.
-    if pointed_at is None and said.is_vaguer(right) and _have_alike(meant, episode.scene):
+    if pointed_at is None and said.is_vaguer(right) and _has_others_of_kind(meant, episode.scene):
         return "wrong_thing"
     return _judge_words(said, right, meant)
 
@@ -113,7 +113,7 @@ class _Subgoal:
         return self.words.startswith("pick") and not self.colors and bool(right.colors)
 
     def is_other_time(self, right: _Subgoal) -> bool:
-        """Return whether the words have another ordinal than the right ones, of the same thing.
+        """Return whether the words are about another time than the right ones, of the same thing.
 
         *For the second time* where *for the first time* is right; *again* fits any time. The
         ordinals of buttons do not count: both have to be pressed, in any order.
@@ -128,7 +128,7 @@ class _Subgoal:
         return ordinal[1] != right_ordinal[1] and self.colors == right.colors
 
 
-def _is_elsewhere(
+def _points_elsewhere(
     pointed_at: Collection[str], due: Stage, right_targets: AbstractSet[str | None]
 ) -> bool:
     """Return whether a point is at none of the objects at which the stage may point."""
@@ -138,7 +138,7 @@ def _is_elsewhere(
 
 
 def _judge_words(said: _Subgoal, right: _Subgoal, meant: Sequence[SceneObject]) -> SubgoalVerdict:
-    """Compare the words of a subgoal with the right ones for the same act.
+    """Return how the words of a subgoal compare with the right words for the same act.
 
     `meant` are the objects with which the stage can rightly be completed. The order matters: a
     wrong color weighs more than a wrong side, and that more than a wrong ordinal.
@@ -172,7 +172,7 @@ def _objects(scene: Scene, names: Collection[str | None]) -> list[SceneObject]:
     return [item for item in scene.objects if item.name in names or item.inside in names]
 
 
-def _have_alike(meant: Sequence[SceneObject], scene: Scene) -> bool:
+def _has_others_of_kind(meant: Sequence[SceneObject], scene: Scene) -> bool:
     """Return whether the scene has other objects of the same kinds."""
     kinds = {item.kind for item in meant}
     return any(item.kind in kinds and item not in meant for item in scene.objects)

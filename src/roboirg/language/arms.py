@@ -78,7 +78,11 @@ class TrialWords(NamedTuple):
 
 
 def arm_episode(episode: Episode, arm: str) -> Episode:
-    """Return the episode with the goal by which an arm's verdict falls.
+    """Return the episode with the goal by which the policy is judged in an arm.
+
+    An arm is a variant of what the policy hears of the same scene. In the arm `OTHER_GOAL` the
+    words state another goal, drawn for the scene, and the returned episode has that goal. All other
+    arms return `episode` itself.
 
     Raises:
         UnknownNameError: there is no such arm.
@@ -87,46 +91,52 @@ def arm_episode(episode: Episode, arm: str) -> Episode:
     check_arm(arm)
     if arm != OTHER_GOAL:
         return episode
-    goal = draw_other_goal(episode)
-    if goal is None:
+    other_goal = draw_other_goal(episode)
+    if other_goal is None:
         raise InvalidValueError(f"The scene of {episode.key} has no other goal with as many picks.")
-    return with_goal(episode, goal)
+    return with_goal(episode, other_goal)
 
 
 def say_arm(episode: Episode, options: InstructionOptions, arm: str = TOLD) -> ArmWords:
-    """Return what is said in an arm of an episode; the same arguments give the same bytes.
+    """Return what is said in an arm, a variant of the words; equal arguments give equal bytes.
+
+    The arm may keep the usual instruction, paraphrase it, scramble its words, replace it by a text
+    that says nothing of the goal, or state another goal of the scene.
 
     Raises:
         UnknownNameError: there is no such arm.
         InvalidValueError: the options cannot express the goal, the scene has no other goal, or
             there is no further paraphrase.
     """
-    judged = arm_episode(episode, arm)
-    original = None if judged is episode else episode
-    instruction = instruct_with(judged, options)
+    judged_episode = arm_episode(episode, arm)
+    original = None if judged_episode is episode else episode
+    instruction = instruct_with(judged_episode, options)
     number = paraphrase_number(arm)  # None for other arms
     if number is not None:
-        instruction = _paraphrase(judged, options, instruction, number)
+        instruction = _paraphrase(judged_episode, options, instruction, number)
     elif arm == SCRAMBLED:
-        instruction = _scramble(judged, instruction)
+        instruction = _scramble(judged_episode, instruction)
     elif arm in SILENT_TEXTS:
         instruction = _silence(instruction, SILENT_TEXTS[arm])
-    return ArmWords(judged, instruction, original)
+    return ArmWords(judged_episode, instruction, original)
 
 
 def word_trial(episode: Episode, options: InstructionOptions, arm: str = TOLD) -> TrialWords:
-    """Return everything that is said of an arm of an episode; raises like `say_arm`."""
+    """Return what the policy hears in an arm, with the explicit command and the goals in words.
+
+    An arm is a variant of the words. Raises like `say_arm`.
+    """
     words = say_arm(episode, options, arm)
-    judged = words.episode
+    judged_episode = words.episode
     explicit = words.instruction
     if options.setting != EXPLICIT or arm != TOLD:
-        explicit = instruct_with(judged, replace(options, setting=EXPLICIT))
+        explicit = instruct_with(judged_episode, replace(options, setting=EXPLICIT))
     return TrialWords(
-        judged,
+        judged_episode,
         words.instruction,
         command=explicit.text,
-        stated=goal_name(judged.goal),
-        goals=_episodes_by_goal(judged),
+        stated=goal_name(judged_episode.goal),
+        goals=_episodes_by_goal(judged_episode),
     )
 
 
@@ -139,18 +149,28 @@ def _episodes_by_goal(episode: Episode) -> dict[str, Episode]:
 def _paraphrase(
     episode: Episode, options: InstructionOptions, usual: Instruction, number: int
 ) -> Instruction:
-    """Return the paraphrase of a number, from 1: another text than the usual one and those before.
+    """Return the instruction in other words: paraphrase 1, 2, ..., all with different texts.
 
-    Words are drawn again until so many different texts with the same reasoning have come up.
+    Words are drawn again (`variant`) until `number` texts other than the usual one have come up;
+    the last of them is returned. Only texts that take the same reasoning count.
+
+    Args:
+        episode: what to say.
+        options: how to say it.
+        usual: the instruction that is not paraphrased.
+        number: which paraphrase, from 1.
+
+    Raises:
+        InvalidValueError: too few different texts were drawn.
     """
-    seen = {usual.text}
+    different_texts = {usual.text}
     for variant in range(1, number * _MOST_DRAWS + 1):
         with contextlib.suppress(InvalidValueError):  # a setting may refuse what was drawn
-            other = instruct_with(episode, options, variant)
-            if _notes_to_keep(other) == _notes_to_keep(usual):
-                seen.add(other.text)
-            if len(seen) > number:  # the usual text is among them
-                return other
+            paraphrase = instruct_with(episode, options, variant)
+            if _notes_to_keep(paraphrase) == _notes_to_keep(usual):
+                different_texts.add(paraphrase.text)
+            if len(different_texts) > number:  # the usual text is among them
+                return paraphrase
     raise InvalidValueError(
         f"The {options.setting} setting has no paraphrase {number} of episode {episode.key}."
     )
@@ -168,21 +188,26 @@ def _silence(instruction: Instruction, text: str) -> Instruction:
 
 
 def _scramble(episode: Episode, instruction: Instruction) -> Instruction:
-    """Return the content words in random order, as many in each utterance as before.
+    """Return the instruction with its content words in random order, and no function words.
 
-    *Please lift the red cube.* may become *cube red lift*. What that means is not known.
+    *Please lift the red cube.* may become *cube red lift*. Each utterance keeps its number of
+    content words; what the new text means is not known. The order depends on the episode and the
+    text only.
     """
-    by_turn = [_content_words(turn) for turn in instruction.turns]
-    words = list(itertools.chain.from_iterable(by_turn))
+    words_by_utterance = [_content_words(utterance_text) for utterance_text in instruction.turns]
+    words = list(itertools.chain.from_iterable(words_by_utterance))
     if len(set(words)) < 2:  # noqa: PLR2004
         text = instruction.text
         raise InvalidValueError(f"The text of {episode.key} has no other order: {text!r}.")
     rng = np.random.default_rng([episode.seed, zlib.crc32(instruction.text.encode())])
-    order = words
-    while order == words:
-        order = shuffled(rng, words)
-    left = iter(order)  # each turn takes the next of them
-    texts = [" ".join(itertools.islice(left, len(turn_words))) for turn_words in by_turn]
+    new_order = words
+    while new_order == words:
+        new_order = shuffled(rng, words)
+    next_words = iter(new_order)  # each utterance takes the next of them
+    texts = [
+        " ".join(itertools.islice(next_words, len(utterance_words)))
+        for utterance_words in words_by_utterance
+    ]
     return _with_texts(instruction, texts)
 
 

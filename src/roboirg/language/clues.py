@@ -19,21 +19,21 @@ from roboirg.language.places import PlaceClass, SpokenPlace, spoken_places
 from roboirg.tasks import Task
 
 ClueKind = Literal["counts", "events", "betweenness", "sets", "place"]
-LEFT = 3
+CUBES_LEFT_OVER = 3
 """Cubes that *all but three* leaves: BinFill's easy scenes allow it for every number."""
-KEPT_SWAPS = {1: (1, 2), 2: (1, 3), 3: (1, 1)}
+SHARE_BY_SWAPS = {1: (1, 2), 2: (1, 3), 3: (1, 1)}
 """Share of the scenes with this number of swaps that say it, so that all are equally frequent.
 
 Of easy scenes half have one swap and half two, of medium ones half two and half three; two of four
 episodes are easy, one is medium.
 """
-_BETWEEN = (PlaceClass.MIDDLE, PlaceClass.BETWEEN)
+_MIDDLE_PLACES = (PlaceClass.MIDDLE, PlaceClass.BETWEEN)
 """Places for which what stands on both sides is looked at."""
-_ASIDE = (PlaceClass.EXTREME, PlaceClass.FIXTURE, PlaceClass.CORNER)
+_EXCLUDING_PLACES = (PlaceClass.EXTREME, PlaceClass.FIXTURE, PlaceClass.CORNER)
 """Places of the two things that are set aside."""
-_THREE = 3
+_EXCLUSION_SIZE = 3
 """Things of which two are set aside."""
-_SIDES = {1: "left", -1: "right"}
+_SIDE_BY_SIGN = {1: "left", -1: "right"}
 """By the sign of y in the robot base frame."""
 
 
@@ -77,10 +77,11 @@ class EventClue(NamedTuple):
 
 
 def thing_clues(scene: Scene, task: Task) -> list[ThingClue]:
-    """Return a clue to each thing that a task points at, by where it stands.
+    """Return words that lead to each thing that commands point at, by where it stands.
 
-    ``the cube in the middle`` leads to the cube there. What has moved before the words are heard is
-    *the container that started in the back*.
+    ``the cube in the middle`` leads to the cube there; no color is named. What changes places
+    before the words are heard is named by its first place: *the container that started in the
+    back*.
     """
     kind = task.things.pointed
     noun = kind.removeprefix("hidden_")
@@ -88,50 +89,51 @@ def thing_clues(scene: Scene, task: Task) -> list[ThingClue]:
     if scene.motions_of(Swap) and task.demonstration(scene):
         noun += " that started"
     places = [place for place in spoken_places(scene, kind, "robot") if place.attributive]
-    found = _with_others_aside(candidates_in(scene, kind), places)
+    clues = _clues_by_exclusion(candidates_in(scene, kind), places)
     for place in places:
         if place.kind in (PlaceClass.COLOR, PlaceClass.UNUSUAL):
             continue  # no clue names a color, or is what no one says
-        clue_kind: ClueKind = "betweenness" if place.kind in _BETWEEN else "place"
+        clue_kind: ClueKind = "betweenness" if place.kind in _MIDDLE_PLACES else "place"
         clue = Clue(clue_kind, f"the {noun} {place.attributive}")
-        found.append(ThingClue(place.thing, clue))
-    return found
+        clues.append(ThingClue(place.thing, clue))
+    return clues
 
 
-def _with_others_aside(
+def _clues_by_exclusion(
     things: Sequence[SceneObject], places: Sequence[SpokenPlace]
 ) -> list[ThingClue]:
-    """Return the clues to each of three things by the places of the two others.
+    """Return clues to one of three things by the places of the two others, which are set aside.
 
     If one is *on the left* and one *next to the button*, these two places lead to the third thing.
-    Without exactly three things there are no such clues.
+    Empty unless there are exactly three things.
     """
-    if len(things) != _THREE:
+    if len(things) != _EXCLUSION_SIZE:
         return []
-    found: list[ThingClue] = []
-    simple_places = [place for place in places if place.kind in _ASIDE]
+    clues: list[ThingClue] = []
+    simple_places = [place for place in places if place.kind in _EXCLUDING_PLACES]
     for first, second in itertools.combinations(simple_places, 2):
         remaining = [thing for thing in things if thing not in (first.thing, second.thing)]
         # Two remain if both places are of the same thing.
         if len(remaining) == 1:
             places_aside = (first.said(), second.said())
             clue = Clue("sets", " ".join(places_aside), aside=places_aside)
-            found.append(ThingClue(remaining[0], clue))
-    return found
+            clues.append(ThingClue(remaining[0], clue))
+    return clues
 
 
 def event_clues(scene: Scene) -> Iterator[EventClue]:
-    """Yield the clues to what the video shows; nothing if there is no video.
+    """Yield words for what the demonstration video shows, each with the goal value it leads to.
 
-    *The cube that the robot moved* leads to the value ``red`` of the slot ``color``.
+    *The cube that the robot moved* leads to the value ``red`` of the goal's slot ``color``. Yields
+    nothing if there is no video.
     """
-    acts = [fact.kind for fact in scene.past]
+    kinds_of_past_acts = [fact.kind for fact in scene.past]
     # Some videos show a cube that is placed on targets, others a cube that is picked up.
-    if "placed" in acts:
+    if "placed" in kinds_of_past_acts:
         yield from _moved_cube(scene)
         yield from _visited_targets(scene)
         yield _target_at_press(scene)
-    elif "picked" in acts:
+    elif "picked" in kinds_of_past_acts:
         yield from _swaps(scene)
         yield from _cubes_on_sides(scene)
 
@@ -145,23 +147,24 @@ def _moved_cube(scene: Scene) -> Iterator[EventClue]:
 
 
 def _visited_targets(scene: Scene) -> Iterator[EventClue]:
-    """Yield clues to the targets on which the cube was put, by where these lay.
+    """Yield clues to the targets on which the video's cube was put, by where the targets lay.
 
-    *The target on the left* leads to placement 2 if it was the second one to be used.
+    *The target on the left* leads to ``placement`` 2 if the cube was put there second. If the video
+    has one placement before and one after the press of the button, it also leads to ``relation``.
     """
     visited = [fact.place for fact in scene.past if fact.kind == "placed"]
     # The button is pressed between two placements: one is before the press, one after it.
-    has_moments = [fact.kind for fact in scene.past] == ["placed", "pressed", "placed"]
+    is_around_press = [fact.kind for fact in scene.past] == ["placed", "pressed", "placed"]
     noun = "target that started" if scene.motions_of(Swap) else "target"
     for place in spoken_places(scene, "target", "robot"):
         is_said = place.attributive and place.kind < PlaceClass.UNUSUAL
         if not is_said or place.thing.name not in visited:
             continue
         clue = Clue("place", f"the {noun} {place.attributive}")
-        order = visited.index(place.thing.name)
-        yield EventClue("placement", order + 1, clue)
-        if has_moments:
-            yield EventClue("relation", MOMENTS[order], clue)
+        times_before = visited.index(place.thing.name)
+        yield EventClue("placement", times_before + 1, clue)
+        if is_around_press:
+            yield EventClue("relation", MOMENTS[times_before], clue)
 
 
 def _target_at_press(scene: Scene) -> EventClue:
@@ -175,17 +178,18 @@ def _target_at_press(scene: Scene) -> EventClue:
 def _swaps(scene: Scene) -> Iterator[EventClue]:
     """Yield how often the cubes change places in the video: *as many times as …*."""
     swaps = len(scene.motions_of(Swap))
-    if swaps in KEPT_SWAPS:
+    if swaps in SHARE_BY_SWAPS:
         words = "the cubes switched places"
         clue = Clue("events", words, f"as many times as {words}")
-        yield EventClue("repeats", swaps, clue, KEPT_SWAPS[swaps])
+        yield EventClue("repeats", swaps, clue, SHARE_BY_SWAPS[swaps])
 
 
 def _cubes_on_sides(scene: Scene) -> Iterator[EventClue]:
-    """Yield how many cubes of each color are left and right of the one that the video shows.
+    """Yield clues to a number of repeats: how many cubes of a color are left or right of another.
 
-    *Once for each red cube to the left of the cube from the video* leads to the number of repeats.
-    Only where nothing changes places there are several colors; a single color gives no clue.
+    *Once for each red cube to the left of the cube from the video* leads to ``repeats`` 2 if two
+    red cubes are there. Yields nothing if all cubes have one color, as in scenes where they change
+    places.
     """
     shown = scene[scene.past[0].subject]
     cubes = scene.of_kind("cube")
@@ -193,9 +197,9 @@ def _cubes_on_sides(scene: Scene) -> Iterator[EventClue]:
     if len(colors) == 1:
         return
     for color in colors:
-        others = [cube for cube in cubes if cube.color == color and cube != shown]
-        for sign, side in _SIDES.items():
-            number = _count_on_side(others, shown, sign)
+        other_cubes = [cube for cube in cubes if cube.color == color and cube != shown]
+        for sign, side in _SIDE_BY_SIGN.items():
+            number = _count_on_side(other_cubes, shown, sign)
             if number:  # neither unclear nor zero
                 yield EventClue("repeats", number, _clue_to_side(color, side))
 
@@ -207,9 +211,10 @@ def _clue_to_side(color: str, side: str) -> Clue:
 
 
 def _count_on_side(things: Sequence[SceneObject], reference: SceneObject, sign: int) -> int | None:
-    """Return how many things are on one side of another; None if that is unclear for one.
+    """Return how many things are on one side of a reference; None if that is unclear for one.
 
-    `sign` is that of a key of `_SIDES`: 1 for the left, -1 for the right.
+    Unclear is a thing within two margins (6 cm) of the reference along y. `sign` is 1 for the
+    robot's left, where y is larger, and -1 for its right.
     """
     count = 0
     for thing in things:

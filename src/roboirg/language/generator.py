@@ -79,20 +79,24 @@ def instruct(
 
 
 def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 0) -> Instruction:
-    """Return the instruction of an episode; like `instruct`, with all options in one value.
+    """Return the instruction of an episode, as `instruct` does, with all options in one value.
 
-    Each `variant` draws its words anew; 0 is the usual one.
+    Each `variant` draws the words anew from its number; 0 gives the usual ones.
+
+    Raises:
+        InvalidValueError: the open wording file has no words of the task, or the setting cannot
+            express the episode.
     """
-    missing = _missing(episode, options)
-    if missing is not None:
-        raise InvalidValueError(f"The {missing}.")
+    missing_words = _find_missing_words(episode, options)
+    if missing_words is not None:
+        raise InvalidValueError(f"The {missing_words}.")
     request = request_of(episode, options, variant)
-    reason = refusal(request)
-    if reason is not None:
+    refusal_reason = refusal(request)
+    if refusal_reason is not None:
         setting = options.setting
         raise InvalidValueError(
             f"The {setting} setting cannot express episode {episode.key} "
-            f"(seed {episode.seed}): {reason}; leave {setting} out (--settings), or choose "
+            f"(seed {episode.seed}): {refusal_reason}; leave {setting} out (--settings), or choose "
             "other episodes (--episodes)."
         )
     return spoken_instruction(request, say(request))
@@ -100,12 +104,15 @@ def instruct_with(episode: Episode, options: InstructionOptions, variant: int = 
 
 def find_refusal(episode: Episode, options: InstructionOptions) -> str | None:
     """Return why a setting of the task cannot express an episode; None if it can."""
-    missing = _missing(episode, options)
+    missing = _find_missing_words(episode, options)
     return missing or refusal(request_of(episode, options))
 
 
 def find_refusals(episode: Episode, **options: Unpack[WordKeywords]) -> Mapping[str, str]:
-    """Return the settings of the task that cannot express an episode, each with the reason."""
+    """Return the settings that cannot express an episode, each with the reason.
+
+    A setting is a way to say the goal; only those of the episode's task are tried.
+    """
     usual = replace(InstructionOptions(), **as_fields(options))
     reasons: dict[str, str] = {}
     for name in settings_of(get_task(episode.task)):
@@ -124,32 +131,41 @@ def expressible(episode: Episode, **options: Unpack[WordKeywords]) -> tuple[str,
 def request_of(
     episode: Episode, options: InstructionOptions, variant: int = 0
 ) -> InstructionRequest:
-    """Return the request to put an episode into words."""
+    """Return an episode with its task, checked options and drawn words: all that a wording needs.
+
+    `variant` selects other random words than the usual ones, 0.
+    """
     check_options(options)
     task = get_task(episode.task)
     get_setting(options.setting, task)  # which the task must have
     return InstructionRequest(episode, task, options, sampler_of(episode, variant))
 
 
-def _missing(episode: Episode, options: InstructionOptions) -> str | None:
-    """Return why a wording file cannot serve a task; None if it can, or words are our own."""
-    identity = outside_words(options.wordings)
-    if identity is None:
+def _find_missing_words(episode: Episode, options: InstructionOptions) -> str | None:
+    """Return why a file of wordings has no words for an episode's task; None if it has them.
+
+    None also for our own words, which all tasks have. The text follows *The* in an error message.
+    """
+    wording_file = outside_words(options.wordings)
+    if wording_file is None:
         return None
-    tasks = find_wordings(identity).tasks
+    tasks = find_wordings(wording_file).tasks
     if episode.task in tasks:
         return None
     return (
-        f"wording file {identity} has no words of {episode.task}; name tasks that it has: "
+        f"wording file {wording_file} has no words of {episode.task}; name tasks that it has: "
         f"--tasks {','.join(tasks)}"
     )
 
 
 def check_options(options: InstructionOptions) -> None:
-    """Check all options of an instruction, those that its setting does not read included."""
+    """Raise if any option of an instruction has a value that does not exist.
+
+    Options that the chosen setting does not read are checked, too.
+    """
     if options.stages not in STAGE_SETS:
-        sets = ", ".join(map(str, STAGE_SETS))
-        raise InvalidValueError(f"The stages {options.stages} must be one of {sets}.")
+        possible_sets = ", ".join(map(str, STAGE_SETS))
+        raise InvalidValueError(f"The stages {options.stages} must be one of {possible_sets}.")
     check_whole("distractors", options.distractors, most=MOST_DISTRACTORS)
     check_names("form", [options.form], FORMS)
     check_names("distractor", [options.distractor], DISTRACTORS)
@@ -158,7 +174,11 @@ def check_options(options: InstructionOptions) -> None:
 
 
 def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> Instruction:
-    """Return the instruction that has the words of a request."""
+    """Return the instruction for a request from its phrases: texts, mentions and metadata.
+
+    A phrase is words with tags on those that name or point back at a value; each tag becomes a
+    mention with its characters in the text.
+    """
     utterances: list[Utterance] = []
     mentions: list[Mention] = []
     for index, (stage, phrase) in enumerate(spec.utterances):
@@ -180,18 +200,21 @@ def spoken_instruction(request: InstructionRequest, spec: InstructionSpec) -> In
 
 
 def _metadata(request: InstructionRequest, spec: InstructionSpec) -> dict[str, object]:
-    """Return the metadata of an instruction: notes of its setting, and how its words were drawn."""
+    """Return the metadata of an instruction: what its setting notes, and how its words were drawn.
+
+    Entries that the setting does not note keep their default.
+    """
     options = request.options
-    words = words_of(request.task.name, request.pool, options.setting, options.wordings)
-    left_open = spec.meaning.terms.keys() - spec.meaning.settled
+    words_version = words_of(request.task.name, request.pool, options.setting, options.wordings)
+    from_context = spec.meaning.terms.keys() - spec.meaning.settled
     return {
         **_DEFAULT_METADATA,
         **spec.notes,
         "wordings": options.wordings,
         "pool": request.pool,
-        "words": words,
+        "words": words_version,
         "language_version": LANGUAGE_VERSION,
         "draws": list(request.sampler.log),
         # The values of the goal that the command leaves to its context.
-        "hidden_slots": len(left_open),
+        "hidden_slots": len(from_context),
     }

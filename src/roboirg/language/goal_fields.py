@@ -40,9 +40,10 @@ def fields_of(goal: Goal, slot: str) -> Iterator[tuple[str, str | int]]:
 
 
 def unordered(goal: Goal) -> Goal:
-    """Return a goal with its colors and their counts in alphabetical order, which means nothing.
+    """Return a goal with its colors, and their counts, in alphabetical order.
 
-    Goals without counts are returned as they are: the order of their colors has a meaning.
+    *2 red and 1 blue* and *1 blue and 2 red* are the same goal. Goals without counts are returned
+    as they are: there the order of the colors has a meaning.
     """
     if "counts" not in goal.as_mapping():
         return goal

@@ -171,15 +171,17 @@ def command_expressions(mentions: Iterable[Any], last: int) -> tuple[str, ...]:
 
 
 def hidden_slots(instruction: Instruction, goal: Goal) -> frozenset[str]:
-    """Return the slots of the goal that the command does not name, so that the context has to.
+    """Return the slots of the goal whose values the last utterance, the command, does not name.
 
-    Of *Red is nice. Lift it twice.*, a goal of ``color`` and ``repeats``, that is ``color``.
+    The earlier utterances have to give them. Of *Red is nice. Lift it twice.*, a goal of ``color``
+    and ``repeats``, that is ``color``. Empty for an instruction that is a whole sentence of a
+    wording file.
     """
     if instruction.meaning is not None and instruction.meaning.goals:
         return frozenset()  # a whole sentence
-    last = len(instruction.utterances) - 1
+    command_index = len(instruction.utterances) - 1
     hidden = set(goal.as_mapping())
     for mention in instruction.mentions:
-        if mention.utterance == last and mention.role == "antecedent":
+        if mention.utterance == command_index and mention.role == "antecedent":
             hidden.discard(mention.slot)
     return frozenset(hidden)

@@ -31,8 +31,8 @@ def row(episode: Episode, instruction: Instruction) -> ExportRow:
         "form": instruction.form,
         "text": instruction.text,
         "command": instruction.command,
-        "turns": _turns(instruction),
-        "mentions": _mentions(instruction),
+        "turns": _utterance_rows(instruction),
+        "mentions": _mention_rows(instruction),
         "words": len(instruction.text.split()),
         "tokens": count_tokens(instruction.text),
         # As text, because each task has its own slots.
@@ -58,33 +58,34 @@ def _copied(metadata: Mapping[str, Any], *names: str) -> ExportRow:
     return {name: metadata[name] for name in names}
 
 
-def _turns(instruction: Instruction) -> list[ExportRow]:
-    """Return a row for each utterance, with the character at which it starts in the prompt.
+def _utterance_rows(instruction: Instruction) -> list[ExportRow]:
+    """Return a row for each utterance: its stage, text, and first character in the whole prompt.
 
-    *Red is nice.* starts at 0, and *Lift it.* after it at 13.
+    The prompt joins utterances by a space: *Red is nice.* starts at 0, and *Lift it.* after it at
+    13.
     """
-    turns: list[ExportRow] = []
+    rows: list[ExportRow] = []
     start = 0
     for utterance in instruction.utterances:
-        turns.append({"stage": utterance.stage, "start": start, "text": utterance.text})
+        rows.append({"stage": utterance.stage, "start": start, "text": utterance.text})
         start += len(utterance.text) + 1  # a space joins two utterances
-    return turns
+    return rows
 
 
-def _mentions(instruction: Instruction) -> list[ExportRow]:
-    """Return a row for each mention.
+def _mention_rows(instruction: Instruction) -> list[ExportRow]:
+    """Return a row for each mention: words that name a value of the goal or point back at one.
 
-    A mention knows its place in its utterance; the row has its place in the whole prompt.
+    A mention has its characters within its utterance; the row has them within the whole prompt.
     """
-    starts = [turn["start"] for turn in _turns(instruction)]
-    mentions: list[ExportRow] = []
+    utterance_starts = [turn["start"] for turn in _utterance_rows(instruction)]
+    rows: list[ExportRow] = []
     for mention in instruction.mentions:
-        turn_start = starts[mention.utterance]
-        mentions.append(
+        utterance_start = utterance_starts[mention.utterance]
+        rows.append(
             {
                 "turn": mention.utterance,
-                "start": turn_start + mention.start,
-                "end": turn_start + mention.end,
+                "start": utterance_start + mention.start,
+                "end": utterance_start + mention.end,
                 "text": instruction.span(mention),
                 "role": mention.role,
                 "expression": mention.expression,
@@ -92,7 +93,7 @@ def _mentions(instruction: Instruction) -> list[ExportRow]:
                 "value": str(mention.value),
             }
         )
-    return mentions
+    return rows
 
 
 def _texts(value: object) -> list[str]:

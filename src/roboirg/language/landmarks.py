@@ -75,9 +75,10 @@ class Ranking(NamedTuple):
         return self._replace(quantity=lambda item: -self.quantity(item))
 
     def select(self, candidates: Sequence[SceneObject], rank: int) -> SceneObject | None:
-        """Return the candidate of a rank, 0 for the first; None if the order there is unclear.
+        """Return the candidate of a rank, 0 for the largest quantity; None if that is unclear.
 
-        It is clear if the candidate differs by the margin from those just before and after it.
+        It is clear if its quantity differs by the margin from those just before and after it. None
+        also if there are too few candidates.
         """
         if rank >= len(candidates):
             return None
@@ -120,40 +121,45 @@ def agreed(found: Iterable[SceneObject | None]) -> SceneObject | None:
 
 
 def selectors(scene: Scene, kind: ObjectKind, frame: Frame) -> Iterator[Selector]:
-    """Yield every selector of the objects of a kind, those with simpler words first.
+    """Yield phrases for where an object stands, each with the rule by which it singles one out.
 
-    Boxes and tapes stand in pairs, one on each side of the robot; only their sides are used.
+    The rule ranks the objects of the kind, for example from left to right. Simpler words come
+    first. Boxes and tapes stand in pairs, one on each side of the robot; only their sides are used.
     """
     candidates = candidates_in(scene, kind)
     if kind in PAIRED:
         yield from _sides(candidates, frame)
         return
     ends = [*_extremes(candidates, frame), *_corners(candidates, frame)]
-    ranked = list(_ranks(candidates, frame))
+    ranked = list(_in_rows(candidates, frame))
     yield from ends
     yield from _far_sides(candidates, frame)
     yield from ranked
-    yield from _fixtures(scene, candidates)
-    yield from _other_colors(candidates)
-    yield from _chains(kind, candidates, ends)
-    yield from _chains(kind, candidates, ranked)
-    yield from _chains(kind, candidates, ends, rank=1)
-    yield from _chains(kind, candidates, ends, rank=2)
-    yield from _ranks(candidates, frame, FOURTH)
+    yield from _by_fixtures(scene, candidates)
+    yield from _by_colors(candidates)
+    yield from _by_neighbors(kind, candidates, ends)
+    yield from _by_neighbors(kind, candidates, ranked)
+    yield from _by_neighbors(kind, candidates, ends, rank=1)
+    yield from _by_neighbors(kind, candidates, ends, rank=2)
+    yield from _in_rows(candidates, frame, FOURTH)
 
 
 def candidates_in(scene: Scene, kind: ObjectKind) -> tuple[SceneObject, ...]:
-    """Return the visible candidates: all objects of a kind, without cubes that arrive later."""
+    """Return the objects of a kind that stand in the scene from the start.
+
+    Cubes that are away at the start and arrive later are left out.
+    """
     if kind != "cube":
         return scene.of_kind(kind)
-    late = {motion.subject for motion in scene.motions_of(Away) if motion.start == 0}
-    return tuple(cube for cube in scene.of_kind("cube") if cube.name not in late)
+    arriving_later = {motion.subject for motion in scene.motions_of(Away) if motion.start == 0}
+    return tuple(cube for cube in scene.of_kind("cube") if cube.name not in arriving_later)
 
 
 def things_of_color(scene: Scene, kind: ObjectKind, color: str) -> tuple[SceneObject, ...]:
-    """Return the things by which a color can be reached: the red cube, or the container over it.
+    """Return the things to handle for a color: open ones, or the containers over hidden ones.
 
-    A hidden cube stands for itself if `kind` is the kind of hidden cubes.
+    For ``red``: the red cube, or the container over it. A hidden cube stands for itself if `kind`
+    is the kind of hidden cubes.
     """
     found: list[SceneObject] = []
     for item in scene.objects:
@@ -183,21 +189,25 @@ class Direction(NamedTuple):
 
 
 def directions(frame: Frame) -> tuple[Direction, ...]:
-    """Return left, right, near and far of a frame, in this order."""
+    """Return the words and the order of things for left, right, near and far, in this sequence.
+
+    In the frame ``robot``, left and right are the robot's, by y in meters; in ``camera``, they are
+    those of the front camera's picture, by its columns.
+    """
     if frame == "robot":
         robot = "you"
-        owner = "your"
+        whose = "your"
         left = Ranking(lambda item: item.position.y)
     else:
         robot = "the robot"
-        owner = "the camera's"
+        whose = "the camera's"
         left = Ranking(lambda item: -_column(item), COLUMN_MARGIN)
     far = Ranking(lambda item: item.position.x)
     closest = f"closest to {robot}"
     farthest = f"farthest from {robot}"
     return (
-        Direction(f"farthest to {owner} left", f"from {owner} left", left, "left"),
-        Direction(f"farthest to {owner} right", f"from {owner} right", left.opposite, "right"),
+        Direction(f"farthest to {whose} left", f"from {whose} left", left, "left"),
+        Direction(f"farthest to {whose} right", f"from {whose} right", left.opposite, "right"),
         Direction(closest, closest, far.opposite),
         Direction(farthest, farthest, far),
     )
@@ -242,7 +252,11 @@ def corner_rankings(depth: str, side: str) -> tuple[Ranking, ...]:
 
 
 def _far_sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    """Yield *at your far right*, where the side and the far corner mean the same object."""
+    """Yield *at your far left* and *at your far right*, only in the robot's frame.
+
+    People may mean the first thing from that side or the one nearest to the far corner, so a thing
+    counts only if it is both.
+    """
     if frame != "robot":
         return
     for direction in sideways(frame):
@@ -252,30 +266,32 @@ def _far_sides(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Se
 
 
 def _corners(candidates: tuple[SceneObject, ...], frame: Frame) -> Iterator[Selector]:
-    """Yield the nearest to each corner: *closest to your near left corner*.
+    """Yield the words for the thing nearest to each corner: *closest to your near left corner*.
 
-    The camera faces the robot, so its left corners are on the robot's right.
+    The camera faces the robot, so what is left in its picture is on the robot's right
+    (`robot_side`).
     """
-    reaches = {"near": "near", "far": "far from"}
-    for side, mirrored in (("left", "right"), ("right", "left")):
-        for depth, reach in reaches.items():
+    depth_words = {"near": "near", "far": "far from"}
+    for side, robot_side in (("left", "right"), ("right", "left")):
+        for depth, depth_word in depth_words.items():
             if frame == "robot":
                 phrase = f"closest to your {depth} {side} corner"
                 rankings = corner_rankings(depth, side)
             else:
-                phrase = f"closest to the camera's {side} corner {reach} the robot"
-                rankings = corner_rankings(depth, mirrored)
+                phrase = f"closest to the camera's {side} corner {depth_word} the robot"
+                rankings = corner_rankings(depth, robot_side)
             yield Selector(Landmark(phrase, is_sided=True), rankings, candidates)
 
 
-def _ranks(
+def _in_rows(
     candidates: tuple[SceneObject, ...],
     frame: Frame,
     ordinals: Mapping[int, str] = ORDINALS,
 ) -> Iterator[Selector]:
-    """Yield those in a row: *second from your left*.
+    """Yield the words for things in a row, counted from an end: *second from your left*.
 
-    `ordinals` has the words by rank, 1 for *second*. The last one in a row is left out.
+    `ordinals` has the words by rank, 1 for *second*. The last thing in a row gets none, since it is
+    the first from the other end.
     """
     for rank, ordinal in ordinals.items():
         # The last one in a row is the extreme of the other end.
@@ -295,7 +311,7 @@ def fixtures_in(scene: Scene) -> list[SceneObject]:
     return [of_kind[0] for of_kind in of_kinds if len(of_kind) == 1]
 
 
-def _fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Selector]:
+def _by_fixtures(scene: Scene, candidates: tuple[SceneObject, ...]) -> Iterator[Selector]:
     """Yield the nearest to a fixture and the farthest from it: *closest to the button*."""
     for fixture in fixtures_in(scene):
         near = nearness(fixture.position)
@@ -311,20 +327,22 @@ def alone_in_color(things: Sequence[SceneObject]) -> list[SceneObject]:
     return [thing for thing in things if thing.color and colors.count(thing.color) == 1]
 
 
-def _other_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
+def _by_colors(candidates: Sequence[SceneObject]) -> Iterator[Selector]:
     """Yield the nearest to the only cube of a color: *closest to the red cube*."""
     for anchor in alone_in_color(candidates):
         landmark = Landmark(f"closest to the {anchor.color} cube")
         yield Selector(landmark, (nearness(anchor.position),), _without(candidates, anchor))
 
 
-def _chains(
+def _by_neighbors(
     kind: str,
     candidates: Sequence[SceneObject],
     anchors: Sequence[Selector],
     rank: int = 0,
 ) -> Iterator[Selector]:
-    """Yield the nearest to what another landmark singles out: *nearest to the cube closest to you*.
+    """Yield words by a neighbor that has words of its own: *nearest to the cube closest to you*.
+
+    The neighbor, or anchor, is what another landmark singles out.
 
     Args:
         kind: of the candidates.

@@ -40,8 +40,9 @@ def command_goals(meaning: Meaning, episode: Episode) -> tuple[Goal, ...]:
 def candidate_goals(meaning: Meaning, episode: Episode) -> tuple[Goal, ...]:
     """Return the goals left to a guesser who knows which values were listed, not which is meant.
 
-    After *red or blue; take the latter*, both colors are left. A field that the command settles has
-    its value, one that is picked from a list has any value of the list, and all others are open.
+    After *red or blue; take the latter*, both colors are left. A field whose value the command
+    itself says has that value, one that is picked from a list has any value of the list, and all
+    others are open.
     """
     possible = _values_of(meaning.settled, meaning, episode)
     for field, term in meaning.terms.items():
@@ -70,7 +71,10 @@ def _goals_with(
 
 
 def _can_be_meant(goal: Goal, possible: Mapping[str, Values], meaning: Meaning) -> bool:
-    """Return whether a goal fits what was said.
+    """Return whether a goal of the scene fits what was said.
+
+    It fits if each of its fields, such as ``color`` or ``repeats``, has a value that the words
+    allow, and if singular and plural agree with it.
 
     Args:
         goal: of the scene.
@@ -80,12 +84,12 @@ def _can_be_meant(goal: Goal, possible: Mapping[str, Values], meaning: Meaning) 
     if meaning.goals and goal not in meaning.goals:
         return False
     # Without words about the goal, or with "Put them into the bin", any number of colors fits.
-    has_any_fields = not meaning.terms or ("counts.0" in meaning.terms and not possible)
+    may_have_other_fields = not meaning.terms or ("counts.0" in meaning.terms and not possible)
     for values in _in_every_order(goal):
-        by_field = {value.field: value.value for value in values}
-        if not has_any_fields and by_field.keys() != meaning.terms.keys():
+        value_by_field = {value.field: value.value for value in values}
+        if not may_have_other_fields and value_by_field.keys() != meaning.terms.keys():
             continue  # it asks for two containers, and the words for one
-        if _has_values(by_field, possible) and _agrees(by_field, meaning.agrees):
+        if _has_values(value_by_field, possible) and _agrees(value_by_field, meaning.agrees):
             return True
     return False
 
@@ -95,19 +99,19 @@ def _has_values(by_field: Mapping[str, Value], possible: Mapping[str, Values]) -
     return all(by_field[field] in values for field, values in possible.items())
 
 
-def _agrees(by_field: Mapping[str, Value], agrees: Mapping[str, bool]) -> bool:
-    """Return whether a goal has one or several where the words speak of one or of several.
+def _agrees(value_by_field: Mapping[str, Value], is_singular_by_slot: Mapping[str, bool]) -> bool:
+    """Return whether a goal agrees with the singular or plural of the words about it.
 
     *Once for each take* speaks of several, ``{"repeats": False}``, so a goal of one repeat does not
     fit.
 
     Args:
-        by_field: the values of the goal.
-        agrees: by slot or field, whether the words are in the singular.
+        value_by_field: the values of the goal.
+        is_singular_by_slot: by slot or field, whether the words are in the singular.
     """
-    for slot, is_single in agrees.items():
+    for slot, is_single in is_singular_by_slot.items():
         values: list[Value] = []
-        for field, value in by_field.items():
+        for field, value in value_by_field.items():
             if slot in (field, field.partition(".")[0]):  # "counts.0" is a field of "counts"
                 values.append(value)
         number = agreeing_number(values)  # 0 if the goal does not have the slot
@@ -118,7 +122,10 @@ def _agrees(by_field: Mapping[str, Value], agrees: Mapping[str, bool]) -> bool:
 
 
 def _in_every_order(goal: Goal) -> Iterator[GoalValues]:
-    """Yield the values of a goal, with amounts in every order, which means nothing."""
+    """Yield the values of a goal once for each order of its amounts, which means nothing.
+
+    *2 red and 1 blue* is also yielded as *1 blue and 2 red*. A goal without counts has one order.
+    """
     if "counts" not in dict(goal.slots):
         yield values_of_goal(goal)
         return
@@ -128,10 +135,10 @@ def _in_every_order(goal: Goal) -> Iterator[GoalValues]:
 
 
 def _term_values(term: Term, field: str, episode: Episode) -> Values:
-    """Return the values that a term, which says how a value follows, gives a field.
+    """Return the values that the words allow for a field of the goal, as a term derives them.
 
-    The term ``double`` of 2 gives ``{4}``, ``rank`` 1 of red and blue ``{"red"}``. Empty if it
-    picks no operand.
+    A term is an operation on what was said: ``double`` of 2 gives ``{4}``, ``rank`` 1 of red and
+    blue ``{"red"}``. Empty if it picks nothing of what was said.
     """
     if term.operation == "without":
         return _values_without(term.operands, field, episode)
@@ -139,15 +146,15 @@ def _term_values(term: Term, field: str, episode: Episode) -> Values:
     if operand is None:
         return frozenset()
     if isinstance(operand, int) and term.operation in ("double", "half", "step"):
-        return frozenset([_reckoned(term, operand)])
+        return frozenset([_computed_number(term, operand)])
     return _operand_values(operand, field, episode)
 
 
 def picked_operand(term: Term) -> Operand | None:
-    """Return the only operand that a term picks; None if it picks none or several.
+    """Return the one of a term's operands, the values that were said, that it picks.
 
-    Of the operands red and blue, ``rank`` 1 picks red, ``other`` than rank 1 picks blue, and
-    ``same`` picks both, so None.
+    Of red and blue, ``rank`` 1 picks red, ``other`` than rank 1 picks blue. None if it picks none
+    or several: ``same`` picks both.
     """
     picked: list[Operand] = []
     for position, operand in enumerate(term.operands, start=1):
@@ -165,7 +172,7 @@ def _is_picked(position: int, term: Term) -> bool:
     return True
 
 
-def _reckoned(term: Term, number: int) -> int:
+def _computed_number(term: Term, number: int) -> int:
     """Return the number that follows from another one."""
     if term.operation == "double":
         return 2 * number
@@ -177,7 +184,8 @@ def _reckoned(term: Term, number: int) -> int:
 def _values_without(operands: Sequence[Operand], field: str, episode: Episode) -> Values:
     """Return the values of a field that are left when some values, or things, are set aside.
 
-    In a scene of red, blue and green cubes, *neither red nor blue* leaves ``{"green"}``.
+    In a scene of red, blue and green cubes, *neither red nor blue* leaves ``{"green"}``. Things may
+    be set aside by descriptions, *the one on the left*; then the only thing left gives the value.
     """
     described = [operand for operand in operands if isinstance(operand, Described)]
     if described:
@@ -188,13 +196,16 @@ def _values_without(operands: Sequence[Operand], field: str, episode: Episode) -
     return _possible_values(field, episode).difference(operands)
 
 
-def _values_of_last_thing(aside: Sequence[Described], field: str, episode: Episode) -> Values:
+def _values_of_last_thing(
+    descriptions: Sequence[Described], field: str, episode: Episode
+) -> Values:
     """Return the values of the only thing that is left when the described things are set aside.
 
-    Empty if a description fits nothing, or if several things or none are left.
+    A description is such as *on the left*. Empty if one fits nothing, or if several things or none
+    are left.
     """
     remaining = list(_things_to_point_at(episode))
-    for description in aside:
+    for description in descriptions:
         thing = _described_thing(description, episode)
         if thing is None:
             return frozenset()
@@ -219,7 +230,7 @@ def _listed_values(term: Term, field: str, episode: Episode) -> Values:
 
 
 def _operand_values(operand: Operand, field: str, episode: Episode) -> Values:
-    """Return the values of a field for which an operand stands.
+    """Return the values of a goal's field for which a value or a description that was said stands.
 
     A value stands for itself. A description stands for what it leads to in the scene or the video:
     the cube *on the left* for its color.
@@ -242,19 +253,25 @@ def _values_of_event(described: Described, field: str, episode: Episode) -> Valu
 
 
 def _described_thing(described: Described, episode: Episode) -> SceneObject | None:
-    """Return the only thing in the scene that fits a description; None if there is no such one."""
+    """Return the only thing in the scene that fits a description; None if no single one does.
+
+    The description is a place, *on the left*, or a clue, *the cube in the middle*.
+    """
     task = get_task(episode.task)
     if described.kind == "place":
-        known = things_at(episode.scene, task.things.pointed, described.frame)
-        return known.get(described.phrase)
-    for found in thing_clues(episode.scene, task):
-        if found.clue.words == described.phrase:
-            return found.thing
+        thing_by_place = things_at(episode.scene, task.things.pointed, described.frame)
+        return thing_by_place.get(described.phrase)
+    for thing_clue in thing_clues(episode.scene, task):
+        if thing_clue.clue.words == described.phrase:
+            return thing_clue.thing
     return None
 
 
 def _values_of_thing(thing: SceneObject, field: str, episode: Episode) -> Values:
-    """Return the colors by which a goal can ask for a thing: of a container, those under it."""
+    """Return the colors by which a goal can ask for a thing: ``{"red"}`` for a red cube.
+
+    A container has the colors of what is under it. `field` is the goal's field, ``colors.1``.
+    """
     kind_of_thing = get_task(episode.task).things.pointed
     found: set[Value] = set()
     for color in _possible_values(field, episode):

@@ -11,18 +11,23 @@ from roboirg.language.instruction import Instruction
 from roboirg.language.places import things_at
 from roboirg.tasks import get_task
 
-_SIDES = {"left": "right", "right": "left", "leftmost": "rightmost", "rightmost": "leftmost"}
-_SIDE = re.compile(rf"\b({'|'.join(_SIDES)})\b(?! (?:by|next))")
+_OPPOSITE_SIDE = {
+    "left": "right",
+    "right": "left",
+    "leftmost": "rightmost",
+    "rightmost": "leftmost",
+}
+_SIDE = re.compile(rf"\b({'|'.join(_OPPOSITE_SIDE)})\b(?! (?:by|next))")
 """A word for a side; *right by the button* is none."""
 
 
 def exchange_sides(words: str) -> str:
     """Return words with left and right exchanged: *on the left* becomes *on the right*."""
-    return _SIDE.sub(lambda found: _SIDES[found[0]], words)
+    return _SIDE.sub(lambda found: _OPPOSITE_SIDE[found[0]], words)
 
 
 def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str, frozenset[str]]:
-    """Return the objects that an instruction's place means with left and right exchanged.
+    """Return which objects the instruction would mean to a listener who takes left for right.
 
     Where the goal counts cubes, a place only gives their color, so all cubes of a color stand for
     one another. No object is given that the instruction means as well.
@@ -42,10 +47,10 @@ def mirrored_objects(episode: Episode, instruction: Instruction) -> Mapping[str,
     if meant is None or exchanged is None:
         return {}
     meant_names = _exchangeable(episode, meant)
-    mirrored = _exchangeable(episode, exchanged) - meant_names
-    if not mirrored:
+    mirrored_names = _exchangeable(episode, exchanged) - meant_names
+    if not mirrored_names:
         return {}
-    return dict.fromkeys(meant_names, mirrored)
+    return dict.fromkeys(meant_names, mirrored_names)
 
 
 def _exchangeable(episode: Episode, thing: SceneObject) -> frozenset[str]:

@@ -17,10 +17,11 @@ ADVERBS = {1: "once", 2: "twice"}
 
 
 def agreeing_number(values: Sequence[str | int]) -> int:
-    """Return the number with which words agree: the only number, or else how many values there are.
+    """Return the number that decides between singular and plural words for some values.
 
-    ``[3]`` gives 3, ``["red"]`` 1 and ``["red", "blue"]`` 2. Moments choose between two wordings as
-    well: the first one gives 1, the second one 2.
+    A single number is itself, ``[3]`` -> 3; other values are counted, ``["red"]`` -> 1 and
+    ``["red", "blue"]`` -> 2. Moments also choose between two wordings: the first one gives 1, the
+    second one 2.
     """
     if len(values) != 1:
         return len(values)

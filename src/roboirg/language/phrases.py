@@ -58,35 +58,38 @@ def anaphor(text: str, expression: Expression, slot: str, value: str | int) -> P
 
 
 def fill(template: str, fields: Mapping[str, Phrase]) -> Phrase:
-    """Fill the fields of a sentence with phrases.
+    """Return a sentence whose fields in braces are replaced by phrases, words with their tags.
 
     ``"Lift the {color} cube."`` with *red* for ``color`` becomes the pieces *Lift the*, *red* and
-    *cube.*; *red* keeps its tag.
+    *cube.*; *red* keeps its tag, which says what it stands for.
     """
     pieces: list[TaggedText] = []
-    end = 0
+    template_position = 0
     for field in _FIELD.finditer(template):
-        pieces.append(TaggedText(template[end : field.start()]))
+        pieces.append(TaggedText(template[template_position : field.start()]))
         pieces.extend(fields[field["name"]])
-        end = field.end()
-    pieces.append(TaggedText(template[end:]))
+        template_position = field.end()
+    pieces.append(TaggedText(template[template_position:]))
     return tuple(piece for piece in pieces if piece.text)
 
 
 def swap_particles(phrase: Phrase) -> Phrase:
-    """Move a pronoun between a verb and its particle: ``pick up it`` becomes ``pick it up``."""
+    """Move a pronoun between a verb and its particle: ``pick up it`` becomes ``pick it up``.
+
+    Only a pronoun with a tag, a mention of a value, is moved; the phrase keeps all its other words.
+    """
     pieces = list(phrase)
     # From the end, so that a change moves no piece that is still to be looked at.
     for position in range(len(pieces) - 1, 0, -1):
-        before = pieces[position - 1]
+        piece_before = pieces[position - 1]
         pronoun = pieces[position]
-        if before.tag is not None or pronoun.tag is None or pronoun.text not in _PRONOUNS:
+        if piece_before.tag is not None or pronoun.tag is None or pronoun.text not in _PRONOUNS:
             continue
-        particle = _PARTICLE.search(before.text)
+        particle = _PARTICLE.search(piece_before.text)
         if particle is not None:
-            verb = TaggedText(before.text[: particle.start()])
-            after = TaggedText(f" {particle[0].strip()}")
-            pieces[position - 1 : position + 1] = [verb, pronoun, after]
+            verb = TaggedText(piece_before.text[: particle.start()])
+            particle_after = TaggedText(f" {particle[0].strip()}")
+            pieces[position - 1 : position + 1] = [verb, pronoun, particle_after]
     return tuple(pieces)
 
 
@@ -120,10 +123,10 @@ def words_of(phrase: Phrase) -> str:
 
 
 def speak(index: int, stage: UtteranceStage, phrase: Phrase, *, capitalize: bool = True) -> Spoken:
-    """Turn a phrase into an utterance, and each of its tags into a mention with its place there.
+    """Return a phrase as an utterance, with the words that have tags as mentions.
 
-    `index` is the number of the utterance in the instruction. Of *Lift it*, in which *it* has a
-    tag, the mention starts at character 5 and ends at 7.
+    A mention has its first and last characters in the utterance. Of *Lift it*, in which *it* has a
+    tag, it starts at 5 and ends at 7. `index` is the number of the utterance in the instruction.
     """
     mentions: list[Mention] = []
     start = 0

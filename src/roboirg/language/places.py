@@ -91,10 +91,11 @@ class SpokenPlace(NamedTuple):
 # Cached: all forms of an episode ask for the same.
 @lru_cache(maxsize=64)
 def spoken_places(scene: Scene, kind: ObjectKind, frame: Frame) -> tuple[SpokenPlace, ...]:
-    """Return all places of the things of a kind, from the best class to the last.
+    """Return all words for where things of a kind stand, each with its thing, best words first.
 
     Things are where the scene has them, at the start; what moves later is named by where it
-    started. Cubes that arrive later are no things yet.
+    started. Cubes that arrive later are left out. If there is only one thing, only words for where
+    something happens are returned (*on the left*), since it needs no telling apart.
     """
     things = candidates_in(scene, kind)
     places: list[SpokenPlace] = []
@@ -107,14 +108,18 @@ def spoken_places(scene: Scene, kind: ObjectKind, frame: Frame) -> tuple[SpokenP
 
 
 def _landmarks(scene: Scene, kind: ObjectKind, frame: Frame) -> Iterator[SpokenPlace]:
-    """Yield what landmarks single out, as unusual places; of a pair, the sides are spots, too."""
+    """Yield the words of `landmarks` as places of the last class, which people hardly say.
+
+    Words by depth, *closest to you*, are left out, as they may be wrong by distance. Boxes and
+    tapes come in pairs, and the words for their sides also say where something happens.
+    """
     is_paired = kind in PAIRED
     for selector in selectors(scene, kind, frame):
         landmark = selector.landmark
         if landmark.is_in_depth:
             continue  # it may be wrong by distance
         spot = landmark.phrase if is_paired else None
-        yield from _said(PlaceClass.UNUSUAL, selector.select(), landmark.phrase, spot)
+        yield from _place_if_any(PlaceClass.UNUSUAL, selector.select(), landmark.phrase, spot)
 
 
 def _places_of(scene: Scene, things: Things, frame: Frame) -> Iterator[SpokenPlace]:
@@ -132,7 +137,7 @@ def _places_of(scene: Scene, things: Things, frame: Frame) -> Iterator[SpokenPla
 def things_at(
     scene: Scene, kind: ObjectKind, frame: Frame
 ) -> Mapping[str | None, SceneObject | None]:
-    """Return the thing that each phrase for a place singles out; None if that is unclear.
+    """Return the thing that each phrase for a place singles out; None where that is unclear.
 
     ``{"on the left": <a cube>, "in the middle": <another>}``
     """
@@ -145,7 +150,7 @@ def things_at(
     return found
 
 
-def _said(
+def _place_if_any(
     kind: PlaceClass, thing: SceneObject | None, attributive: str | None, spot: str | None = None
 ) -> Iterator[SpokenPlace]:
     """Yield a place if something stands there, and if there are words for it."""
@@ -153,15 +158,16 @@ def _said(
         yield SpokenPlace(kind, thing, attributive, spot)
 
 
-def _only(things: Things, ranking: Ranking, start: float) -> SceneObject | None:
-    """Return the only thing whose quantity is at least `start`; None if there are none or several.
+def _only_beyond(things: Things, ranking: Ranking, start: float) -> SceneObject | None:
+    """Return the only thing whose quantity is at least `start`; None if none or several are.
 
-    None also if another thing comes closer to `start` than the margin. With distances past the
-    center as the quantity and 0.06 as `start`: the only thing that is clearly on the left.
+    None also if another thing comes closer to `start` than the margin. With the distance to the
+    left of the center as the quantity and 0.06 m as `start`: the only thing that is clearly on the
+    left.
     """
     # Things beyond the start count as equal, so that two of them are no clear first one.
-    capped = ranking._replace(quantity=lambda thing: min(ranking.quantity(thing), start))
-    thing = capped.select(things, 0)
+    capped_ranking = ranking._replace(quantity=lambda thing: min(ranking.quantity(thing), start))
+    thing = capped_ranking.select(things, 0)
     if thing is None or ranking.quantity(thing) < start:
         return None
     return thing
@@ -169,19 +175,19 @@ def _only(things: Things, ranking: Ranking, start: float) -> SceneObject | None:
 
 _CENTER = SceneObject("center", "site", Point(-0.05, 0.0, 0.0))
 """The center of the work area."""
-_CLEARLY = 2
+_CLEAR_MARGINS = 2
 """Margins from the center from which a thing is clearly in a direction."""
-_AROUND = 0.09
+_MIDDLE_RADIUS = 0.09
 """Meters from the center up to which a thing is in the middle."""
-_IN_QUARTER = 0.06
+_QUARTER_DISTANCE = 0.06
 """Meters in both directions from the center from which a thing is at the back left, and so on."""
-_IN_CORNER = 0.1
+_CORNER_DISTANCE = 0.1
 """The same from which it is in the back left corner."""
-_FAR = 3
+_FAR_MARGINS = 3
 """Margins from the center from which a thing is on the far side."""
-_FAR_ALONE = 5
+_FAR_MARGINS_ALONE = 5
 """The same for the only thing there is."""
-_DETOUR = 0.03
+_MAX_DETOUR = 0.03
 """Meters that the way from one thing to another is longer over a third one between them."""
 
 
@@ -193,14 +199,18 @@ def _center_of(things: Things) -> SceneObject:
     return replace(_CENTER, position=Point((min(depths) + max(depths)) / 2, 0.0, 0.0))
 
 
-def _past(center: SceneObject, ranking: Ranking) -> Ranking:
+def _distance_past(center: SceneObject, ranking: Ranking) -> Ranking:
     """Return the order of things by how far they are past a center."""
     start = ranking.quantity(center)
     return ranking._replace(quantity=lambda thing: ranking.quantity(thing) - start)
 
 
 def _is_past_work_center(thing: SceneObject | None, *rankings: Ranking) -> bool:
-    """Return whether a thing is a margin past the work area's center in all of some directions."""
+    """Return whether a thing is clearly past the work area's center in each of some directions.
+
+    Clearly is by `MARGIN`, 3 cm. A ranking measures how far things are in its direction. None, no
+    thing, is not past it.
+    """
     if thing is None:
         return False
     for ranking in rankings:
@@ -255,20 +265,23 @@ _WORDS: Mapping[Frame, tuple[_Words, ...]] = {
 
 
 def _in_directions(things: Things, frame: Frame) -> Iterator[SpokenPlace]:
-    """Yield the places in each direction: left, right, near and far."""
-    left, right, near, far = _WORDS[frame]
+    """Yield the words for things far to the left, right, front and back, with their things.
+
+    The frame says whose left and right: the robot's, or that of the front camera's picture.
+    """
+    left_words, right_words, near_words, far_words = _WORDS[frame]
     to_left, to_right, in_front, behind = directions(frame)
-    yield from _in_direction(things, left, to_left.ranking)
-    yield from _in_direction(things, right, to_right.ranking)
+    yield from _in_direction(things, left_words, to_left.ranking)
+    yield from _in_direction(things, right_words, to_right.ranking)
     closeness = nearness(ROBOT_BASE)
-    yield from _in_depth(things, near, in_front.ranking, closeness)
-    yield from _in_depth(things, far, behind.ranking, closeness.opposite)
+    yield from _in_depth(things, near_words, in_front.ranking, closeness)
+    yield from _in_depth(things, far_words, behind.ranking, closeness.opposite)
 
 
 def _in_depth(
     things: Things, words: _Words, by_depth: Ranking, by_distance: Ranking
 ) -> Iterator[SpokenPlace]:
-    """Yield the places that are right in depth and by distance from the robot.
+    """Yield words for near or far things that are right by depth and by distance from the robot.
 
     What stands aside is farther away than it is deep, and people may mean either.
     """
@@ -279,32 +292,32 @@ def _in_depth(
 
 
 def _in_direction(things: Things, words: _Words, ranking: Ranking) -> Iterator[SpokenPlace]:
-    """Yield the places in one direction, here the left.
+    """Yield words in one direction, here the left, each with the thing that it singles out.
 
     They are the first one, *all the way on the left*; one that is far ahead, *on the far left*; the
     only one there, *on the left*; and those after the first, *second from the left*.
     """
-    yield from _said(PlaceClass.EXTREME, ranking.select(things, 0), words.most)
+    yield from _place_if_any(PlaceClass.EXTREME, ranking.select(things, 0), words.most)
 
     # The first one is "on the far left" if it is well ahead of all others, and far from the center.
-    clear = ranking._replace(margin=_CLEARLY * ranking.margin)
-    past_center = _past(_center_of(things), ranking)
-    ahead = clear.select(things, 0)
-    margins = _FAR if len(things) > 1 else _FAR_ALONE
-    if ahead is not None and past_center.quantity(ahead) >= ranking.margin * margins:
-        yield from _said(PlaceClass.EXTREME, ahead, None, words.far)
+    wide_ranking = ranking._replace(margin=_CLEAR_MARGINS * ranking.margin)
+    past_center = _distance_past(_center_of(things), ranking)
+    thing_ahead = wide_ranking.select(things, 0)
+    margins = _FAR_MARGINS if len(things) > 1 else _FAR_MARGINS_ALONE
+    if thing_ahead is not None and past_center.quantity(thing_ahead) >= ranking.margin * margins:
+        yield from _place_if_any(PlaceClass.EXTREME, thing_ahead, None, words.far)
 
     # The only one past the center is simply "on the left".
-    alone = _only(things, past_center, clear.margin)
-    if _is_past_work_center(alone, ranking):
-        yield from _said(PlaceClass.EXTREME, alone, words.alone, words.spot)
+    thing_alone = _only_beyond(things, past_center, wide_ranking.margin)
+    if _is_past_work_center(thing_alone, ranking):
+        yield from _place_if_any(PlaceClass.EXTREME, thing_alone, words.alone, words.spot)
 
     if words.row is not None:
         yield from _in_row(things, words, ranking)
 
 
 def _in_row(things: Things, words: _Words, ranking: Ranking) -> Iterator[SpokenPlace]:
-    """Yield those after the first in a direction: *second from the left*.
+    """Yield words for the things after the first one in a direction: *second from the left*.
 
     The last one gets no such words, since it is the first from the other end.
     """
@@ -314,16 +327,22 @@ def _in_row(things: Things, words: _Words, ranking: Ranking) -> Iterator[SpokenP
         kind = PlaceClass.RANK
         if rank > 1 and words.row == words.most:
             kind = PlaceClass.UNUSUAL  # no one says "third closest"
-        yield from _said(kind, ranking.select(things, rank), f"{ordinal} {words.row}")
+        yield from _place_if_any(kind, ranking.select(things, rank), f"{ordinal} {words.row}")
 
 
 def _near_others(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
-    """Yield what is near a fixture or the only cube of a color, or farthest from a fixture."""
+    """Yield words by another thing: *next to the button*, *nearest to the red cube*.
+
+    The others are fixtures (button, target or bin, if there is one only) and cubes that are alone
+    in their color. A fixture also gives *farthest from the button*.
+    """
     for fixture in fixtures_in(scene):
         name = f"the {fixture.kind}"
         yield from _near(fixture, name, things, PlaceClass.FIXTURE)
         farness = nearness(fixture.position).opposite
-        yield from _said(PlaceClass.FIXTURE, farness.select(things, 0), f"farthest from {name}")
+        yield from _place_if_any(
+            PlaceClass.FIXTURE, farness.select(things, 0), f"farthest from {name}"
+        )
     for cube in alone_in_color(things):
         others = [thing for thing in things if thing is not cube]
         if len(others) > 1:  # else only one thing could be meant
@@ -333,7 +352,10 @@ def _near_others(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
 def _near(
     anchor: SceneObject, name: str, things: Things, kind: PlaceClass
 ) -> Iterator[SpokenPlace]:
-    """Yield what is nearest to an anchor, a fixture or a cube, and what is right next to it.
+    """Yield *nearest to the button* and *next to the button*, for the things that are so.
+
+    The anchor is what the words name, here the button. *Next to* is within a few centimeters
+    (`BESIDE`) of touching it.
 
     Args:
         anchor: near which things are looked for.
@@ -341,15 +363,17 @@ def _near(
         things: that may be near it.
         kind: class of the places.
     """
-    by_nearness = nearness(anchor.position)
-    yield from _said(kind, by_nearness.select(things, 0), f"nearest to {name}")
+    nearness_to_anchor = nearness(anchor.position)
+    yield from _place_if_any(kind, nearness_to_anchor.select(things, 0), f"nearest to {name}")
 
     reach = anchor.half_width + things[0].half_width + BESIDE
-    neighbor = _only(things, by_nearness, -reach)  # the quantity is the distance with a minus sign
+    neighbor = _only_beyond(
+        things, nearness_to_anchor, -reach
+    )  # the quantity is the distance with a minus sign
     spot = None
     if kind == PlaceClass.FIXTURE:
         spot = f"right by {name}"
-    yield from _said(kind, neighbor, f"next to {name}", spot)
+    yield from _place_if_any(kind, neighbor, f"next to {name}", spot)
 
 
 def _between(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
@@ -357,8 +381,8 @@ def _between(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
     for first, second in itertools.combinations(fixtures_in(scene), 2):
         words = f"between the {first.kind} and the {second.kind}"
         shortest = nearness(first.position).quantity(second)
-        thing = _only(things, _way_between(first, second), shortest - _DETOUR)
-        yield from _said(PlaceClass.BETWEEN, thing, words, words)
+        thing = _only_beyond(things, _way_between(first, second), shortest - _MAX_DETOUR)
+        yield from _place_if_any(PlaceClass.BETWEEN, thing, words, words)
 
 
 def _way_between(first: SceneObject, second: SceneObject) -> Ranking:
@@ -375,13 +399,15 @@ def _in_middle(things: Things) -> Iterator[SpokenPlace]:
     may mean either. Of an even number of things, it must be the only one around the center; of an
     odd number, it must be the middle one from left to right.
     """
-    in_area = nearness(_CENTER.position)
-    among_things = nearness(_center_of(things).position)
-    nearest = agreed([in_area.select(things, 0), among_things.select(things, 0)])
+    nearness_to_area_center = nearness(_CENTER.position)
+    nearness_to_their_center = nearness(_center_of(things).position)
+    nearest = agreed(
+        [nearness_to_area_center.select(things, 0), nearness_to_their_center.select(things, 0)]
+    )
     if nearest is None:
         return
     words = "in the middle"
-    is_around = nearest is _only(things, among_things, -_AROUND)
+    is_around = nearest is _only_beyond(things, nearness_to_their_center, -_MIDDLE_RADIUS)
     spot = words if is_around else None
     is_meant = is_around
     if len(things) % 2 == 1:
@@ -412,17 +438,20 @@ class _Corner(NamedTuple):
         """Return the thing that is clearly the nearest to the corner; None if there is none."""
         found: list[SceneObject | None] = []
         for ranking in corner_rankings(self.depth, self.side):
-            clear = ranking._replace(margin=_CLEARLY * MARGIN)
+            clear = ranking._replace(margin=_CLEAR_MARGINS * MARGIN)
             found.append(clear.select(things, 0))
         return agreed(found)
 
     def quarter(self, center: SceneObject) -> Ranking:
         """Return the order of things by how far they are in the corner's quarter of the table."""
-        return _both(_past(center, self.along), _past(center, self.across))
+        return _lesser_of(_distance_past(center, self.along), _distance_past(center, self.across))
 
 
 def _corners(things: Things) -> Iterator[SpokenPlace]:
-    """Yield the thing nearest to each corner, and where it is if no other one is near there."""
+    """Yield words for the thing nearest to each of the four corners of the table, with the thing.
+
+    Front and left are the robot's: *nearest to the front left corner*.
+    """
     left, right, near, far = (direction.ranking for direction in directions("robot"))
     corners = (
         _Corner("near", "left", "front left", near, left),
@@ -435,7 +464,7 @@ def _corners(things: Things) -> Iterator[SpokenPlace]:
 
 
 def _at_corner(things: Things, corner: _Corner) -> Iterator[SpokenPlace]:
-    """Yield the words for the thing nearest to a corner, if one is clearly the nearest.
+    """Yield words for the thing nearest to a corner, if one is clearly the nearest.
 
     Alone in that quarter of the table, it is *at the back left*, and close enough to the corner
     also *in the back left corner*. Else it is *nearest to the back left corner*.
@@ -444,35 +473,39 @@ def _at_corner(things: Things, corner: _Corner) -> Iterator[SpokenPlace]:
     if nearest is None:
         return
     quarter = corner.quarter(_center_of(things))
-    is_alone = nearest is _only(things, quarter, _IN_QUARTER)
+    is_alone = nearest is _only_beyond(things, quarter, _QUARTER_DISTANCE)
     if not is_alone or not _is_past_work_center(nearest, corner.along, corner.across):
         yield SpokenPlace(PlaceClass.NEAR_CORNER, nearest, f"nearest to the {corner.name} corner")
         return
     there = f"at the {corner.name}"
     yield SpokenPlace(PlaceClass.CORNER, nearest, there, there)
-    if quarter.quantity(nearest) >= _IN_CORNER:
+    if quarter.quantity(nearest) >= _CORNER_DISTANCE:
         words = f"in the {corner.name} corner"
         # One thing alone on the table stands in no corner.
         spot = words if len(things) > 1 else None
         yield SpokenPlace(PlaceClass.CORNER, nearest, words, spot)
 
 
-def _both(along: Ranking, across: Ranking) -> Ranking:
+def _lesser_of(along: Ranking, across: Ranking) -> Ranking:
     """Return the order of things by the lesser of two quantities: how far they are past both."""
 
     def lesser(thing: SceneObject) -> float:
         return min(along.quantity(thing), across.quantity(thing))
 
     # What is hardly outside of a quarter may still pass for being in it.
-    return Ranking(lesser, _CLEARLY * MARGIN)
+    return Ranking(lesser, _CLEAR_MARGINS * MARGIN)
 
 
 def _on_sides(things: Things, scene: Scene) -> Iterator[SpokenPlace]:
-    """Yield the only thing left or right of a fixture, unless it is rather behind or before it."""
+    """Yield *to the left of the button* for the only thing on that side of a fixture.
+
+    Fixtures are the button, target and bin. A thing that is rather behind or in front of the
+    fixture than aside of it gets no words.
+    """
     for fixture in fixtures_in(scene):
         for direction in sideways("robot"):
             order = direction.ranking
-            thing = _only(things, order, order.quantity(fixture))
+            thing = _only_beyond(things, order, order.quantity(fixture))
             if thing and _is_sideways(thing, fixture):
                 words = f"to the {direction.side} of the {fixture.kind}"
                 yield SpokenPlace(PlaceClass.SIDE_OF_FIXTURE, thing, words)

@@ -134,7 +134,10 @@ class InstructionRequest:
 
     @property
     def shows_color(self) -> bool:
-        """Whether the video shows the robot handle a thing of the goal's color, and no other."""
+        """Whether the video gives the goal's color away.
+
+        It does if the robot handles things of this one color in it, and of no other.
+        """
         scene = self.episode.scene
         colored = self.task.things.colored
         handled_names = {fact.subject for fact in scene.past}
@@ -183,9 +186,10 @@ class InstructionSpec:
 # Cached: all settings and forms of an episode ask for the same.
 @functools.lru_cache(maxsize=256)
 def values_of_goal(goal: Goal) -> GoalValues:
-    """Return the values of a goal with their fields, in the order of its slots.
+    """Return the values of a goal one by one, each with its slot, its field and its type.
 
-    A goal of the colors red and blue gives red in ``colors.0`` and blue in ``colors.1``.
+    A goal with the slot ``colors`` of red and blue gives red in the field ``colors.0`` and blue in
+    ``colors.1``. Colors that have counts are of the type ``amount``.
     """
     found: list[GoalValue] = []
     has_counts = "counts" in dict(goal.slots)
@@ -215,7 +219,7 @@ def _without_slot(goal: Goal, slot: str) -> dict[str, SlotValue]:
 
 @functools.lru_cache(maxsize=64)
 def _scene_colors(task: str, scene: Scene) -> tuple[str, ...]:
-    """Return the colors that goals of a scene can have, in the order of the task's vocabulary."""
+    """Return all colors in goals of a scene, in the order of the task's vocabulary."""
     found: set[str | int] = set()
     for goal in get_task(task).goals(scene):
         for slot, content in goal.slots:

@@ -30,7 +30,7 @@ from roboirg.tasks.splits.splits import split_episodes
 REFERENCE_SPLIT: Split = "train"
 """Its goals show which numbers are usual for a difficulty, and its partners how often each rival
 goes with a value, for episodes outside the splits."""
-_AMOUNT_FIELDS = 2
+_FIELDS_OF_ONE_AMOUNT = 2
 """A goal that counts cubes of one color has two fields: the color and its count."""
 NUMBER_SLOTS = ("repeats", "counts", "visit", "placement")
 
@@ -62,33 +62,36 @@ def pair_refusal(request: InstructionRequest) -> str | None:
     """Return why an episode can have no rival; None if it can."""
     if rival_pairs(request):
         return None
-    if len(request.values_of("amount")) > _AMOUNT_FIELDS:
+    if len(request.values_of("amount")) > _FIELDS_OF_ONE_AMOUNT:
         return "a goal that counts cubes of several colors leaves no rival"
     return "the scene has no second value that the goal could ask for"
 
 
 def rival_pairs(request: InstructionRequest) -> list[ValuePair]:
-    """Draw one of the slots that can have a rival, and return all pairs of its value.
+    """Return the goal's value in one slot, with each other value that words may name next to it.
 
-    A color that the video gives away has none: its words would tell nothing.
+    The other value is a rival: *red or blue?* where red is meant. Of several slots that can have
+    rivals one is drawn. A color that the video gives away has none, as the choice would be no
+    choice.
     """
-    found: dict[str, list[ValuePair]] = {}
+    pairs_by_slot: dict[str, list[ValuePair]] = {}
     for pair in possible_pairs(request):
         is_given_away = pair.slot in COLOR_SLOTS and request.shows_color
         if not is_given_away:
-            found.setdefault(pair.slot, []).append(pair)
-    if not found:
+            pairs_by_slot.setdefault(pair.slot, []).append(pair)
+    if not pairs_by_slot:
         return []
-    return found[request.sampler.pick("rival slot", list(found))]
+    return pairs_by_slot[request.sampler.pick("rival slot", list(pairs_by_slot))]
 
 
 def possible_pairs(request: InstructionRequest) -> Iterator[ValuePair]:
-    """Yield a pair, the meant value and a rival, for every other value that the goal could have.
+    """Yield each value of the goal with each other value that it could have instead, its rival.
 
     For the goal *red* in a scene with red and blue cubes: red and its rival blue. Of two colors in
-    order, the rival is the other order: *first red, then blue* or *first blue, then red*.
+    order, the rival is the other order: *first red, then blue* or *first blue, then red*. A goal
+    that counts several colors has none.
     """
-    if len(request.values_of("amount")) > _AMOUNT_FIELDS:
+    if len(request.values_of("amount")) > _FIELDS_OF_ONE_AMOUNT:
         return
     for slot, _ in request.episode.goal.slots:
         meant = request.values_in(slot)
@@ -100,16 +103,16 @@ def possible_pairs(request: InstructionRequest) -> Iterator[ValuePair]:
 
 
 def _other_values(request: InstructionRequest, meant: GoalValue) -> Iterator[str | int]:
-    """Yield every other value that the slot of a single value can have.
+    """Yield every other value that the goal's slot could hold in this scene, instead of its value.
 
-    A number only if other episodes of the same difficulty ask for it.
+    A number is yielded only if goals of the same difficulty ask for it; others would stand out.
     """
-    usual = _usual_numbers(request.task.name, request.episode.difficulty, meant.slot)
-    for content in request.alternatives(meant.slot):
-        if len(content) > 1 or content == (meant.value,):
+    usual_numbers = _usual_numbers(request.task.name, request.episode.difficulty, meant.slot)
+    for values in request.alternatives(meant.slot):
+        if len(values) > 1 or values == (meant.value,):
             continue  # it is no single value, or the one that is meant
-        (value,) = content
-        if meant.slot not in NUMBER_SLOTS or value in usual:
+        (value,) = values
+        if meant.slot not in NUMBER_SLOTS or value in usual_numbers:
             yield value
 
 
@@ -124,13 +127,14 @@ def _has_opposite_order(request: InstructionRequest, slot: str) -> bool:
 def _usual_numbers(task: str, difficulty: Difficulty, slot: str) -> frozenset[str | int]:
     """Return the numbers that goals of a difficulty have in a slot: ``{1, 2, 3}`` repeats.
 
-    Any other number would give itself away as the rival: only hard episodes ask for four or five.
+    They are counted in the training split. Any other number would give itself away as the wrong
+    one: only hard episodes ask for four or five.
     """
-    found: set[str | int] = set()
+    numbers: set[str | int] = set()
     for episode in split_episodes([get_task(task).name], [REFERENCE_SPLIT]):
         if episode.difficulty == difficulty:
-            found.update(values_in(episode.goal[slot]))
-    return frozenset(found)
+            numbers.update(values_in(episode.goal[slot]))
+    return frozenset(numbers)
 
 
 class _SlotValue(NamedTuple):
@@ -173,38 +177,46 @@ def balanced_rival(request: InstructionRequest, pairs: list[ValuePair]) -> Value
 
 
 def _likely_rivals(request: InstructionRequest, meant: GoalValue) -> list[str | int]:
-    """Return the rivals that fit an episode best; empty if there are none.
+    """Return the values that words should name next to the meant one; empty if there are none.
 
-    For an episode of a split that is the value of its partner. For any other episode these are the
-    rivals that the training split pairs with the same value, in episodes of the same difficulty: a
-    rival that goes with the value often is in the list often.
+    Episodes of a split are paired so that the meant value of each is named, as its rival, in the
+    other: that value is returned. Any other episode gets the rivals that training episodes of the
+    same difficulty have with the same value, each as often as there, to be drawn from.
     """
     episode = request.episode
     split = episode.split if episode.split in SPLITS else REFERENCE_SPLIT
-    entries = _entries_in(request.task.name, split)
+    entries = _paired_entries(request.task.name, split)
     entry = entries.get(episode.index)
     if entry is not None and entry.is_of(episode):
-        alike = [entry]
+        like_episode = [entry]
     else:
-        wanted = _SlotValue(meant.slot, meant.value)
-        of_value = [entry for entry in entries.values() if entry.meant == wanted]
-        alike = [entry for entry in of_value if entry.episode.difficulty == episode.difficulty]
-    return [entry.rival for entry in alike if entry.rival is not None]
+        meant_value = _SlotValue(meant.slot, meant.value)
+        with_same_value = [entry for entry in entries.values() if entry.meant == meant_value]
+        like_episode = [
+            entry for entry in with_same_value if entry.episode.difficulty == episode.difficulty
+        ]
+    return [entry.rival for entry in like_episode if entry.rival is not None]
 
 
 @functools.cache
-def _entries_in(task: str, split: Split) -> Mapping[int, _SplitEntry]:
-    """Return the episodes of a split that can have a rival, by index, as partners were found."""
+def _paired_entries(task: str, split: Split) -> Mapping[int, _SplitEntry]:
+    """Return the episodes of a split that can have a rival value, by index, paired with each other.
+
+    The rival of an entry is the meant value of the episode with which it is paired.
+    """
     entries: dict[int, _SplitEntry] = {}
     for episode in split_episodes([task], [split]):
-        entry = _entry_of(episode, get_task(task))
+        entry = _unpaired_entry(episode, get_task(task))
         if entry is not None:
             entries[episode.index] = entry
     return {entry.episode.index: entry for entry in _with_partners(entries)}
 
 
-def _entry_of(episode: Episode, task: Task) -> _SplitEntry | None:
-    """Return an episode with the rivals that it can have; None if it can have none."""
+def _unpaired_entry(episode: Episode, task: Task) -> _SplitEntry | None:
+    """Return an episode with the values that may be named instead of its own; None without any.
+
+    Such a value is a rival. The entry is not paired with another episode yet.
+    """
     request = InstructionRequest(episode, task, InstructionOptions(), sampler_of(episode))
     pairs = rival_pairs(request)
     if not pairs:
@@ -217,20 +229,23 @@ def _entry_of(episode: Episode, task: Task) -> _SplitEntry | None:
 def _with_partners(entries: Mapping[int, _SplitEntry]) -> Iterator[_SplitEntry]:
     """Pair the episodes of a split, and yield each with the value of its partner as its rival.
 
-    If episode 3 means red and its partner, 7, means blue, 3 gets blue and 7 gets red. Partners are
-    found among the values that are left most often, so that few episodes remain without one.
+    If episode 3 means red and its partner, 7, means blue, 3 gets blue and 7 gets red. The most
+    frequent of the values that are left is paired first, so that few episodes remain without a
+    partner; these are yielded without a rival.
     """
     unmatched = dict(entries)
     while unmatched:
         frequency = Counter(entry.meant for entry in unmatched.values())
         # The most frequent value goes first; of its episodes, the one with the lowest index.
-        ranks = {index: (frequency[entry.meant], -index) for index, entry in unmatched.items()}
-        entry = unmatched.pop(max(ranks, key=ranks.__getitem__))
+        priority_by_index = {
+            index: (frequency[entry.meant], -index) for index, entry in unmatched.items()
+        }
+        entry = unmatched.pop(max(priority_by_index, key=priority_by_index.__getitem__))
         partners = [index for index, other in unmatched.items() if entry.is_partner(other)]
         if not partners:
             yield entry
             continue
-        partner = unmatched.pop(max(partners, key=ranks.__getitem__))
+        partner = unmatched.pop(max(partners, key=priority_by_index.__getitem__))
         yield entry._replace(rival=partner.meant.value)
         yield partner._replace(rival=entry.meant.value)
 
@@ -258,15 +273,16 @@ BLOCK = len(_ORDERS)
 
 
 def draw_order(request: InstructionRequest) -> PairOrder:
-    """Draw the order for an episode; each block of four episodes has every one once.
+    """Draw in which order two values are said, and whether the remark points at the meant one.
 
-    With independent draws a split of fifty could favor the value named first by chance.
+    Each block of four episodes has each of the four cases once: with independent draws, a split of
+    fifty could favor the value named first by chance.
     """
     episode = request.episode
-    block, place = divmod(episode.index, BLOCK)
+    block, place_in_block = divmod(episode.index, BLOCK)
     # The block has its own sampler, so that its four episodes share one shuffled row of orders.
     sampler = sampler_for(f"{episode.task}|{episode.split}|{block}")
     shuffled = list(itertools.islice(sampler.cycle("rival order", _ORDERS), BLOCK))
-    order = shuffled[place]
+    order = shuffled[place_in_block]
     request.sampler.log.append(f"rival order/{_ORDERS.index(order)}")
     return order

@@ -35,8 +35,11 @@ def tokens_of(text: str) -> int:
 
 
 def tokens_shown(text: str) -> str:
-    """Return the number of tokens of any text for a user: ``51``; a bound is ``at most 51``."""
-    if split_words(text) <= _pieces().keys():
+    """Return the number of tokens of a text, to be printed: ``51``, or a bound, ``at most 51``.
+
+    It is exact if the table has all its words or the tokenizer is installed.
+    """
+    if split_words(text) <= _tokens_by_word().keys():
         return str(count_tokens(text))  # exact, without loading a tokenizer
     number = str(tokens_of(text))
     if _tokenizer() is None:
@@ -46,7 +49,7 @@ def tokens_shown(text: str) -> str:
 
 @functools.cache
 def _tokenizer() -> Callable[[str], list[int]] | None:
-    """Return the tokenizer with 32,000 pieces; None if it is not installed."""
+    """Return the function that splits text into ids of tokens; None if it is not installed."""
     try:
         from sentencepiece import SentencePieceProcessor
 
@@ -64,7 +67,7 @@ def count_tokens(text: str) -> int:
     that the table lacks counts one token for each character and one for the space before it, the
     most that such a vocabulary can need for English.
     """
-    pieces = _pieces()
+    pieces = _tokens_by_word()
     words: list[str] = _WORD.findall(text)
     return ADDED_TOKENS + sum(pieces.get(word, len(word) + 1) for word in words)
 
@@ -75,10 +78,10 @@ def split_words(text: str) -> frozenset[str]:
 
 
 @functools.cache
-def _pieces() -> Mapping[str, int]:
+def _tokens_by_word() -> Mapping[str, int]:
     """Return the number of tokens of every word and mark of the language: ``{"cube": 2, ".": 1}``.
 
-    The file has the words by their number of tokens, and each spelling of a word.
+    The file has them the other way round: for each number of tokens the words that need so many.
     """
     text = files("roboirg.language").joinpath("token_pieces.json").read_text(encoding="utf-8")
     by_count: dict[str, list[str]] = json.loads(text)

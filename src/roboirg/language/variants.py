@@ -17,16 +17,19 @@ from roboirg.tasks import get_task
 def expressible_options(
     episode: Episode, wordings: str | None = None
 ) -> Iterator[InstructionOptions]:
-    """Yield every setting, form and combination of options that can express an episode."""
+    """Yield all options with which an episode can be instructed: every setting, form and variant.
+
+    A setting that cannot express the episode with some options is left out with these.
+    """
     for name in settings_of(get_task(episode.task)):
-        usual = InstructionOptions(name, wordings=wordings)
-        possible: list[InstructionOptions] = []
+        plain_options = InstructionOptions(name, wordings=wordings)
+        expressible: list[InstructionOptions] = []
         for changes in all_settings()[name].variants:
-            options = replace(usual, **changes)
+            options = replace(plain_options, **changes)
             if find_refusal(episode, options) is None:
-                possible.append(options)
+                expressible.append(options)
         for form in FORMS:
-            for options in possible:
+            for options in expressible:
                 yield replace(options, form=form)
 
 
@@ -36,7 +39,7 @@ def instructions(
     forms: Sequence[str],
     options: InstructionOptions = InstructionOptions(),  # noqa: B008 - immutable
 ) -> Iterator[tuple[Episode, Instruction]]:
-    """Yield the instructions of episodes in every wanted setting and form.
+    """Yield each episode with its instructions in every wanted setting and form.
 
     Leaves out a setting that the task lacks, or that cannot express the episode.
     """

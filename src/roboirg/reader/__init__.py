@@ -24,7 +24,7 @@ from roboirg.tasks import get_task
 
 __all__ = ["Interpretation", "interpret"]
 
-_COUNTING = word_set("time times often many more again each every both half double")
+_COUNTING_WORDS = word_set("time times often many more again each every both half double")
 """Words of a remark that may say how often to do what the command asks for."""
 
 
@@ -46,12 +46,12 @@ class Interpretation(NamedTuple):
 
 
 def interpret(text: str, scene: Scene, task: str) -> Interpretation:
-    """Return all goals of a task that fit a command: the last sentences of a text.
+    """Return all goals of a task that fit a command in plain English: the last sentences of a text.
 
-    It reads commands that state their values: explicit ones, resolved ones of the settings direct,
-    contextual and spatial, and those of other people as far as it knows their words. What comes
-    before the command is not read, so a command that points back at it is refused. What an
-    instruction means by declaration is in `roboirg.language.meaning`.
+    It reads commands that state their values, *Lift the red cube twice*, in our words or in other
+    people's as far as it knows these. What comes before the command is not read, so a command that
+    points back at it is refused. What an instruction means by declaration is in
+    `roboirg.language.meaning`.
 
     Args:
         text: the command, or a whole text that ends with it.
@@ -62,15 +62,15 @@ def interpret(text: str, scene: Scene, task: str) -> Interpretation:
         UnknownNameError: there is no such task.
     """
     goals = _possible_goals(scene, task)
-    split = _split_off_command(split_sentences(text))
-    unread = [reading for reading in split.command if not reading.is_command]
+    split_text = _split_off_command(split_sentences(text))
+    unread = [reading for reading in split_text.command if not reading.is_command]
     acts: list[Act] = []
-    for reading in split.command:
+    for reading in split_text.command:
         acts += reading.acts
     if unread or not _ask_for_something(acts):
-        return _refused(unread)
+        return _without_goals(unread)
     # "Lift it." means once only if nothing before it says how often.
-    is_alone = not any(map(_counts, split.remarks))
+    is_alone = not any(map(_speaks_of_number, split_text.remarks))
     try:
         fitting = fitting_goals(acts, goals, scene, is_alone=is_alone)
     except UnfitWordsError as error:
@@ -88,7 +88,7 @@ def _complaints_about(fitting: Sequence[Goal]) -> tuple[str, ...]:
     if not fitting:
         return ("no goal of the task fits everything that the text says",)
     if len(fitting) > 1:
-        return (_left_open(fitting),)
+        return (_complaint_of_open_slots(fitting),)
     return ()
 
 
@@ -111,14 +111,12 @@ def _possible_goals(scene: Scene, task: str) -> tuple[Goal, ...]:
 
 
 def _split_off_command(sentences: Sequence[Sentence]) -> _SplitText:
-    """Return the last run of sentences that command, and the remarks, which are those before them.
+    """Return a text as its command, the last sentences that ask for acts, and what is before.
 
     *It is late. Lift the red cube. Then press the button. Thank you.* has the command *Lift the red
     cube. Then press the button.* and the remark *It is late.* The sentences are read from the last
-    one.
-
-    A sentence with words that are not read ends the run. It belongs to the command if it is the
-    last one or asks to handle a thing, and counts as a remark as well.
+    one. One with words that no rule reads ends the run. It belongs to the command if it is the last
+    one or asks to handle a thing, and counts as a remark as well.
     """
     command: list[Reading] = []
     for position in range(len(sentences) - 1, -1, -1):
@@ -131,15 +129,15 @@ def _split_off_command(sentences: Sequence[Sentence]) -> _SplitText:
             continue
 
         # This sentence has words that are not read: the command begins after it or in it.
-        before = list(sentences[:position])
+        remarks = list(sentences[:position])
         if not command:
-            lead = _lead_apart(words)
-            after_colon = read_command(lead.command)
-            if lead.remark and after_colon.is_command:
-                return _SplitText([after_colon], [*before, lead.remark])
+            lead_in = _split_at_colon(words)
+            after_colon = read_command(lead_in.command)
+            if lead_in.remark and after_colon.is_command:
+                return _SplitText([after_colon], [*remarks, lead_in.remark])
         if not command or reading.is_like_command:
             command.insert(0, reading)
-        return _SplitText(command, [*before, words])
+        return _SplitText(command, [*remarks, words])
     return _SplitText(command, [])
 
 
@@ -150,16 +148,15 @@ class _LeadIn(NamedTuple):
     command: Sentence
 
 
-def _lead_apart(words: Sentence) -> _LeadIn:
-    """Return the words before a sentence's last colon, a remark, and the command after it.
+def _split_at_colon(words: Sentence) -> _LeadIn:
+    """Return a sentence as the words before its last colon, a remark, and the command after it.
 
     *My task for you: lift the red cube* is split at the colon. A sentence without a colon is all
-    command, and so is one that names a color before the colon that the words after it do not
-    repeat.
+    command, and so is one with a color before the colon that the words after it do not repeat.
     """
-    whole = _LeadIn((), words)
+    unsplit = _LeadIn((), words)
     if ":" not in words:
-        return whole
+        return unsplit
     colon = len(words) - 1
     while words[colon] != ":":
         colon -= 1
@@ -168,17 +165,17 @@ def _lead_apart(words: Sentence) -> _LeadIn:
     colors = {color_of(word.removesuffix("'s")) for word in remark}
     colors.discard(None)  # which other words give
     if not colors.issubset(map(color_of, command)):
-        return whole
+        return unsplit
     return _LeadIn(remark, command)
 
 
-def _counts(words: Iterable[str]) -> bool:
+def _speaks_of_number(words: Iterable[str]) -> bool:
     """Return whether a remark has a number, or words such as *again* that may say how often."""
-    return any(word in _COUNTING or word in ADVERBS or number_of(word) for word in words)
+    return any(word in _COUNTING_WORDS or word in ADVERBS or number_of(word) for word in words)
 
 
-def _refused(readings: Sequence[Reading]) -> Interpretation:
-    """Return an interpretation without goals, with complaints about what is not understood.
+def _without_goals(readings: Sequence[Reading]) -> Interpretation:
+    """Return the result for a text that is not understood: no goals, and complaints in sentences.
 
     `readings` are the sentences of the command with words that no rule reads; empty if there is
     none.
@@ -204,10 +201,11 @@ def _refused(readings: Sequence[Reading]) -> Interpretation:
     return Interpretation((), tuple(complaints), unknown)
 
 
-def _left_open(goals: Sequence[Goal]) -> str:
-    """Return the complaint about several goals: *leaves color open: it can be red or blue*.
+def _complaint_of_open_slots(goals: Sequence[Goal]) -> str:
+    """Return the complaint about a command that several goals fit.
 
-    It names each slot with several values, and the values of the first of these slots.
+    *leaves color open: it can be red or blue* names each slot in which the goals differ, and the
+    values of the first of these slots.
     """
     slots: list[str] = []
     choices: list[str] = []

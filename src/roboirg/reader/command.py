@@ -253,9 +253,11 @@ def _words(found: FoundPhrase) -> str:
 
 
 def _goal(found: FoundPhrase) -> Value:
-    """Return where something goes: a target, a way over targets, a box, or a noun such as ``bin``.
+    """Return where a phrase says to put something: *on target#1*, *into the bin*.
 
-    None if the words are a thing that is no box.
+    In the text, a phrase that has been read stands as its kind and number, ``target#1``. Such a
+    phrase gives what it means, a noun gives itself, ``"bin"``. None if the words are a thing that
+    is no box.
     """
     words = found["goal"]  # after "on" or "to": "target#1", "the same bin"
     if "#" not in words:
@@ -279,10 +281,10 @@ _REST_RULES = (
 
 
 def _acts(chunks: Chunks) -> Reading:
-    """Return the acts of a sentence whose phrases are chunks.
+    """Return the acts that a sentence asks for, and its words that no rule reads.
 
-    ``lift thing#1 then press button#0`` is two acts: ``take`` with a thing, ``press`` with a
-    button.
+    Its phrases have been replaced by chunks: ``lift thing#1 then press button#0`` is two acts,
+    ``take`` with a thing, and ``press`` with a button.
     """
     builder = _ActBuilder()
     tokens = list(chunks.tokens())
@@ -295,15 +297,15 @@ def _acts(chunks: Chunks) -> Reading:
 
 
 def _has_imperative(tokens: Sequence[Token]) -> bool:
-    """Return whether a sentence begins with a verb, or has one after *first* or *then*.
+    """Return whether a sentence begins with a verb, or has one right after *first* or *then*.
 
     A comma is not enough: *okay, get ready* asks nothing of the robot's things.
     """
-    may_begin = True
+    may_be_verb = True
     for token in tokens:
-        if may_begin and token.kind in VERB_OF:
+        if may_be_verb and token.kind in VERB_OF:
             return True
-        may_begin = token.kind in _OPENERS
+        may_be_verb = token.kind in _OPENERS
     return False
 
 
@@ -316,9 +318,10 @@ class _ActBuilder:
         self._is_joined = False  # whether a comma, *and* or *then* stands just before
 
     def add_word(self, word: str) -> None:
-        """Add a word outside of all chunks: a verb begins an act, and joining words are skipped.
+        """Add a word of a sentence: a verb begins an act, *lift*; other words count as not read.
 
-        Every other word counts as not read.
+        Joining words (*and*, commas) and words that change nothing (*also*) are skipped. *First*
+        after a verb is kept with its act, and *release* also says that the thing is put down.
         """
         if word in VERB_OF:
             act = Act(VERB_OF[word])
@@ -332,7 +335,7 @@ class _ActBuilder:
         self._is_joined = word in _JOINTS
 
     def add_chunk(self, chunk: Token) -> None:
-        """Add a chunk, such as a thing or a number of times, to the act that it is said of."""
+        """Add a phrase that has been read, such as a thing, to the act that it is about."""
         act = self._act_for(chunk.kind)
         part = self._part_of(act, chunk)
         if part is None:
@@ -342,7 +345,11 @@ class _ActBuilder:
         self._is_joined = False
 
     def _part_of(self, act: Act, chunk: Token) -> ActPart | None:
-        """Return what a chunk says of an act; None of a place at which no thing is said to be."""
+        """Return what a phrase that has been read says of an act; None if it does not fit there.
+
+        A place alone is a thing only right after a verb: *take on the left*, what is there. *Twice
+        more* after a comma or *and* adds to the number; elsewhere it is unclear, ``extra``.
+        """
         if chunk.kind == "place":
             if not act.verb or act.parts:
                 return None
@@ -354,9 +361,10 @@ class _ActBuilder:
         return ActPart(chunk.kind, chunk.value)
 
     def _act_for(self, kind: str) -> Act:
-        """Return the act of which something is said: the last one, or a new one without a verb.
+        """Return the act that the next phrase is about: the last one, or a new one without a verb.
 
-        *Put it down, then the red one*: the red one is to be taken.
+        *Put it down, then the red one*: the red one is to be taken. `kind` is that of the phrase,
+        ``thing``.
         """
         if not self.acts:
             self.acts.append(Act(""))

@@ -16,13 +16,13 @@ from roboirg.reader.things import ALL_OF_THEM, Description
 Values = set[str] | set[int] | None
 """The values that a slot can have; None for any."""
 
-_HANDLING = ("take", "uncover", "move", "put", "repeat", "")
+_REPEATABLE_VERBS = ("take", "uncover", "move", "put", "repeat", "")
 """Verbs of acts that can be repeated; empty where none is said."""
-_SWING = ["right", "left"]
+_SWING_SIDES = ["right", "left"]
 """The sides in the order in which a cube swings over them."""
-_NUMBERS = ("times", "more", "extra", "again")
+_NUMBER_PARTS = ("times", "more", "extra", "again")
 """Parts of an act that say how often."""
-_GOING = ("goal", "down", "way", "target")
+_DESTINATION_PARTS = ("goal", "down", "way", "target")
 """Parts of an act that say where something goes."""
 
 
@@ -33,7 +33,10 @@ class UnfitWordsError(Exception):
 def fitting_goals(
     acts: Sequence[Act], goals: Sequence[Goal], scene: Scene, *, is_alone: bool
 ) -> tuple[Goal, ...]:
-    """Return the goals that fit a command.
+    """Return the goals of a scene that fit a command.
+
+    Every slot of a goal (``color``, ``repeats``, ...) must have a value that the acts of the
+    command allow. What the command leaves open, any goal fits.
 
     Args:
         acts: of the command.
@@ -47,15 +50,15 @@ def fitting_goals(
     command = _Command(acts, scene)
     slots = dict(goals[0].slots) if goals else {}
     command.check(slots)
-    allowed = _allowed_values(command, goals, is_alone=is_alone)
-    fitting = [goal for goal in goals if _fits(goal, allowed)]
+    allowed_by_slot = _allowed_values(command, goals, is_alone=is_alone)
+    fitting = [goal for goal in goals if _fits(goal, allowed_by_slot)]
     if "counts" in slots:
         amounts = command.amounts()
         if amounts:
             fitting = [goal for goal in fitting if dict(goal.amounts) in amounts]
     elif "colors" in slots:
-        sequence = command.sequence()
-        fitting = [goal for goal in fitting if _fits_in_order(goal, sequence)]
+        colors_in_order = command.sequence()
+        fitting = [goal for goal in fitting if _fits_in_order(goal, colors_in_order)]
     return tuple(fitting)
 
 
@@ -64,7 +67,8 @@ def _allowed_values(
 ) -> dict[str, Values]:
     """Return what a command allows each slot that holds a single value: ``{"color": {"red"}}``.
 
-    Slots that the goals of the scene do not have are left out.
+    None instead of a set allows any value. Slots that the goals of the scene do not have are left
+    out.
     """
     slots = dict(goals[0].slots) if goals else {}
     allowed: dict[str, Values] = {}
@@ -87,17 +91,18 @@ def _fits(goal: Goal, allowed: Mapping[str, Values]) -> bool:
     return all(values is None or goal[slot] in values for slot, values in allowed.items())
 
 
-def _fits_in_order(goal: Goal, sequence: Sequence[Values]) -> bool:
-    """Return whether a goal's colors are those of a sequence, one by one: ``[{"red"}, None]``.
+def _fits_in_order(goal: Goal, allowed_in_order: Sequence[Values]) -> bool:
+    """Return whether a goal's colors are those that a command allows, one by one.
 
-    None stands for any color. Any goal fits an empty sequence.
+    Of ``[{"red"}, None]``, the first color must be red and the second can be any. Any goal fits an
+    empty sequence.
     """
-    if not sequence:
+    if not allowed_in_order:
         return True
     colors = goal.texts("colors")
-    if len(colors) != len(sequence):
+    if len(colors) != len(allowed_in_order):
         return False
-    for color, possible in zip(colors, sequence, strict=True):
+    for color, possible in zip(colors, allowed_in_order, strict=True):
         if possible is not None and color not in possible:
             return False
     return True
@@ -154,7 +159,8 @@ class _Command:
     def check(self, slots: Mapping[str, SlotValue]) -> None:
         """Refuse a command that says what no slot of the task's goals takes, such as a placement.
 
-        `slots` are those of a goal, with its values.
+        Raises `UnfitWordsError`. `slots` are those of any goal of the scene, with its values: only
+        the names count.
         """
         for act in self._acts:
             self._check_act(act, slots)
@@ -165,14 +171,14 @@ class _Command:
                 raise UnfitWordsError("does not understand which target is meant")
         if "color" not in slots and "colors" not in slots:
             self._check_uncolored("repeats" in slots)
-        sides = self._sides()
+        sides_in_order = self._sides()
         targets = self._scene.of_kind("target")
         # A cube swings over two targets, always over the right one first.
-        if sides and (len(targets) != len(_SWING) or sides != _SWING):
+        if sides_in_order and (len(targets) != len(_SWING_SIDES) or sides_in_order != _SWING_SIDES):
             raise UnfitWordsError("does not understand the way between the targets")
 
     def _check_act(self, act: Act, slots: Mapping[str, SlotValue]) -> None:
-        """Refuse an act that cannot be done, or is repeated where goals have no number of times."""
+        """Refuse an act that cannot be done, or has a number of times that no goal takes."""
         self._check_goals(act)
         if act.verb in ("press", "stop"):
             is_once = all(number == 1 for number in act.values("times"))
@@ -180,12 +186,12 @@ class _Command:
                 raise UnfitWordsError("does not understand how often to press")
         if act.has("visit", "passed") and "visit" not in slots:
             raise UnfitWordsError("does not understand when to act")
-        if act.verb in _HANDLING and act.has(*_NUMBERS) and "repeats" not in slots:
+        if act.verb in _REPEATABLE_VERBS and act.has(*_NUMBER_PARTS) and "repeats" not in slots:
             raise UnfitWordsError("does not understand how often to act")
 
     def _check_goals(self, act: Act) -> None:
-        """Refuse to put something nowhere, or on or in what is not there."""
-        if act.verb == "put" and not act.has(*_GOING):
+        """Refuse an act that puts something nowhere, or in what the scene does not have."""
+        if act.verb == "put" and not act.has(*_DESTINATION_PARTS):
             raise UnfitWordsError("does not understand where to put it")
         kinds_there = {item.kind for item in self._scene.objects} | {"table"}
         for goal in act.values("goal"):
@@ -194,7 +200,7 @@ class _Command:
                 raise UnfitWordsError(f"there is no {kind} in the scene")
 
     def _check_uncolored(self, is_shown: bool) -> None:
-        """Refuse descriptions that choose among things where there is only one to handle.
+        """Refuse words that choose among things where the goal says nothing about which thing.
 
         Only *cube* or *one* without color or place will do. With `is_shown`, several cubes are
         there and the video shows which one is meant, so that it must be *the cube* or the one in
@@ -202,31 +208,33 @@ class _Command:
         """
         for named in self._named:
             thing = named.thing
-            is_other = is_shown and not (thing.is_definite or thing.is_shown)
-            if thing.noun not in ("cube", "one") or not thing.is_open or is_other:
+            is_unlike_shown = is_shown and not (thing.is_definite or thing.is_shown)
+            if thing.noun not in ("cube", "one") or not thing.is_open or is_unlike_shown:
                 raise UnfitWordsError(f'does not understand which "{thing.noun}" is meant')
 
     def visits(self, last: int) -> Values:
-        """Return at which visits of the cube to the target to act; None for any.
+        """Return at which visits of a moving cube to a target to act, from 1; None for any.
 
-        *Stop it at the second visit* gives ``{2}``. `last` is the number of the last visit.
+        *Stop it at the second visit* gives ``{2}``; *let it pass twice, and stop it the next time*,
+        ``{3}``. `last` is the number of the last visit.
         """
         passed: list[int] = []
         for act in self._acts:
             passed += act.values("passed")
-        found: set[int] = set()
+        numbers: set[int] = set()
         for act in self._acts:
             for visit in act.values("visit"):
-                found.add(self._visit(visit, passed, last))
-        if passed and not found:  # "let it pass twice" does not say at which visit to act
+                numbers.add(self._visit(visit, passed, last))
+        if passed and not numbers:  # "let it pass twice" does not say at which visit to act
             raise UnfitWordsError("does not understand when to act")
-        return self._only(found, "visit")
+        return self._only_value(numbers, "visit")
 
     def _visit(self, visit: Visit, passed: Sequence[int], last: int) -> int:
-        """Return the number of a visit.
+        """Return the number of the visit that words name, from 1.
 
         `passed` has how many visits pass before, if that is said: *let it pass twice, and stop it
-        at the next visit* means the third.
+        at the next visit* means the third. `last` is the number of the last visit, for *the last
+        one*.
         """
         if not passed:
             if visit.rank is None:
@@ -242,7 +250,7 @@ class _Command:
 
         *Lift the cube twice* gives ``{2}``, *lift the cube twice, then once more* ``{3}`` and *lift
         the cube again and again* ``{3}``. Without a number it means once, ``{1}``, if `is_alone`:
-        nothing else is said of numbers.
+        nothing before the command speaks of numbers.
         """
         totals: set[int] = set()  # numbers that are said, "twice"; they must agree
         more = 0  # what is added to them, "once more"
@@ -252,7 +260,7 @@ class _Command:
             if act.verb in ("press", "stop"):
                 has_pressed = True
                 continue  # the button is pressed once, whatever is repeated
-            if act.verb == "repeat" and has_pressed and act.has(*_NUMBERS):
+            if act.verb == "repeat" and has_pressed and act.has(*_NUMBER_PARTS):
                 raise UnfitWordsError("does not understand what to repeat")
             if act.verb == "repeat" and act.values("times") == [1] and not is_first:
                 more += 1  # "Repeat once"
@@ -266,10 +274,10 @@ class _Command:
             else:
                 more += len(act.values("again"))
             more += sum(act.values("more"))
-            if act.verb in _HANDLING:
+            if act.verb in _REPEATABLE_VERBS:
                 is_first = False
 
-        self._only(totals, "number of times")  # refuses two that differ
+        self._only_value(totals, "number of times")  # refuses two that differ
         if totals:
             return {sum(totals) + more}
         if not more and not is_alone:
@@ -279,34 +287,37 @@ class _Command:
     def relations(self) -> Values:
         """Return the possible relations to the press of the button."""
         relations = [target.relation for target in self._targets() if target.relation is not None]
-        return self._only(relations, "target")
+        return self._only_value(relations, "target")
 
     def placements(self, last: int) -> Values:
         """Return the possible placements; `last` is the last one."""
         ranks = [target.rank for target in self._targets() if target.rank is not None]
-        return self._only([_from_start(rank, last) for rank in ranks], "target")
+        return self._only_value([_from_start(rank, last) for rank in ranks], "target")
 
     def colors(self) -> Values:
-        """Return the colors that the chosen thing can have by all its descriptions; None for any.
+        """Return the colors of the thing that a command means, by all words about it; None for any.
 
         *The red cube* gives ``{"red"}``; *the cube on the left*, the colors of what may be meant
         there.
         """
         kind = self._referents.chosen  # among things of this kind the goals choose
-        possible: set[str] | None = None
+        possible_colors: set[str] | None = None
         for thing in self._things_to_choose(kind):
             if thing.noun not in (kind, "one") or thing.number not in (None, 1):
                 raise UnfitWordsError(f'does not understand "{thing.noun}" and its number')
-            found = self._present(thing)
-            if possible is not None:
-                found = found & possible
-            possible = found
-        if possible is not None and not possible:
+            colors = self._colors_in_scene(thing)
+            if possible_colors is not None:
+                colors = colors & possible_colors
+            possible_colors = colors
+        if possible_colors is not None and not possible_colors:
             raise UnfitWordsError("does not understand which color is meant")
-        return possible
+        return possible_colors
 
     def _things_to_choose(self, kind: str) -> list[Description]:
-        """Return the descriptions of what is chosen by its color: a box is where something goes."""
+        """Return the descriptions of the thing that the goal chooses by its color.
+
+        That is the thing to handle, or the box into which it goes where goals choose a box.
+        """
         if kind != "box":
             return [named.thing for named in self._named if not named.thing.is_open]
         boxes: list[Description] = []
@@ -320,25 +331,28 @@ class _Command:
         *Lift the red one, then the one on the left* gives ``[{"red"}, {"blue"}]`` if blue is on the
         left.
         """
-        found: list[Values] = []
+        colors_in_order: list[Values] = []
         for act, thing in self._named:
             if thing.is_open:
                 continue
             if thing.noun not in ("container", "cube", "one") or thing.number not in (None, 1):
                 raise UnfitWordsError(f'does not understand "{thing.noun}" and its number')
-            colors = self._present(thing)
+            colors = self._colors_in_scene(thing)
             # "Lift the red cube, then put the red cube down" is about one thing.
-            is_again = thing.is_definite and bool(found) and found[-1] == colors
+            is_again = thing.is_definite and bool(colors_in_order) and colors_in_order[-1] == colors
             if act.verb == "put" and not is_again:
                 raise UnfitWordsError("does not understand what to put down")
             if not is_again:
-                found.append(colors)
-        if len(found) > 1:
+                colors_in_order.append(colors)
+        if len(colors_in_order) > 1:
             self._check_first()
-        return found
+        return colors_in_order
 
     def _check_first(self) -> None:
-        """Refuse *first* behind a later thing: *lift the red one, the blue one first*."""
+        """Refuse *first* after a later thing, which leaves the order unclear.
+
+        *Lift the red one, the blue one first* is refused.
+        """
         things = 0
         for act in self._acts:
             for part in act.parts:
@@ -348,25 +362,27 @@ class _Command:
                     raise UnfitWordsError("does not understand what comes first")
 
     def amounts(self) -> list[dict[str, int]]:
-        """Return the possible amounts of cubes by color; none if nothing is said of them.
+        """Return all amounts of cubes by color that a command can mean; empty if it names none.
 
-        *A red cube and the one on the left* may be two red ones, or a red and a blue one.
+        *A red cube and the one on the left* gives ``[{"red": 2}, {"red": 1, "blue": 1}]`` if a red
+        or a blue one may be meant on the left.
         """
         mentions = self._amount_mentions()
         if not mentions:
             return []
-        found: list[dict[str, int]] = []
+        possible_totals: list[dict[str, int]] = []
         for meant_amounts in itertools.product(*mentions):  # one for each mention
             total: Counter[str] = Counter()
             for amount in meant_amounts:
                 total[amount.color] += amount.number
-            found.append(dict(total))
-        return found
+            possible_totals.append(dict(total))
+        return possible_totals
 
     def _amount_mentions(self) -> list[list[_Amount]]:
-        """Return for each mention of cubes the amounts that it can mean.
+        """Return, for each time that the command names cubes, the amounts that it can mean there.
 
-        *two red cubes* gives ``[(red, 2)]``; *two of each color*, one such list for each color.
+        *two red cubes* gives ``[(red, 2)]``, and *two cubes* one entry for each color; *two of each
+        color* counts as one mention for each color.
         """
         mentions: list[list[_Amount]] = []
         for named in self._named:
@@ -393,7 +409,7 @@ class _Command:
                 raise UnfitWordsError("does not understand how many cubes are meant")
             colors = self._referents.colors
         else:
-            colors = self._present(thing)
+            colors = self._colors_in_scene(thing)
         return [_Amount(color, self._count(thing, color)) for color in sorted(colors)]
 
     def _count(self, thing: Description, color: str) -> int:
@@ -405,9 +421,10 @@ class _Command:
         return thing.number
 
     def _named_things(self) -> Iterator[_NamedThing]:
-        """Yield each thing that is named, with its act; not those that only point back at one.
+        """Yield each thing that the command names, with the act that handles it.
 
-        *It* before any thing is refused: what comes before the command is not read.
+        Words that only point back at a named thing are left out. *It* before any thing is refused:
+        what comes before the command is not read.
         """
         has_named = False
         for act in self._acts:
@@ -429,7 +446,10 @@ class _Command:
                     yield value
 
     def _sides(self) -> list[str]:
-        """Return the sides of the targets as a cube passes them: ``["right", "left"]``."""
+        """Return on which sides the targets are over which the command swings a cube, in its order.
+
+        Both for the robot: ``["right", "left"]``.
+        """
         found: list[str] = []
         for act in self._acts:
             for part in act.parts:
@@ -439,20 +459,23 @@ class _Command:
                     found.append(part.value.side)
         return found
 
-    def _present(self, thing: Description) -> set[str]:
-        """Return the colors that a description can mean, of what is there."""
+    def _colors_in_scene(self, thing: Description) -> set[str]:
+        """Return the colors that a description can mean, of things that the scene has.
+
+        Raises `UnfitWordsError` if it fits none.
+        """
         found = self._referents.colors_of(thing)
         if found:
             return found
-        named = thing.under or thing
-        if named.color and named.place is None:
-            raise UnfitWordsError(f"there is nothing {named.color} in the scene")
+        described = thing.under or thing
+        if described.color and described.place is None:
+            raise UnfitWordsError(f"there is nothing {described.color} in the scene")
         raise UnfitWordsError("there is nothing to handle at the place that the text names")
 
-    def _only(self, values: Iterable[str | int], name: str) -> Values:
-        """Return the only value that is named, as a set; None without any. Several are refused.
+    def _only_value(self, values: Iterable[str | int], name: str) -> Values:
+        """Return the only value that is named, as a set; None if there is none.
 
-        `name` is what the values are of, for the complaint.
+        Two values that differ are refused. `name` is what the values are of, for the complaint.
         """
         found = set(values)
         if len(found) > 1:

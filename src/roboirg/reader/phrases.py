@@ -38,15 +38,16 @@ _PARTS: Mapping[str, str] = {
 
 
 def compiled(pattern: str, parts: Mapping[str, str] = _PARTS) -> re.Pattern[str]:
-    """Return a pattern of whole words, in which words in capital letters stand for parts.
+    """Return a regular expression for whole words; words in capitals in it stand for others.
 
-    ``"the COLOR cube"`` becomes ``the (?:red|green|…) cube``. Its small words become known ones.
+    ``"the COLOR cube"`` becomes ``the (?:red|green|...) cube``. `parts` has what such words stand
+    for. The small words are added to `KNOWN_WORDS`, those that the interpreter can read.
     """
-    known = {**_PARTS, **parts}
+    all_parts = {**_PARTS, **parts}
     # The longest name first, or the beginning of one would pass for another.
-    names = re.compile("|".join(sorted(known, key=len, reverse=True)))
-    while names.search(pattern):  # parts are made of other parts
-        pattern = names.sub(lambda found: known[found[0]], pattern)
+    capitals = re.compile("|".join(sorted(all_parts, key=len, reverse=True)))
+    while capitals.search(pattern):  # parts are made of other parts
+        pattern = capitals.sub(lambda found: all_parts[found[0]], pattern)
     KNOWN_WORDS.update(_WORD.findall(_MARK.sub(" ", pattern)))
     return re.compile(rf"(?<!\S)(?:{pattern})(?:(?!\S)|(?<= ))")
 
@@ -129,9 +130,10 @@ class Chunks:
         self._words: list[str] = []
 
     def apply(self, rules: Iterable[PhraseRule]) -> bool:
-        """Replace the phrases of each rule by chunks, and return whether there were any.
+        """Replace the phrases that rules find by chunks, and return whether any were found.
 
-        *The red cube* becomes ``thing#3``.
+        *The red cube* becomes the chunk ``thing#3``, one word with a number for what the phrase
+        means. The rules apply one after the other.
         """
         before = self.text
         for rule in rules:
@@ -139,7 +141,11 @@ class Chunks:
         return self.text != before
 
     def _chunk(self, rule: PhraseRule, match: re.Match[str]) -> str:
-        """Return the chunk for a phrase, or its words if the rule does not read them."""
+        """Return the word for a phrase that was read, ``thing#3``, and store what the phrase means.
+
+        The number is that of the stored meaning. The words themselves are returned if the rule
+        cannot read them.
+        """
         words = match[0]
         value = rule.read(FoundPhrase(match, self))
         if value is None:
@@ -155,9 +161,10 @@ class Chunks:
         return self._values[int(word.rpartition("#")[2])]
 
     def tokens(self) -> Iterator[Token]:
-        """Yield each chunk and each other word, in order.
+        """Yield the words of the sentence; a phrase that was read is one, with its meaning.
 
-        Words of a chunk within a chunk are left out.
+        Of ``lift thing#3``: the word *lift*, with the value None, and *thing* with the description
+        of a thing. Words of a chunk within a chunk are left out.
         """
         for word in self.text.split():
             kind, mark, number = word.partition("#")

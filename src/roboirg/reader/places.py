@@ -24,9 +24,9 @@ _WORK_AREA = {"front": -0.3, "back": 0.2, "left": 0.25, "right": -0.25}
 """The same of the area where things stand."""
 _CENTER_X = -0.05
 """Of the center of the work area."""
-_ASIDE = 0.03
+_SIDE_DISTANCE = 0.03
 """Meters from the center from which on more than the first thing may be *on the left*."""
-_TANGENT_ASIDE = 6 / 128
+_SIDE_TANGENT = 6 / 128
 """The same as a tangent: six pixels."""
 _CAMERA = (0.3, 0.0, 0.4)
 _VIEW = (-0.3, 0.0, -0.6)
@@ -92,12 +92,15 @@ class _Nearness(NamedTuple):
         return [thing for thing in self.things if abs(self.measure(thing) - wanted) <= self.tie]
 
     def on_side(self) -> Things:
-        """Return the things that are clearly on a side: past the center by some centimeters."""
+        """Return the things clearly on the side from which the order counts, by some centimeters.
+
+        They are past the center by 3 cm, or by six pixels in the picture.
+        """
         # The center counts as a thing, so that it is measured like one.
         center = SceneObject("center", "site", Point(_center_x(self.things), 0.0, _CUBE_HEIGHT))
-        aside = _ASIDE
+        aside = _SIDE_DISTANCE
         if self.tie == _TANGENT_TIE:
-            aside = _TANGENT_ASIDE
+            aside = _SIDE_TANGENT
         start = self.measure(center) - aside
         return [thing for thing in self.things if self.measure(thing) <= start]
 
@@ -107,68 +110,71 @@ def find_objects(
 ) -> tuple[SceneObject, ...]:
     """Return the things that a place may mean: for *second from the left*, the second one.
 
-    Several are returned where words can mean several orders, or where things tie.
+    Several are returned where words can mean several orders, or where things tie: they differ by
+    less than people see.
 
     Args:
         place: as words name it.
         candidates: the things.
         find_anchors: returns the things that *the button* or *the red cube* in it may mean.
     """
-    found: list[SceneObject] = []
+    things: list[SceneObject] = []
     if place.group is not None:
-        alone = place._replace(group=None)
+        place_in_group = place._replace(group=None)
         for few_things in _groups(place.group, place.size, candidates, find_anchors):
-            found += find_objects(alone, few_things, find_anchors)
-        return tuple(dict.fromkeys(found))
+            things += find_objects(place_in_group, few_things, find_anchors)
+        return tuple(dict.fromkeys(things))
     for order in _orders(place, candidates, find_anchors):
-        found += order.of_rank(place.rank)
+        things += order.of_rank(place.rank)
         if place.is_loose and place.kind != "distance":
-            found += order.on_side()
-    return tuple(dict.fromkeys(found))
+            things += order.on_side()
+    return tuple(dict.fromkeys(things))
 
 
 def things_of(scene: Scene, kind: str) -> Things:
     """Return the things of a kind, open or hidden, without cubes that appear later."""
     if kind != "cube":
         return scene.of_kind(kind)
-    late = {motion.subject for motion in scene.motions_of(Away) if motion.start == 0}
+    arriving_later = {motion.subject for motion in scene.motions_of(Away) if motion.start == 0}
     cubes = [*scene.of_kind("cube"), *scene.of_kind("hidden_cube")]
-    return [cube for cube in cubes if cube.name not in late]
+    return [cube for cube in cubes if cube.name not in arriving_later]
 
 
 def _groups(
     place: Place, size: int, candidates: Things, find_anchors: FindAnchors
 ) -> Iterator[Things]:
-    """Yield the things that a group may mean: for *the two in the back*, the two farthest.
+    """Yield the few things that words like *the two in the back* may mean, here the two farthest.
 
-    Two groups where the last one in it and the next one tie.
+    `size` is their number. Two such groups are yielded if the last thing in the first one and the
+    next thing tie: they are about as far.
     """
     for order in _orders(place, candidates, find_anchors):
         ordered = sorted(order.things, key=order.measure)
         if place.rank != 1 or not 0 < size < len(ordered):
             continue  # "the second on the left" is no group, and neither are all things
-        *inner, last = ordered[:size]
+        *certain, last = ordered[:size]
         following = ordered[size]
-        yield [*inner, last]
+        yield [*certain, last]
         if order.measure(following) - order.measure(last) <= order.tie:
-            yield [*inner, following]
+            yield [*certain, following]
 
 
 def _orders(place: Place, candidates: Things, find_anchors: FindAnchors) -> Iterator[_Nearness]:
-    """Yield the orders that a place can mean: from the left, by the distance from the bin.
+    """Yield the orders of things that words for a place can mean, each with its measure.
 
-    For *second from the left*, the thing is then the second one in the order.
+    *second from the left* is an order from the left, of which the second thing is meant; *nearest
+    to the bin*, one by the distance from the bin. An anchor is what such words name, here the bin.
     """
     if place.kind in ("side", "depth", "corner", "middle"):
         yield from _direction_orders(place, candidates)
         return
-    first, *others = [find_anchors(anchor) for anchor in place.anchors]
-    for anchor in first:
+    first_anchors, *other_anchors = [find_anchors(anchor) for anchor in place.anchors]
+    for anchor in first_anchors:
         if place.kind == "between":
-            for other in others[0]:
+            for other in other_anchors[0]:
                 yield _order_between(anchor, other, candidates)
         elif place.kind == "aside":
-            yield _order_aside(place, anchor, candidates)
+            yield _on_side_of(place, anchor, candidates)
         else:
             yield _order_by_distance(place, anchor, candidates)
 
@@ -179,8 +185,8 @@ def _order_between(anchor: SceneObject, other: SceneObject, candidates: Things) 
     return _Nearness(others, _detour(anchor, other), _WIDE_TIE)
 
 
-def _order_aside(place: Place, anchor: SceneObject, candidates: Things) -> _Nearness:
-    """Return the things on a side of an anchor, all alike: any of them may be meant."""
+def _on_side_of(place: Place, anchor: SceneObject, candidates: Things) -> _Nearness:
+    """Return the things on one side of another thing, all alike: any of them may be meant."""
     across = _sideways(place)
     aside: list[SceneObject] = []
     for thing in candidates:
@@ -198,7 +204,11 @@ def _order_by_distance(place: Place, anchor: SceneObject, candidates: Things) ->
 
 
 def _direction_orders(place: Place, candidates: Things) -> Iterator[_Nearness]:
-    """Yield the orders along a direction, or from the middle."""
+    """Yield the orders of things along a direction, or from a corner or the middle of the table.
+
+    *closest to you* may mean by depth or by distance, so both orders are yielded. Things whose
+    measures differ by up to the tie (1 cm, or two pixels in the picture) may stand for each other.
+    """
     if place.kind == "side":
         tie = _TANGENT_TIE if place.is_mirrored else _TIE
         yield _Nearness(candidates, _sideways(place), tie)
@@ -224,12 +234,13 @@ def _corner_orders(place: Place, candidates: Things) -> Iterator[_Nearness]:
 def _middle_orders(candidates: Things) -> Iterator[_Nearness]:
     """Yield the orders in which the thing *in the middle* is first.
 
-    They are by the distance from the center, and, of an odd number of things, from the middle one.
+    One is by the distance from the center. Of an odd number of things, another one is by the
+    distance from the middle thing, counted from left to right.
     """
     yield _Nearness(candidates, _distance((_center_x(candidates), 0.0)), _WIDE_TIE)
     if len(candidates) % 2 == 1:
-        row = sorted(thing.position.y for thing in candidates)
-        middle = row[len(row) // 2]
+        positions_y = sorted(thing.position.y for thing in candidates)
+        middle = positions_y[len(positions_y) // 2]
         yield _Nearness(candidates, lambda thing: abs(thing.position.y - middle), _TIE)
 
 

@@ -48,7 +48,7 @@ class Target(NamedTuple):
     relation: Relation | None = None
 
 
-_ENDS = {
+_RANK_FROM_END = {
     "last": LAST, "very last": LAST, "final": LAST, "penultimate": LAST_BUT_ONE,
     "second to last": LAST_BUT_ONE, "next to last": LAST_BUT_ONE, "last but one": LAST_BUT_ONE,
 }  # fmt: skip
@@ -156,7 +156,7 @@ _WAY = compiled(
 def _times(found: FoundPhrase) -> int:
     """Return the number of repetitions that a phrase names: 3 for *three times*, 2 for *twice*.
 
-    Without a number it is once.
+    Each group of the phrase holds another way to say it; without a number it is once.
     """
     for name in ("number", "many", "another", "x"):
         if found[name]:
@@ -169,7 +169,7 @@ def _rank(words: list[str]) -> int | None:
 
     None if they name none or two that differ.
     """
-    ranks = {_ENDS.get(word) or ordinal_of(word) for word in words if word}
+    ranks = {_RANK_FROM_END.get(word) or ordinal_of(word) for word in words if word}
     return ranks.pop() if len(ranks) == 1 else None
 
 
@@ -200,7 +200,8 @@ def _side_target(found: FoundPhrase) -> Target:
 def _target(found: FoundPhrase) -> Target | None:
     """Return a target with the placement that its words name; None if they name several.
 
-    *the second target used before the press* has the rank 2 and the relation ``before``.
+    A placement is that of the cube in the video: *the second target used before the press* has the
+    rank 2 and the relation ``before``. The groups of the phrase hold ordinals and numbers.
     """
     ordinals = [found["rank"], found["at"], found["of"], found["first"]]
     rank = _rank(ordinals)

@@ -189,8 +189,8 @@ _EACH = compiled(r"(?P<count>NUMBER|an?) (?:cube )?(?:(?:of|from|in) (?:each|eve
 def read_things(chunks: Chunks) -> None:
     """Replace the words for things, and for where they stand, by chunks.
 
-    *the red cube on the left* first becomes ``thing#0 place#1``, and then ``thing#2``: a thing with
-    its description is a chunk again, which another description can follow.
+    A chunk is one word for a phrase that was read: *the red cube on the left* first becomes
+    ``thing#0 place#1``, and then ``thing#2``, which another description can follow.
     """
     chunks.text = _BEHIND_NOUNS.apply(chunks.text)
     chunks.apply(_NAMES)
@@ -201,7 +201,10 @@ def read_things(chunks: Chunks) -> None:
 
 
 def _place(found: FoundPhrase, place: Place) -> Place | None:
-    """Return a place with the side, rank and anchors that its words name; None if too deep.
+    """Return a place with what its words name: a side, a rank, and the things that it refers to.
+
+    Of *second from the left*, the side ``left`` and the rank 2; of *next to the bin*, the bin, an
+    anchor. None if the anchors are described by too many others to be read.
 
     Args:
         found: the words, *second from the left*.
@@ -221,7 +224,7 @@ def _place(found: FoundPhrase, place: Place) -> Place | None:
 
 
 def _is_deep(anchor: object) -> bool:
-    """Return whether a thing is described by one that is described by another one, and so on.
+    """Return whether a thing is described by a thing that is described by another, and so on.
 
     *the cube next to the cube next to the cube next to the cube by the bin* is too deep to be read.
     """
@@ -252,9 +255,10 @@ def _number_of_each(found: FoundPhrase) -> int:
 
 
 def _named(found: FoundPhrase) -> Description:
-    """Return the description of a thing that is named by noun, color or both.
+    """Return what a phrase with a noun, a color or both says of a thing.
 
-    *two red cubes* has the noun ``cube``, the color ``red`` and the number 2.
+    *two red cubes* has the noun ``cube``, the color ``red`` and the number 2. Without a noun it is
+    ``one``; *the* and *this* make it definite.
     """
     determiner, _, _ = found["det"].partition(" ")  # of "all of the", the first word
     if found["count"]:
@@ -286,9 +290,9 @@ def _like(found: FoundPhrase) -> Description:
 
 
 def _standing(found: FoundPhrase) -> Description | None:
-    """Return a thing with its place; None if it has another description already.
+    """Return a thing with the place that words after it name; None if it is described already.
 
-    *thing#0 that was place#1* also says when it stood there: at first.
+    *the cube that was on the left* also says when it stood there: at first.
     """
     thing: Description = found.value("thing")
     if thing.place is not None or thing.under is not None:
@@ -327,10 +331,10 @@ def _owned(found: FoundPhrase) -> Description:
 
 
 def _over(thing: Description, under: Description) -> Description | None:
-    """Return the container over a cube, *the container over the red cube*.
+    """Return the container over a cube, as the description of one thing by another.
 
-    None if the first thing can be no container, the second no cube, or if the container has another
-    description already.
+    *the container over the red cube*. None if the first thing can be no container, the second no
+    cube, or if the container has another description already.
     """
     if thing.noun not in ("container", "one") or under.noun not in ("cube", "one"):
         return None
@@ -340,7 +344,10 @@ def _over(thing: Description, under: Description) -> Description | None:
 
 
 def _moment(*words: str) -> PlaceMoment | None:
-    """Return the moment of a place: *now* is the last one, *was* and *at first* the first."""
+    """Return at which moment of the scene a thing stands at its place: ``first`` or ``last``.
+
+    *now* is the last one, *was* and *at first* the first. None if no word says it.
+    """
     text = " ".join(words)
     if re.search(r"\b(?:now|currently|at the moment)\b", text):
         return "last"

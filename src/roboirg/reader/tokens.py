@@ -103,10 +103,11 @@ COLOR = rf"(?:{_alternatives(_COLOR_NAMES)})"
 
 
 def split_sentences(text: str) -> tuple[Sentence, ...]:
-    """Return the sentences of a text as words and commas, without fillers and empty sentences.
+    """Return the sentences of a text, each as its words and commas, spelled in one way.
 
-    ``"Please lift it. It's grey!"`` gives ``(("lift", "it"), ("it", "is", "gray"))``: British
-    spelling and short forms give the same words as others, and known synonyms become one word.
+    ``"Please lift it. It's grey!"`` gives ``(("lift", "it"), ("it", "is", "gray"))``: capitals and
+    filler words are dropped, British spelling and short forms give the same words as others, and
+    known synonyms become one word.
     """
     text = _LIST_MARK.sub("\n", text.lower())
     for variant, usual in _SPELLINGS:

@@ -48,9 +48,10 @@ def is_known(word: str) -> bool:
 
 
 def register_words(synonyms: Mapping[str, str]) -> None:
-    """Teach the interpreter words of another package. Teaching the same again changes nothing.
+    """Make the interpreter read new words of another package as words that it knows.
 
-    Call it in the module of the task or setting that uses the words:
+    Call it in the module of the task or setting that uses the words; a second call with the same
+    words changes nothing:
 
         register_words({"crate": "box", "hoist": "lift"})
 

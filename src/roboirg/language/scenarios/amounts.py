@@ -52,10 +52,10 @@ def stated_counts(words: Text) -> int:
 
 
 def hidden_fields(words: Text, fields: Sequence[str]) -> Sequence[str]:
-    """Return those of a command's fields that words leave to their context.
+    """Return those of a command's fields whose values its words leave to what was said before.
 
-    *it* leaves all of them; *two of them*, which states a count, leaves ``colors.0``; words that
-    point at nothing leave none.
+    *it* leaves all of them; *two of them*, which states a count, leaves ``colors.0``; words that do
+    not point back leave none.
     """
     if not any(pointers_in(words)):
         return ()
@@ -89,16 +89,17 @@ def hidden_term(field: str, words: Text, remark: ChoosingRemark | None, said: Sa
 
 
 def _pointer_of(field: str, words: Text) -> Pointer:
-    """Return the words that point back at a field.
+    """Return which of a command's words that point back stand for a field of the goal.
 
-    Next to stated counts, *two of those and one of these*, the first pointer is for ``colors.0``
-    and the second for ``colors.1``. Else the last pointer is for all fields.
+    Next to stated counts, *two of those and one of these*, the first are for ``colors.0`` and the
+    second for ``colors.1``. Else the last ones are for all fields. Raises LookupError if there are
+    too few.
     """
     pointers = list(pointers_in(words))
     if not stated_counts(words):
         return pointers[-1]
     _, _, number = field.partition(".")
-    at = int(number)
-    if at >= len(pointers):
+    index = int(number)
+    if index >= len(pointers):
         raise LookupError(f"words that point at {field}")
-    return pointers[at]
+    return pointers[index]

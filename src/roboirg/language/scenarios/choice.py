@@ -70,44 +70,48 @@ class _Match(NamedTuple):
 def choose(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
 ) -> Chosen | None:
-    """Return what is said in a setting that does not refuse; None if no scenario fits.
+    """Return what is said of an episode: a scenario with its values; None if none fits.
 
-    The scenario is drawn, with the first offer that it can say, then its list and its people.
+    A scenario is what a person says of a task, with slots for values. One is drawn, with the first
+    way to lead to the goal that it can say, an offer; then its list of values and its people.
     """
     matches = list(_matches(request, setting, scenarios))
     if not matches:
         return None
-    scenario, offer = _drawn(request, setting, matches)
+    scenario, offer = _drawn_match(request, setting, matches)
     values = {**goal_values(request), **offer.values}
     if offer.listed is None and scenario.fields.list:
-        values |= several("list", _list(request, scenario))
-    values |= _people(request, scenario)
+        values |= several("list", _drawn_list(request, scenario))
+    values |= _drawn_people(request, scenario)
     return Chosen(scenario, offer, Introduced(values))
 
 
 def _matches(
     request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]
 ) -> Iterator[_Match]:
-    """Yield each offer of a setting with each scenario that can say it, in the order of the offers.
+    """Yield each way to lead to the goal with each scenario whose words can say it.
 
-    A scenario says an offer that leaves the same fields to the context as its words do: with *it*
-    for the color, an offer that gives the color.
+    Such a way is an offer of the setting. A scenario says one that leaves the same fields of the
+    goal to the context as its words do: with *it* for the color, an offer that gives the color.
     """
-    by_hidden: dict[frozenset[str], list[Scenario]] = {}
+    scenarios_by_hidden: dict[frozenset[str], list[Scenario]] = {}
     for scenario in scenarios:
-        if _fits(scenario, request):
-            by_hidden.setdefault(_hidden_by(scenario, request), []).append(scenario)
+        if _fits_episode(scenario, request):
+            scenarios_by_hidden.setdefault(_hidden_by(scenario, request), []).append(scenario)
     for offer in _offers_of(setting)(request):
-        for scenario in by_hidden.get(frozenset(offer.fields), []):
-            if _says(scenario, offer):
+        for scenario in scenarios_by_hidden.get(frozenset(offer.fields), []):
+            if _can_say(scenario, offer):
                 yield _Match(scenario, offer)
 
 
-def _drawn(request: InstructionRequest, setting: str, matches: Sequence[_Match]) -> _Match:
-    """Draw a scenario, with the first offer that it can say; in reasoning, of those in turn."""
+def _drawn_match(request: InstructionRequest, setting: str, matches: Sequence[_Match]) -> _Match:
+    """Draw a scenario, with the first of the offers, ways to lead to the goal, that it can say.
+
+    In reasoning, the way is drawn first, so that all kinds of reasoning get their turn.
+    """
     if all_settings()[setting].offers == "reasoning":
-        derivation = _in_turn(request, matches)
-        matches = [match for match in matches if match.offer is derivation]
+        offer_in_turn = _in_turn(request, matches)
+        matches = [match for match in matches if match.offer is offer_in_turn]
     by_frame: dict[str, _Match] = {}
     for match in matches:
         by_frame.setdefault(match.scenario.fields.frame, match)
@@ -125,7 +129,10 @@ def _offers_of(setting: str) -> Callable[[InstructionRequest], Iterable[Offer]]:
 
 
 def misfit(request: InstructionRequest, setting: str, scenarios: Sequence[Scenario]) -> str:
-    """Return why none of some scenarios of a setting fits an episode."""
+    """Return why none of some scenarios of a setting fits an episode, for a message.
+
+    If they fit without their introductions, only the words of a place or a clue are lacking.
+    """
     # Without introductions, only the words of places and clues can no longer be lacking.
     without_introductions: list[Scenario] = []
     for scenario in scenarios:
@@ -137,10 +144,10 @@ def misfit(request: InstructionRequest, setting: str, scenarios: Sequence[Scenar
 
 
 def _in_turn(request: InstructionRequest, matches: Iterable[_Match]) -> Offer:
-    """Draw a derivation of the pattern, such as ``color exclusion``, whose turn it is.
+    """Draw one way in which the goal follows, of the kind of reasoning whose turn it is.
 
-    Derivations of one pattern are told apart by relation, reference and listed slot, under which
-    they are drawn.
+    A kind, or pattern, is such as ``color exclusion``. Ways of one pattern are told apart by
+    relation, reference and listed slot, under which they are drawn.
     """
     by_pattern: dict[str, dict[str, Offer]] = {}
     for _, offer in matches:
@@ -161,10 +168,11 @@ def in_turn(episode: Episode, patterns: Sequence[str]) -> str:
     return patterns[(episode.index + episode.index // BLOCK) % len(patterns)]
 
 
-def _people(request: InstructionRequest, scenario: Scenario) -> Values:
-    """Return two people, who are different, and their pronouns, if a scenario speaks of any.
+def _drawn_people(request: InstructionRequest, scenario: Scenario) -> Values:
+    """Return two different people and their pronouns, by slot; empty if a scenario names none.
 
-    The slots of the first are ``person``, ``he`` …, those of the second ``person.2``, ``he.2`` …
+    The slots of the first are ``person``, ``he`` ..., those of the second ``person.2``, ``he.2``
+    ...
     """
     if not scenario.people:
         return {}
@@ -172,22 +180,22 @@ def _people(request: InstructionRequest, scenario: Scenario) -> Values:
     others = [person for person in scenario.people if person is not first]
     second = request.sampler.pick("other person", others)
     values: dict[str, tuple[IntroducedValue, ...]] = {}
-    for number, person in (("", first), (".2", second)):
+    for suffix, person in (("", first), (".2", second)):
         # Each person is a row of words in the order of `PERSON`: "Leo", "he", "him" …
         for slot, word in zip(PERSON, person, strict=True):
-            values[f"{slot}{number}"] = (IntroducedValue("", "person", word),)
+            values[f"{slot}{suffix}"] = (IntroducedValue("", "person", word),)
     return values
 
 
-def _fits(scenario: Scenario, request: InstructionRequest) -> bool:
-    """Return whether an episode has what a scenario needs."""
+def _fits_episode(scenario: Scenario, request: InstructionRequest) -> bool:
+    """Return whether an episode has the numbers of colors and values that a scenario needs."""
     needs = scenario.fields.needs
     if needs.colors and len(request.color_values) not in needs.colors:
         return False
     if needs.shown and len(request.scene_colors) not in needs.shown:
         return False
     # A scenario with a list needs enough values for it.
-    return not scenario.fields.list or bool(_lengths(request, scenario))
+    return not scenario.fields.list or bool(_possible_lengths(request, scenario))
 
 
 def _hidden_by(scenario: Scenario, request: InstructionRequest) -> frozenset[str]:
@@ -198,11 +206,12 @@ def _hidden_by(scenario: Scenario, request: InstructionRequest) -> frozenset[str
     return frozenset(hidden)
 
 
-def _says(scenario: Scenario, offer: Offer) -> bool:
-    """Return whether a scenario has the words for an offer that hides the same fields.
+def _can_say(scenario: Scenario, offer: Offer) -> bool:
+    """Return whether a scenario has the words for an offer, a way to lead to the goal.
 
     It has to introduce the list of the offer, if that has one, derive the goal as the offer does,
-    and name nothing in its introduction for which the offer has no words.
+    and name nothing in its introduction for which the offer has no words. Both leave the same
+    fields of the goal open.
     """
     if offer.listed not in (None, scenario.fields.list):
         return False
@@ -218,8 +227,8 @@ def _says(scenario: Scenario, offer: Offer) -> bool:
 def _has_words(slot: Slot, offer: Offer) -> bool:
     """Return whether an offer has words for a slot of a sentence, such as ``{place:spot}``.
 
-    Those of the goal's values are always known. A place must have words in the form that is asked
-    for.
+    An offer is a way to lead to the goal. Values of the goal always have words. A place must have
+    them in the form that is asked for, such as ``spot``.
     """
     if slot.name.partition(".")[0] not in _DESCRIBED:
         return True
@@ -229,30 +238,30 @@ def _has_words(slot: Slot, offer: Offer) -> bool:
     return values[0].kind != "place" or slot.form in (_ANY, values[0].form)
 
 
-def _lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
-    """Return the lengths that the list of a scenario can have.
+def _possible_lengths(request: InstructionRequest, scenario: Scenario) -> list[int]:
+    """Return the possible numbers of values in the list that a scenario introduces: ``[2, 3]``.
 
     It holds all values of the goal and perhaps others: with one color of three in the scene, 1 to
-    3, of which the scenario's or the usual lengths are left, ``[2, 3]``.
+    3, of which those are left that the scenario allows, or else the usual ones.
     """
     slot = scenario.fields.list
-    least = len(request.values_in(slot))
-    if not least:  # a slot of another task of the file
+    num_in_goal = len(request.values_in(slot))
+    if not num_in_goal:  # a slot of another task of the file
         return []
-    most = least + len(_others(request, slot))
+    num_in_scene = num_in_goal + len(_others(request, slot))
     wanted = scenario.fields.needs.list or _USUAL_LENGTHS
-    return [length for length in wanted if least <= length <= most]
+    return [length for length in wanted if num_in_goal <= length <= num_in_scene]
 
 
-def _list(request: InstructionRequest, scenario: Scenario) -> Sequence[IntroducedValue]:
-    """Draw the list of a scenario: the goal's values among others of the scene, in any order.
+def _drawn_list(request: InstructionRequest, scenario: Scenario) -> Sequence[IntroducedValue]:
+    """Draw the values that a scenario lists: the goal's among others of the scene, in any order.
 
     For the goal red it may be *blue, red*.
     """
     slot = scenario.fields.list
     members = list(goal_values(request)[slot])
     kind = members[0].kind
-    size = request.sampler.pick("list length", _lengths(request, scenario))
+    size = request.sampler.pick("list length", _possible_lengths(request, scenario))
     choices = list(itertools.permutations(_others(request, slot), size - len(members)))
     for other in request.sampler.pick("listed others", choices):
         members.append(IntroducedValue(REFERENCE, kind, other))
@@ -268,9 +277,10 @@ def _others(request: InstructionRequest, slot: str) -> list[str | int]:
 
 
 def rival_values(request: InstructionRequest, introduced: Introduced) -> Iterator[Introduced]:
-    """Yield what a competing remark can name: the slots with one more, a value that is not meant.
+    """Yield the values of the goal with one more, that is not meant, for remarks that name it.
 
-    For the goal red, ``rival color`` is blue, then green, as far as neither was named in a list.
+    For the goal red, the slot ``rival color`` is blue, then green, as far as neither was named in a
+    list.
     """
     already_named = [value.value for value in introduced.values.get("list", ())]
     already_named += [value.value for value in request.goal_values]

@@ -21,13 +21,19 @@ from roboirg.language.scenarios.markup import Operation, Pointer
 
 Operand = str | int | Described
 
-_RANKS: Mapping[str, int] = {"former": 1, "latter": 2, "first": 1, "second": 2, "third": 3}
+_RANK_BY_EXPRESSION: Mapping[str, int] = {
+    "former": 1,
+    "latter": 2,
+    "first": 1,
+    "second": 2,
+    "third": 3,
+}
 """Positions that classes of expressions name."""
-_DIRECTIONS: Mapping[Operation, int] = {"minus": -1, "earlier": -1, "plus": 1, "later": 1}
+_STEP_SIGNS: Mapping[Operation, int] = {"minus": -1, "earlier": -1, "plus": 1, "later": 1}
 """Of a step that is said."""
 _STEPS: Mapping[Operation, int] = {"before": -1, "after": 1}
 """Steps that the operation itself names."""
-_ASIDE = ("excluded", "aside", "kept", "reference")
+_SLOTS_SET_ASIDE = ("excluded", "aside", "kept", "reference")
 """Slots of what is named so that something else is left."""
 
 
@@ -60,7 +66,7 @@ class SaidValues:
         self.by_slot[slot] = values
 
     def operands(self, slot: str) -> tuple[Operand, ...]:
-        """Return what a slot named; empty if it was not said.
+        """Return what a slot named: values, or descriptions of things; empty if it was not said.
 
         ``colors.1`` may have been named alone, or as the second of ``colors``.
         """
@@ -77,9 +83,10 @@ class SaidValues:
         return int(number.value)
 
     def listed(self, *bases: str) -> tuple[Operand, ...]:
-        """Return the members of a list, named together or one by one, as they were said.
+        """Return the members of lists, named together or one by one, in the order of speaking.
 
-        Of several bases, the members are those of any: a cube by its color, another by its place.
+        Of several bases, ``place`` and ``clue``, the members are those of any: a cube by its color,
+        another by its place.
         """
         members: list[Operand] = []
         for slot in self.by_slot:
@@ -106,7 +113,7 @@ def pointed_term(pointer: Pointer, said: SaidValues) -> Term:
     that* a number and a step.
     """
     if pointer.of == "rest":  # the thing that is left when two are set aside
-        return _left(pointer, said)
+        return _without_set_aside(pointer, said)
     return _TERM_OF[pointer.operation](pointer, said)
 
 
@@ -138,9 +145,9 @@ def _other(_pointer: Pointer, said: SaidValues) -> Term:
     return Term("other", members, _taken_rank(members, said))
 
 
-def _left(_pointer: Pointer, said: SaidValues) -> Term:
+def _without_set_aside(_pointer: Pointer, said: SaidValues) -> Term:
     """Return the term of *the one that is left* of all, without what was set aside."""
-    for slot in _ASIDE:
+    for slot in _SLOTS_SET_ASIDE:
         members = said.listed(slot)
         if members:
             return Term("without", members)
@@ -161,7 +168,7 @@ def _stepped(pointer: Pointer, said: SaidValues) -> Term:
     """Return the term of *one more than that*, or of *right before that*."""
     step = _STEPS.get(pointer.operation)
     if step is None:
-        step = _DIRECTIONS[pointer.operation] * said.number("step")
+        step = _STEP_SIGNS[pointer.operation] * said.number("step")
     return Term("step", said.operands(pointer.of), step=step)
 
 
@@ -171,8 +178,8 @@ _TERM_OF: Mapping[Operation, Callable[[Pointer, SaidValues], Term]] = {
     "seen": _same,
     "rank": _ranked,
     "other": _other,
-    "without": _left,
-    "neighbor": _left,
+    "without": _without_set_aside,
+    "neighbor": _without_set_aside,
     "double": _doubled,
     "half": _halved,
     "minus": _stepped,
@@ -195,18 +202,19 @@ def _taken_rank(members: tuple[Operand, ...], said: SaidValues) -> int:
 
 def _rank_of(pointer: Pointer, said: SaidValues) -> int:
     """Return the position that words name, by their class or as the number in them."""
-    if pointer.expression in _RANKS:
-        return _RANKS[pointer.expression]
+    if pointer.expression in _RANK_BY_EXPRESSION:
+        return _RANK_BY_EXPRESSION[pointer.expression]
     return said.number("rank")
 
 
 def chosen_term(pointer: Pointer, remark: ChoosingRemark, said: SaidValues) -> Term:
-    """Return the term of words for a value that a remark has chosen from a list of two.
+    """Return how a value follows from a list of two of which a remark has chosen one.
 
-    *The other one* is the one that was not chosen.
+    *Let's skip the former* chooses the second. Words for *the other one* then mean the one that was
+    not chosen.
     """
     members = said.listed("list")
-    rank = _RANKS[remark.pointer.expression]
+    rank = _RANK_BY_EXPRESSION[remark.pointer.expression]
     if remark.sets_aside:
         rank = 3 - rank  # the other one of two
     if pointer.operation == "other":

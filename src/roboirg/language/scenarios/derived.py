@@ -44,7 +44,11 @@ MAX_REFERENCE = 10
 
 
 def derivations_of(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield the derivations of an episode; those of a pair are drawn."""
+    """Yield every way in which the goal can follow from something else, by some reasoning.
+
+    Such a way, an offer, has what is introduced, *three laps*, and the fields of the command that
+    point back at it, *one fewer than that*. Offers of two values are drawn.
+    """
     yield from _deduced(request)
     for value in (*request.values_of("visit"), *request.values_of("placement")):
         yield from _stepped(request, value, "number deduction", COUNTED_STEPS)
@@ -60,13 +64,14 @@ def _neighboring(moment: GoalValue) -> Offer:
     (other,) = [name for name in MOMENTS if name != moment.value]
     reference = IntroducedValue(REFERENCE, "relation", other)
     values = {"reference": (reference,)}
-    return _derived("sequential relation", [moment.field], values, NEIGHBOR.name)
+    return _offer_of("sequential relation", [moment.field], values, NEIGHBOR.name)
 
 
 def _deduced(request: InstructionRequest) -> Iterator[Offer]:
     """Yield the goal's numbers as they follow from others: 2 as *one fewer than* 3.
 
-    All counts of a goal follow by the same relation: 2 red and 1 blue from 3 red and 2 blue.
+    All counts of a goal follow by the same relation: 2 red and 1 blue from 3 red and 2 blue. A
+    relation whose words spell the result is left out, *one fewer* for 1.
     """
     numbers = request.values_of("number") or request.values_in("counts")
     if not numbers:
@@ -81,7 +86,7 @@ def _deduced(request: InstructionRequest) -> Iterator[Offer]:
         if relation.spells in results and not is_unsaid:
             continue
         values = _counted(first, references, relation.offset)
-        yield _derived("number deduction", fields, values, relation.name)
+        yield _offer_of("number deduction", fields, values, relation.name)
 
 
 class Deduction(NamedTuple):
@@ -154,11 +159,14 @@ def _stepped(
     for step, references in deductions([value.number], choices, known, length):
         if step.spells != value.number:
             values = _counted(value, references, step.offset)
-            yield _derived(pattern, [value.field], values, step.name)
+            yield _offer_of(pattern, [value.field], values, step.name)
 
 
 def series_length(request: InstructionRequest, value: GoalValue) -> int:
-    """Return the length of the episode's series: visits to come, or placements shown."""
+    """Return how many visits of the cube are to come, or how many placements the video shows.
+
+    It is the length of the series in which `value`, a visit or a placement, is a position.
+    """
     scene = request.episode.scene
     if value.slot_type == "visit":
         return sum(shuttle.passes for shuttle in scene.motions_of(Shuttle))
@@ -168,12 +176,14 @@ def series_length(request: InstructionRequest, value: GoalValue) -> int:
 
 
 def _counted(value: GoalValue, references: Sequence[int], offset: int) -> Values:
-    """Return the slots of a number: ``reference``, from which it follows, and ``step``.
+    """Return what is introduced for a number that follows: the reference, and the step to it.
 
     For 2 as one fewer than 3, the reference is 3 and the step 1; words say the direction.
     """
-    known = [IntroducedValue(REFERENCE, value.slot_type, number) for number in references]
-    values = {**several("reference", known)}
+    reference_values = [
+        IntroducedValue(REFERENCE, value.slot_type, number) for number in references
+    ]
+    values = {**several("reference", reference_values)}
     if offset:
         values["step"] = (IntroducedValue("", "number", abs(offset)),)
     return values
@@ -191,14 +201,14 @@ def _colored(request: InstructionRequest) -> Iterator[Offer]:
 def _remaining(request: InstructionRequest, color: GoalValue) -> Offer:
     """Return the color that is left when others are excluded."""
     excluded = [IntroducedValue(REFERENCE, "color", name) for name in excluded_colors(request)]
-    return _derived("color exclusion", [color.field], several("excluded", excluded))
+    return _offer_of("color exclusion", [color.field], several("excluded", excluded))
 
 
 def _second_of(request: InstructionRequest, colors: GoalValues) -> Offer:
     """Return the two colors of a goal, of which the first one is taken."""
     both = [named(color) for color in colors]
     fields = [color.field for color in colors]
-    return _one_of(request, both, both[0], fields, colors[0].slot)
+    return _offer_of_two(request, both, both[0], fields, colors[0].slot)
 
 
 def excluded_colors(request: InstructionRequest) -> tuple[str, ...]:
@@ -216,7 +226,10 @@ def excluded_colors(request: InstructionRequest) -> tuple[str, ...]:
 
 
 def _complements(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield for each slot a value as the other one of two, in an order that is drawn."""
+    """Yield, for each slot that can have a second value, the meant one as *the other one* of two.
+
+    The second value and the order of the two are drawn: *red or blue? Not blue, the other one.*
+    """
     by_slot: dict[str, list[ValuePair]] = {}
     for pair in possible_pairs(request):
         if not pair.is_ordered:
@@ -230,20 +243,20 @@ def _complement(request: InstructionRequest, pair: ValuePair) -> Offer:
     kind = pair.meant.slot_type
     meant = IntroducedValue(REFERENCE, kind, pair.meant.value)
     rival = IntroducedValue(REFERENCE, kind, pair.rival.value)
-    return _one_of(request, [meant, rival], rival, [pair.meant.field], pair.slot)
+    return _offer_of_two(request, [meant, rival], rival, [pair.meant.field], pair.slot)
 
 
-def _one_of(
+def _offer_of_two(
     request: InstructionRequest,
     both: list[IntroducedValue],
     taken: IntroducedValue,
     fields: list[str],
     slot: str,
 ) -> Offer:
-    """Return the offer of two values, and of the one that is taken.
+    """Return the offer, a way to lead to the goal, of two values of which one is taken.
 
-    Their order is drawn, but for positions: after *the second or first one*, *the first* could be
-    the first of these two.
+    The order of the two is drawn, but for positions: after *the second or first one*, *the first*
+    could be the first of these two.
 
     Args:
         request: of the episode.
@@ -257,10 +270,10 @@ def _one_of(
         orders = [tuple(sorted(both, key=lambda introduced: introduced.value))]
     order = request.sampler.pick("complement order", orders)
     values = {**several("list", order), "taken": (taken,)}
-    return _derived("contextual logic", fields, values, listed=slot)
+    return _offer_of("contextual logic", fields, values, listed=slot)
 
 
-def _derived(
+def _offer_of(
     pattern: str,
     fields: list[str],
     values: Values,

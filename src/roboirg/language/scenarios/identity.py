@@ -40,7 +40,10 @@ def language_label(
     settings: Iterable[str] = (),
     wordings: str | None = None,
 ) -> str:
-    """Return the version of the words, followed by which words each task has in settings."""
+    """Return the version of the language, followed by the words of each task in some settings.
+
+    ``4.7.0 PickXtimes/test@1a2b3c4d5e6f``; each task counts in the explicit setting, too.
+    """
     names = (EXPLICIT, *settings)
     words: list[str] = []
     for task in tasks:
@@ -77,15 +80,15 @@ def words_digest(
 
 
 def _scenarios_in(words: TaskScenarios, pool: PoolName) -> list[list[str]]:
-    """Return the fields and the sentences of each scenario of a pool, as text, sorted.
+    """Return each scenario of a pool as text, its fields and sentences, in a fixed order.
 
-    So the same scenarios in another order give the same list.
+    So the same scenarios in another order of the file give the same list.
     """
-    found: list[list[str]] = []
+    scenario_texts: list[list[str]] = []
     for scenario in words.scenarios:
         if scenario.fields.is_in(pool):
             # Which other tasks say it, too, does not matter.
             needs = replace(scenario.fields.needs, tasks=())
             fields = replace(scenario.fields, needs=needs)
-            found.append([repr(fields), repr(sorted(scenario.texts.items()))])
-    return sorted(found)
+            scenario_texts.append([repr(fields), repr(sorted(scenario.texts.items()))])
+    return sorted(scenario_texts)

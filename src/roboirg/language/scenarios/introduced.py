@@ -49,6 +49,7 @@ class IntroducedValue(NamedTuple):
         """Return the words for the value in a form, or as a number of a noun.
 
         For 3: ``ordinal`` gives *third*, ``times`` *three times*, the noun ``lap`` *three laps*.
+        Texts have no other forms than their words.
         """
         # Colors, places and clues have no other forms; numbers may have words of their own.
         if isinstance(self.value, str) or (self.words and form is None):
@@ -120,17 +121,18 @@ class Introduced:
     def referent(self, name: str) -> PointedValue:
         """Return the slot and value for which words stand that point back at a slot.
 
-        *them*, for the colors red and blue, stands for ``red and blue``.
+        *them*, for the colors red and blue, stands for ``red and blue``. Values of different slots
+        have the slot ``reference``.
         """
-        found = self.values[name]
-        if len(found) == 1:
-            return PointedValue(found[0].slot, found[0].value)
-        slots = {value.slot for value in found}
+        values = self.values[name]
+        if len(values) == 1:
+            return PointedValue(values[0].slot, values[0].value)
+        slots = {value.slot for value in values}
         slot = slots.pop() if len(slots) == 1 else REFERENCE
-        return PointedValue(slot, " and ".join(str(value.value) for value in found))
+        return PointedValue(slot, " and ".join(str(value.value) for value in values))
 
     def ranked(self, name: str, *, ordinals: bool) -> Ranked:
-        """Name a slot's value by its position in the list.
+        """Return the values with one more: words for the position of a slot's value in the list.
 
         Of two values it is *the former* or *the latter*, of three *the second one*. With
         `ordinals`, words of two values are also of the class of *the first*.
@@ -175,11 +177,11 @@ def named(value: GoalValue) -> IntroducedValue:
 
 
 def goal_values(request: InstructionRequest, first: int = 0) -> Values:
-    """Return the values of the goal by field, and all values of a slot by its name.
+    """Return the goal's values by slot, ``colors``, and one by one by field, ``colors.0``.
 
     A goal of red and blue gives ``colors``, both, ``colors.0``, red, and ``colors.1``, blue.
-    Amounts have no order: the one with the number `first` gets the fields of the first. Words that
-    point back at them stand for their colors.
+    Amounts, numbers of cubes by color, have no order: the one with the index `first` gets the
+    fields of the first. Words that point back at them stand for their colors.
     """
     values: dict[str, tuple[IntroducedValue, ...]] = {}
     for value in request.goal_values:

@@ -44,11 +44,12 @@ class LiteralFields(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def read_literals(
     written: Iterable[dict[str, Any]], tasks: Sequence[str], mistakes: Mistakes
 ) -> dict[str, dict[Goal, str]]:
-    """Return the sentences of each task, ``{"StopCube": {…}}``, by goal as `unordered` has it.
+    """Return the whole sentences of a wording file by task, and there by the goal that they state.
 
-    What is wrong with a sentence is added to the mistakes, and the sentence is left out.
+    ``{"StopCube": {<goal>: "Stop it at the third visit."}}``; the goal as `unordered` has it. What
+    is wrong with a sentence is added to `mistakes`, and the sentence is left out.
     """
-    found: dict[str, dict[Goal, str]] = {task: {} for task in tasks}
+    sentences_by_task: dict[str, dict[Goal, str]] = {task: {} for task in tasks}
     for number, table in enumerate(written, 1):
         part = mistakes.at(f"literal {number}")
         literal = fields_of(table, LiteralFields, part)
@@ -58,8 +59,8 @@ def read_literals(
             part.check_names("task", [literal.task], tasks)
             continue
         with part.kept():
-            _add_literal(literal, found[literal.task], part.where)
-    return found
+            _add_literal(literal, sentences_by_task[literal.task], part.where)
+    return sentences_by_task
 
 
 def _add_literal(literal: LiteralFields, sentences: dict[Goal, str], where: str) -> None:
@@ -75,16 +76,17 @@ def _add_literal(literal: LiteralFields, sentences: dict[Goal, str], where: str)
 def _goal(literal: LiteralFields, where: str) -> Goal:
     """Return the goal that a sentence is for: ``when = {color = "red", repeats = 2}`` as a goal.
 
-    It must have a value of the right type for each slot of the task's goals.
+    It must have a value of the right type for each slot of the task's goals. `where` names the
+    sentence in messages.
     """
-    example = _example(literal.task).as_mapping()
-    if literal.when.keys() != example.keys():
+    example_slots = _example(literal.task).as_mapping()
+    if literal.when.keys() != example_slots.keys():
         given = shown(dict(literal.when))
         raise InvalidValueError(
-            f"{where} has when = {given}; it must have a value for {' and '.join(example)}."
+            f"{where} has when = {given}; it must have a value for {' and '.join(example_slots)}."
         )
     values: dict[str, SlotValue] = {}
-    for slot, content in example.items():
+    for slot, content in example_slots.items():
         kind = _kind_of(content)
         values[slot] = converted(literal.when[slot], kind, f"{where}, when.{slot}")
     try:
@@ -136,12 +138,15 @@ def in_words(goal: Goal) -> str:
 
 
 def say_literal(request: InstructionRequest, words: TaskScenarios) -> InstructionSpec:
-    """Return the sentence for an episode; it means every goal of which the file says the same."""
+    """Return the wording file's sentence for an episode, as an instruction without fields.
+
+    It means every goal of the scene for which the file has the same sentence.
+    """
     goal = request.episode.goal
     sentence = words.literals[unordered(goal)]
-    meant: list[Goal] = []
-    for other in dict.fromkeys((goal, *goals_of(request.episode))):
-        if words.literals.get(unordered(other)) == sentence:
-            meant.append(other)
+    meant_goals: list[Goal] = []
+    for possible_goal in dict.fromkeys((goal, *goals_of(request.episode))):
+        if words.literals.get(unordered(possible_goal)) == sentence:
+            meant_goals.append(possible_goal)
     command = UtteranceSpec("command", plain(sentence))
-    return InstructionSpec((command,), Meaning({}, goals=tuple(meant)), {"command": sentence})
+    return InstructionSpec((command,), Meaning({}, goals=tuple(meant_goals)), {"command": sentence})

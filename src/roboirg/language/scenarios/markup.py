@@ -86,7 +86,10 @@ class Pointer(NamedTuple):
 
 
 def parse(text: object) -> Text:
-    """Return the parts of a sentence: of ``Lift <it color: it>.`` words, a pointer, a stop.
+    """Return the parts of a sentence: of ``Lift <it color: it>.`` words, a pointer and a stop.
+
+    Marks are slots for values, ``{color}``, pointers, which point back at a value, and words in
+    singular and plural.
 
     Raises:
         ValueError: it is none, or it has a bracket that is none of the marks.
@@ -103,7 +106,10 @@ def parse(text: object) -> Text:
 
 
 def _checked_sentence(text: object) -> str:
-    """Return a text as it is if it can be a sentence."""
+    """Return a text as it is; raise ValueError if it cannot be a sentence.
+
+    A sentence is printable ASCII on one line, and not too long.
+    """
     if isinstance(text, str) and len(text) > MOST_LETTERS:
         raise ValueError(
             f"has words of {len(text):,} characters, {shown(text)}; at most {MOST_LETTERS:,} are "
@@ -115,7 +121,10 @@ def _checked_sentence(text: object) -> str:
 
 
 def _plain_words(sentence: str, start: int, end: int) -> list[TaggedText]:
-    """Return the words between two marks, if there are any."""
+    """Return the words from one mark to the next as a list of one; empty if there are none.
+
+    Raises ValueError for a bracket that belongs to no mark.
+    """
     words = sentence[start:end]
     if _BRACKET.search(words):
         raise ValueError(

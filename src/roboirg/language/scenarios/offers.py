@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping
 
-from roboirg.language.clues import LEFT, Clue
+from roboirg.language.clues import CUBES_LEFT_OVER, Clue
 from roboirg.language.instruction import REFERENCE
 from roboirg.language.places import PlaceClass, SpokenPlace, spoken_places
 from roboirg.language.request import GoalValue, InstructionRequest
@@ -44,9 +44,11 @@ def _direct(request: InstructionRequest) -> Iterator[Offer]:
 
 
 def _spatial(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield a spot of a thing of the goal; if none has any, a place after a noun.
+    """Yield words for where a thing of the goal stands, as a way to lead to its color.
 
-    Of amounts both, where there are both: a thing stands for its color.
+    A spot, *on the left*, is preferred to words after a noun, *the cube nearest to the button*.
+    Goals with amounts may be said either way, so both are yielded; only one of their colors is
+    found out.
     """
     has_amounts = bool(request.values_of("amount"))
     for form in ("spot", None):  # None: words after a noun
@@ -63,9 +65,10 @@ def _spatial(request: InstructionRequest) -> Iterator[Offer]:
 
 
 def _placed(request: InstructionRequest, at: int, place: SpokenPlace, form: str | None) -> Offer:
-    """Return the offer of a place, said in a form, for the color with the number `at` in the goal.
+    """Return the way to the goal by a place: *the cube on the left* gives the color of that cube.
 
-    *the cube on the left* stands for the color of the cube there, at which the command points back.
+    The color has the index `at` in the goal; the command points back at the place. `form` is how
+    the place is said, ``spot`` or None for after a noun.
     """
     colors = request.color_values
     words = place.said(form)
@@ -75,8 +78,8 @@ def _placed(request: InstructionRequest, at: int, place: SpokenPlace, form: str 
         "landmark_classes": [int(place.kind)],
         "frame": request.frame,
     }
-    fields = [color.field for color in colors]
-    return Offer(fields, {"place": value, f"place.{at}": value}, notes)
+    pointing_fields = [color.field for color in colors]
+    return Offer(pointing_fields, {"place": value, f"place.{at}": value}, notes)
 
 
 def _with_others_stated(request: InstructionRequest, thing: GoalValue, offer: Offer) -> Offer:
@@ -86,26 +89,27 @@ def _with_others_stated(request: InstructionRequest, thing: GoalValue, offer: Of
 
 
 def _drawn_places(request: InstructionRequest, form: str | None) -> dict[int, SpokenPlace]:
-    """Draw a place for each color of the goal that has one in this form, by the color's number.
+    """Return a drawn place for each color of the goal that has one, by the color's index.
 
-    For the goal red and blue it may be ``{0: on the left, 1: next to the button}``. The class is
-    drawn first, or most places would be extremes.
+    For the goal red and blue it may be ``{0: on the left, 1: next to the button}``. The class of a
+    place is drawn first, or most places would be of the most frequent class. `form` is how it is
+    said.
     """
     found: dict[int, SpokenPlace] = {}
-    for at, color in enumerate(request.color_values):
+    for index, color in enumerate(request.color_values):
         places = _places_of(request, color, form)
         if places:
             kinds = list(dict.fromkeys(place.kind for place in places))
             kind = request.sampler.pick(f"{form} class-{color.field}", kinds)
             of_kind = [place for place in places if place.kind == kind]
-            found[at] = request.sampler.pick(f"{form} place-{color.field}", of_kind)
+            found[index] = request.sampler.pick(f"{form} place-{color.field}", of_kind)
     return found
 
 
 def _places_of(
     request: InstructionRequest, color: GoalValue, form: str | None
 ) -> list[SpokenPlace]:
-    """Return the places of the things of a color in a form.
+    """Return the places of the things of a color that can be said in a form.
 
     Unusual words, *third closest to you*, are taken only if there are no others, and only one of
     them.
@@ -118,7 +122,7 @@ def _places_of(
 
 
 def _grounded(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield one offer: what the scene or the video shows of a slot that is drawn.
+    """Yield one way to the goal: what only the scene or the video shows of a slot that is drawn.
 
     *the cube in the middle* is introduced, and the command points back at it.
     """
@@ -128,46 +132,51 @@ def _grounded(request: InstructionRequest) -> Iterator[Offer]:
     slots = list(dict.fromkeys(value.slot for value in clues))
     slot = request.sampler.pick("seen slot", slots)
     # Of two things only that with the shorter words is described.
-    of_slot = [value for value in clues if value.slot == slot]
-    thing = min(of_slot, key=lambda value: len(clues[value].words))
-    yield _clued(request, thing, clues[thing])
+    values_of_slot = [value for value in clues if value.slot == slot]
+    described_value = min(values_of_slot, key=lambda value: len(clues[value].words))
+    yield _clued(request, described_value, clues[described_value])
 
 
-def _clued(request: InstructionRequest, thing: GoalValue, clue: Clue) -> Offer:
-    """Return the offer of a clue to a value of the goal, at which the command points back."""
-    notes = {"touched": [thing.slot], "pattern": clue.kind, "patterns": [clue.kind]}
-    if thing.slot == "counts":  # "all but three"
-        kept = (IntroducedValue(REFERENCE, "number", LEFT),)
+def _clued(request: InstructionRequest, value: GoalValue, clue: Clue) -> Offer:
+    """Return the way to the goal by a clue, words for what is seen that lead to one of its values.
+
+    The command points back at the clue. *All but three* gives a number of cubes and their only
+    color.
+    """
+    notes = {"touched": [value.slot], "pattern": clue.kind, "patterns": [clue.kind]}
+    if value.slot == "counts":  # "all but three"
+        kept = (IntroducedValue(REFERENCE, "number", CUBES_LEFT_OVER),)
         return Offer(["colors.0", "counts.0"], {"kept": kept}, notes)
-    fields = [value.field for value in request.values_in(thing.slot)]
-    offer = Offer(fields, _seen(thing, clue), notes)
+    fields = [value.field for value in request.values_in(value.slot)]
+    offer = Offer(fields, _seen(value, clue), notes)
     if request.values_of("amount"):
-        return _with_others_stated(request, thing, offer)
+        return _with_others_stated(request, value, offer)
     return offer
 
 
-def _seen(thing: GoalValue, clue: Clue) -> Values:
-    """Return what is introduced for a clue, by slot.
+def _seen(value: GoalValue, clue: Clue) -> Values:
+    """Return what is introduced for a clue, words for what is seen that lead to a value, by slot.
 
     A clue that sets two things aside names their places, ``aside.0`` and ``aside.1``, and ``rest``
     for the thing that is left. Numbers of cubes at a side are ``beside``; all others are ``clue``.
     """
     if clue.aside:
         aside = [IntroducedValue("", "place", place, place) for place in clue.aside]
-        rest = IntroducedValue(thing.slot, "clue", thing.value, "one")
+        rest = IntroducedValue(value.slot, "clue", value.value, "one")
         return {"rest": (rest,), **several("aside", aside)}
-    seen = IntroducedValue(thing.slot, "clue", thing.value, clue.words)
-    counted = IntroducedValue(thing.slot, "clue", thing.value, clue.short)
+    seen = IntroducedValue(value.slot, "clue", value.value, clue.words)
+    counted = IntroducedValue(value.slot, "clue", value.value, clue.short)
     if clue.kind == "counts":
         return {"beside": (seen,), "counted": (counted,)}
-    _, _, number = thing.field.partition(".")
+    _, _, number = value.field.partition(".")
     return {"clue": (seen,), f"clue.{number}": (seen,), "counted": (counted,)}
 
 
 def _rival(request: InstructionRequest) -> Iterator[Offer]:
-    """Yield one offer: the meant value and its rival, of which a remark chooses one.
+    """Yield one way to the goal: its value and another one are named, and a remark chooses.
 
-    The rival is drawn so that both values are meant equally often.
+    *Red or blue? The latter.* The other value, a rival, is drawn so that both values are meant
+    equally often.
     """
     pair = balanced_rival(request, rival_pairs(request))
     order = draw_order(request)
@@ -180,7 +189,7 @@ def _rival(request: InstructionRequest) -> Iterator[Offer]:
 
 
 def _rival_notes(pair: ValuePair, order: PairOrder) -> dict[str, object]:
-    """Return the entries of the metadata for a rival."""
+    """Return the entries of the metadata for a value and its rival, which is named next to it."""
     candidates = [value.value for value in pair]
     if not order.is_meant_first:
         candidates.reverse()

@@ -157,7 +157,13 @@ def read_task_scenarios(text: str, where: str) -> Mapping[str, TaskScenarios]:
 # Cached: each task that a file serves asks for its head.
 @functools.lru_cache(maxsize=8)
 def read_head(text: str, where: str) -> FileFields:
-    """Return the content of a file with its tables as they were written."""
+    """Return the content of a file of words, checked for its fields; its tables are as written.
+
+    `where` names the file in messages.
+
+    Raises:
+        InvalidValueError: it is no TOML, lacks tasks, or has fields that no such file has.
+    """
     data = data_of(text, where)
     for task in every_task():
         if task in data:
@@ -175,9 +181,10 @@ def read_head(text: str, where: str) -> FileFields:
 
 
 def tasks_in(head: FileFields, where: str) -> Mapping[str, TaskScenarios]:
-    """Return the words of each task that a file serves, like `read_task_scenarios`.
+    """Return the words of each task that a file serves; raise one error with all of its mistakes.
 
-    A task for which it has no commands has those of its own file; so does each stated value.
+    The words are commands, words that state values, and scenarios. A task for which the file has no
+    commands has those of its own file; so does each stated value.
     """
     mistakes = Mistakes(where)
     mistakes.check_names("task", head.tasks, every_task())
@@ -204,7 +211,7 @@ def _check_stated(head: FileFields, words: Mapping[str, TaskScenarios], mistakes
 def _add_scenarios(
     head: FileFields, words: Mapping[str, TaskScenarios], mistakes: Mistakes
 ) -> None:
-    """Add the scenarios of a file to the words of each task that they serve."""
+    """Add each scenario of a file to the words of the tasks that it serves: its own, or all."""
     for scenario in _scenarios(head, _stated_in(words), mistakes):
         served = scenario.fields.needs.tasks or head.tasks
         for task, task_words in words.items():
@@ -221,23 +228,23 @@ def _stated_in(words: Mapping[str, TaskScenarios]) -> dict[str, Text]:
 
 
 def _of_task(tables: Mapping[str, Any], task: str) -> dict[Any, Any]:
-    """Return what a file has for a task, by its name or for all tasks; its own entries win.
+    """Return what a table of a file has for a task: entries for all tasks, then its own, which win.
 
-    A list is for both pools: ``["Lift it."]`` becomes ``{"train": […], "test": […]}``.
+    A list is for both pools: ``["Lift it."]`` becomes ``{"train": [...], "test": [...]}``.
     """
-    found: dict[Any, Any] = {}
+    entries: dict[Any, Any] = {}
     for owner in (ALL, task):
         table = tables.get(owner, {})
         if isinstance(table, tuple):
             table = dict.fromkeys(POOLS, table)
-        found |= table
-    return found
+        entries |= table
+    return entries
 
 
 def _command_words(
     head: FileFields, task: str, literals: Literals, mistakes: Mistakes
 ) -> TaskScenarios:
-    """Return the words of a task but its scenarios: commands, and words that state values.
+    """Return a task's commands and words that state values, with no scenarios yet.
 
     What the file lacks is taken from the file that the task names for its words.
     """
@@ -248,21 +255,25 @@ def _command_words(
 
     own_stated = _of_task(head.stated, task)
     stated = _stated_texts(_of_task(task_head.stated, task), own_stated, mistakes)
-    parts = list(own_stated)
+    own_parts = list(own_stated)
     commands = _of_task(task_head.commands, task)
     if ALL in head.commands or task in head.commands:
         commands = _of_task(head.commands, task)
-        parts.append(COMMANDS)
+        own_parts.append(COMMANDS)
     # Whole sentences need no commands: a task without words of ours may have nothing else.
-    if COMMANDS in parts or commands or not literals:
+    if COMMANDS in own_parts or commands or not literals:
         _check_commands(commands, task, stated, mistakes)
-    return TaskScenarios(commands, stated, [], mistakes.where, literals, parts)
+    return TaskScenarios(commands, stated, [], mistakes.where, literals, own_parts)
 
 
 def _stated_texts(
     usual: Mapping[str, str], own: Mapping[str, str], mistakes: Mistakes
 ) -> dict[str, Text]:
-    """Return the words that state each field of a task: a file's own, or else the usual ones."""
+    """Return the words that state each field of a task: a file's own, or else the usual ones.
+
+    ``{"color": <the {color} cube>}``. A mistake is added for words with marks other than their own
+    value.
+    """
     stated: dict[str, Text] = {}
     for name, usual_text in usual.items():
         part = mistakes.at(f"stated {name}")
@@ -278,7 +289,10 @@ def _stated_texts(
 def _check_commands(
     commands: Mapping[PoolName, Texts], task: str, stated: Collection[str], mistakes: Mistakes
 ) -> None:
-    """Check that each pool has commands, with no marks but values that are stated."""
+    """Add a mistake for each pool without commands, and for each command with unknown marks.
+
+    A command may only have marks for values that are stated, ``{color}``.
+    """
     part = mistakes.at(f"commands of {task}")
     for pool in POOLS:
         texts = commands.get(pool, ())
@@ -299,24 +313,24 @@ def _check_command(text: str, stated: Collection[str], mistakes: Mistakes) -> No
 
 
 def _scenarios(head: FileFields, stated: Collection[str], mistakes: Mistakes) -> Iterator[Scenario]:
-    """Yield the scenarios of a file whose fields are right; each mistake is added.
+    """Yield the scenarios of a file whose fields are right; add a mistake for all others.
 
     A frame, which is the name of a scenario, may be there once for each setting and pool.
     """
-    taken: dict[str, set[str]] = {}  # by frame: the settings with pools that have it
+    settings_by_frame: dict[str, set[str]] = {}  # by frame: the settings with pools that have it
     # In files of users, which have a name, a scenario without a pool is for both.
-    usual: dict[str, Any] = {"pool": None} if head.name else {}
+    default_fields: dict[str, Any] = {"pool": None} if head.name else {}
     for number, table in enumerate(head.scenario, 1):
         part = mistakes.at(f"scenario {shown(table.get('frame', number))}")
-        scenario = _scenario(usual | table, stated, part)
+        scenario = _scenario(default_fields | table, stated, part)
         if scenario is None:
             continue
         part.at("needs.tasks").check_names("task", scenario.fields.needs.tasks, head.tasks)
-        before = taken.setdefault(scenario.fields.frame, set())
+        settings_before = settings_by_frame.setdefault(scenario.fields.frame, set())
         settings = _settings_of(scenario)
-        if settings & before:
-            part.add(f"stands twice in the setting {min(settings & before)}")
-        before |= settings
+        if settings & settings_before:
+            part.add(f"stands twice in the setting {min(settings & settings_before)}")
+        settings_before |= settings
         yield scenario
 
 
@@ -330,13 +344,13 @@ def _settings_of(scenario: Scenario) -> set[str]:
 def _scenario(
     table: Mapping[str, Any], stated: Collection[str], mistakes: Mistakes
 ) -> Scenario | None:
-    """Return a scenario; None if a field has a mistake. Each mistake is added.
+    """Return the scenario that a table of the file holds; None if a field has a mistake.
 
-    What its fields need of each other is checked once each of them is right.
+    Each mistake is added. What its fields need of each other is checked once each of them is right.
     """
-    flat = _flat_table(table)
-    fields = fields_of(flat, ScenarioFields, mistakes, sentence_names(stated))
-    texts = _sentences(flat, fields, stated, mistakes)
+    flat_table = _flat_table(table)
+    fields = fields_of(flat_table, ScenarioFields, mistakes, sentence_names(stated))
+    texts = _sentences(flat_table, fields, stated, mistakes)
     if fields is None:
         return None
     _check_names(fields, mistakes.at("frame or people"))
@@ -355,7 +369,7 @@ def _check_names(fields: ScenarioFields, mistakes: Mistakes) -> None:
 
 
 def _flat_table(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a scenario's table with the sentences of inner tables by full name, ``say.color``."""
+    """Return a scenario's table with its sentences by full name: ``say.color``, not ``say``."""
     flat: dict[str, Any] = {}
     for name, value in table.items():
         if name in ScenarioFields.__struct_fields__:
@@ -390,25 +404,25 @@ def _sentences(
 
 
 def _operations(fields: ScenarioFields | None) -> set[str]:
-    """Return the operations of the relations that a scenario can say."""
-    found: set[str] = set()
+    """Return the operations, ``minus`` or ``after``, that the relations of a scenario stand for."""
+    operations: set[str] = set()
     if fields is not None and fields.derive is not None:
         for name in fields.derive.relations:
             if name in EVERY_RELATION:
-                found.add(EVERY_RELATION[name].operation)
-    return found
+                operations.add(EVERY_RELATION[name].operation)
+    return operations
 
 
 def _people(fields: ScenarioFields, texts: Sentences) -> tuple[Texts, ...]:
-    """Return who can be spoken of, with pronouns: ``("Leo", "he", "him", "his", "his")``.
+    """Return the people of whom a scenario can speak, with pronouns; empty if it names none.
 
-    Empty if no sentence speaks of a person.
+    One is ``("Leo", "he", "him", "his", "his")``.
     """
-    said: set[str] = set()
+    slots: set[str] = set()
     for alternatives in texts.values():
         for text in alternatives:
-            said.update(slots_in(text))
-    if PEOPLE.isdisjoint(said):
+            slots.update(slots_in(text))
+    if PEOPLE.isdisjoint(slots):
         return ()
     people: list[Texts] = []
     for pronoun, names in (fields.people or general().people).items():
@@ -462,16 +476,20 @@ class _SentenceReader:
     slots: Collection[str]
 
     def read(self, text: object, mistakes: Mistakes) -> Text:
-        """Return a sentence, with the rows of the closed table for what points back."""
+        """Return the parts of a sentence, with what its pointers, words that point back, mean.
+
+        The table of pointers says what they mean. Mistakes are added: unknown slots, and words
+        that are not in the table.
+        """
         parts = _parsed(text, mistakes)
         mistakes.check_names("slot", slots_in(parts), self.slots)
-        sentence: list[Part] = []
+        parts_read: list[Part] = []
         for part in parts:
             if isinstance(part, Pointer):
-                sentence.append(self._pointing(part, str(text), mistakes))
+                parts_read.append(self._pointing(part, str(text), mistakes))
             else:
-                sentence.append(part)
-        return tuple(sentence)
+                parts_read.append(part)
+        return tuple(parts_read)
 
     def _pointing(self, pointer: Pointer, sentence: str, mistakes: Mistakes) -> Pointer:
         """Return a pointer of a sentence with what its row in the table of pointers says.
@@ -528,10 +546,10 @@ def _written(row: PointerRow, of: str) -> str:
 
 
 def type_of(name: str, listed: str = "") -> str:
-    """Return the type of what a slot stands for, as in ``of`` of the table of pointers.
+    """Return the type of the value that a slot holds, as the table of pointers names it.
 
     ``repeats`` gives ``number`` and ``list`` gives ``pair``; ``list.0`` and ``taken`` have the type
-    of what is listed.
+    of what is listed, the slot `listed`.
     """
     base, _, number = name.partition(".")
     if not number and base == "list":

@@ -39,7 +39,7 @@ def sentence_names(stated: Collection[str]) -> list[str]:
 
 
 def check_needs(scenario: Scenario, stated: Collection[str], mistakes: Mistakes) -> None:
-    """Check that a scenario has what its setting and its other fields need; each lack is added.
+    """Add a mistake for all that a scenario lacks of what its setting and other fields need.
 
     `stated` has the fields of the task's commands: ``color``, ``repeats``.
     """
@@ -56,8 +56,8 @@ def check_needs(scenario: Scenario, stated: Collection[str], mistakes: Mistakes)
     if has_derive != (setting.offers == "reasoning"):
         mistakes.add("must have derive if its setting is reasoning, and only then")
     if fields.people is not None:
-        people = set(itertools.chain.from_iterable(fields.people.values()))
-        if len(people) < _FEWEST_PEOPLE:
+        names_of_people = set(itertools.chain.from_iterable(fields.people.values()))
+        if len(names_of_people) < _FEWEST_PEOPLE:
             mistakes.add("has fewer than two people; leave people out to speak of anybody")
     if fields.list:
         slots = sorted(SLOT_TYPE_NAMES.keys() & slots_of(stated))
@@ -66,7 +66,7 @@ def check_needs(scenario: Scenario, stated: Collection[str], mistakes: Mistakes)
 
 
 def _check_presence(scenario: Scenario, setting: Setting, mistakes: Mistakes) -> None:
-    """Check that a scenario has the sentences that its setting says, and that no field is empty."""
+    """Add a mistake if a scenario lacks a sentence that its setting says, or has an empty one."""
     needed: list[str] = ["introduction"]
     if setting.name == "direct":
         needed += CONTEXTUAL
@@ -81,10 +81,10 @@ def _check_presence(scenario: Scenario, setting: Setting, mistakes: Mistakes) ->
 
 
 def _check_sentences(scenario: Scenario, mistakes: Mistakes) -> None:
-    """Check what the sentences of some fields must speak of.
+    """Add a mistake for each sentence of a scenario that does not speak of what it must.
 
-    Competing remarks name a rival, remarks that choose point at something, and all words for a
-    field leave the same fields of the goal open.
+    Remarks that compete name a value that is not meant, remarks that choose point at something, and
+    all words for a field leave the same fields of the goal to the context.
     """
     for text in scenario.texts.get("competing", ()):
         if not any(name.startswith("rival ") for name in slots_in(text)):

@@ -52,7 +52,7 @@ from roboirg.language.scenarios.scenario import Scenario, TaskScenarios
 from roboirg.language.scenarios.scenario_file import general
 from roboirg.language.settings import all_settings
 
-_LOOKING = ("spatial", "grounded")
+_WAYS_BY_SIGHT = ("spatial", "grounded")
 """Ways to the goal on which the scene gives a value; the resolved form says where to look."""
 _ALWAYS_CAPITAL = re.compile(r"I\b|[A-Z]{2}")
 """*I*, *I'd*, and words in capitals: they stay as they are within a sentence."""
@@ -127,9 +127,9 @@ class Speech:
         return values.phrase(slot)
 
     def _agreeing(self, agreement: Agreement, values: Introduced) -> TaggedText:
-        """Return the singular or the plural of words, and remember with which they agree.
+        """Return the singular or the plural of words, and remember with which value they agree.
 
-        ``[repeats: lap|laps]`` is *laps* for two repeats.
+        ``[repeats: lap|laps]``, an agreement, is *laps* for two repeats.
         """
         controller = agreement.controller
         if controller == "step":  # *right before*, *two before*
@@ -139,17 +139,23 @@ class Speech:
         return TaggedText(agreement.one if is_single else agreement.many)
 
     def _pointing(self, pointer: Pointer) -> Phrase:
-        """Return words that point back, as a mention: *it*, which stands for the color red."""
+        """Return words that point back, tagged with what they stand for: *it*, the color red.
+
+        A rank, *the latter*, gets the position of its value in the list.
+        """
         values = self._introduced
-        kind = cast("Expression", pointer.expression)
+        expression = cast("Expression", pointer.expression)
         if pointer.expression == "rank":
-            values, kind = values.ranked(pointer.of, ordinals="ordinal" in pointer.words)
+            values, expression = values.ranked(pointer.of, ordinals="ordinal" in pointer.words)
         words = words_of(self.phrase(pointer.parts, values))
         referent = values.referent(pointer.of)
-        return anaphor(words, kind, referent.slot, referent.value)
+        return anaphor(words, expression, referent.slot, referent.value)
 
     def _named(self, pointer: Pointer) -> Phrase:
-        """Return words that name what a pointer stands for: *the red cube* in place of *it*."""
+        """Return words that name what a pointer stands for: *the red cube* in place of *it*.
+
+        A pointer is words that point back. It is replaced in the resolved form of an instruction.
+        """
         text = pointer.resolved
         if not text:
             text = self._referent(pointer.of)
@@ -162,7 +168,10 @@ class Speech:
         return antecedent(words_of(self.phrase(text)), referent.slot, referent.value)
 
     def _referent(self, name: str) -> Text:
-        """Return the words for what a slot stands for, to be filled: *the red cube*, *twice*."""
+        """Return a sentence part that names what a slot holds, with marks: *the {color} cube*.
+
+        By the type of the value: a color gets a noun, a visit or placement *the*, a number *twice*.
+        """
         values = self._introduced.values[name]
         kind = values[0].kind if len(values) == 1 else "several"
         if kind in ("placement", "relation") and name in self._words.stated:
@@ -205,10 +214,10 @@ class Speech:
         return listed(phrases)
 
     def _resolved(self, name: str, words: Text, scenario: Scenario) -> Text:
-        """Return the words for a field in the resolved form.
+        """Return the words for a field of the command when it has to name its value.
 
         They are the scenario's own if it has any, or those that state the value, or else the same
-        words, in which pointers will be replaced.
+        words, in which those that point back will be replaced.
         """
         own = scenario.texts.get(f"resolved.{name}")
         if own:
@@ -220,15 +229,16 @@ class Speech:
     def _is_stated(self, words: Text, scenario: Scenario) -> bool:
         """Return whether the resolved form states the value for which some words stand."""
         way = all_settings()[scenario.fields.setting].offers
-        if way not in _LOOKING:
+        if way not in _WAYS_BY_SIGHT:
             return way != "reasoning"
         fields = [value.field for value in self._request.goal_values]
         return all(pointer.of in fields for pointer in pointers_in(words))
 
     def meaning(self, command: Phrase) -> Meaning:
-        """Return what has been said, of which some fields point back at what came before.
+        """Return how the value of each field follows from what has been said.
 
-        A field is also settled if the command names its value, whatever points back.
+        It also has the fields whose values the command alone gives, ``settled``: it names them, or
+        their words do not point back.
         """
         fields = [value.field for value in self._request.goal_values]
         terms = {field: self._terms[field] for field in fields}
@@ -242,17 +252,17 @@ class Speech:
         return Meaning(terms, frozenset(settled), agrees=dict(self._agrees))
 
     def command(self, fields: Mapping[str, Phrase], lead: Phrase) -> Phrase:
-        """Return the command with the words for some fields; the others state their values.
+        """Return the command with the words for some fields; all other fields state their values.
 
-        The lead comes before it: *So, pick it up.* or *All right. Pick it up.*
+        The lead, words before it, comes first: *So, pick it up.* or *All right. Pick it up.*
         """
         skeleton = self._skeleton(fields)
         if lead:
             # After "So," the command goes on in small letters; after "All right." it does not.
-            lead = _begun(lead, str.upper)
+            lead = _with_first_letter(lead, str.upper)
             is_sentence = lead[-1].text.endswith((". ", "! ", "? "))
             if not is_sentence and not _ALWAYS_CAPITAL.match(skeleton[0].text):
-                skeleton = _begun(skeleton, str.lower)
+                skeleton = _with_first_letter(skeleton, str.lower)
         return (*lead, *skeleton)
 
     def _skeleton(self, fields: Mapping[str, Phrase]) -> Phrase:
@@ -276,7 +286,11 @@ class Speech:
         return swap_particles(filled) if fields else filled
 
     def _commands_with(self, wanted: set[str]) -> list[str]:
-        """Return the commands of the pool that say exactly the wanted fields."""
+        """Return the commands of the pool that have exactly the wanted fields as marks.
+
+        For ``{"color", "repeats"}``: *Pick up {color} {repeats}.* Raises InvalidValueError if there
+        is none.
+        """
         pool = self._request.pool
         commands = [text for text in self._words.commands[pool] if _fields_in(text) == wanted]
         if not commands:
@@ -296,23 +310,25 @@ class Speech:
         yield from map(plain, self._request.sampler.cycle("distractor", known))
 
     def competing(self, scenario: Scenario) -> Iterator[Phrase]:
-        """Yield the scenario's remarks about other values than the goal's, in any order, for ever.
+        """Return remarks about values that are not meant, in any order and for ever.
+
+        They are those of the scenario, each with every such value for which it has a slot.
 
         Raises:
             LookupError: none of them has a value for all of its slots.
         """
         texts = scenario.texts["competing"]
-        found: dict[Phrase, None] = {}  # each once, in order
+        remarks: dict[Phrase, None] = {}  # each once, in order
         for text in texts:
             slots = set(slots_in(text))
             for values in rival_values(self._request, self._introduced):
                 if slots <= values.values.keys():
-                    found[self.phrase(text, values)] = None
-        if not found:
+                    remarks[self.phrase(text, values)] = None
+        if not remarks:
             said = itertools.chain.from_iterable(map(slots_in, texts))
             lacking = sorted(set(said) - self._introduced.values.keys())
             raise LookupError(f"a competing remark with a value for {' or '.join(lacking)}")
-        return self._request.sampler.cycle("competing distractor", list(found))
+        return self._request.sampler.cycle("competing distractor", list(remarks))
 
 
 @functools.cache  # of the same few for every episode
@@ -330,7 +346,7 @@ def _named_values(words: Phrase) -> set[PointedValue]:
     return found
 
 
-def _begun(words: Phrase, case: Callable[[str], str]) -> Phrase:
+def _with_first_letter(words: Phrase, case: Callable[[str], str]) -> Phrase:
     """Return words whose first letter is made a capital, or small."""
     first, *rest = words
     text = case(first.text[:1]) + first.text[1:]

@@ -60,7 +60,10 @@ _MOST_CHOICES = 256
 
 
 def refusal(request: InstructionRequest) -> str | None:
-    """Return why a setting cannot express an episode; None if it can."""
+    """Return why a setting, a way to say the goal, cannot express an episode; None if it can.
+
+    It may lack words of the task, exclude the episode, or have no scenario that fits it.
+    """
     setting = _setting_of(request)
     words = _find_words(request)
     is_explicit = setting.offers == EXPLICIT
@@ -82,7 +85,10 @@ def _no_words(task: Task, setting: Setting) -> str:
 
 
 def say(request: InstructionRequest) -> InstructionSpec:
-    """Return the words of an episode in a setting that does not refuse it."""
+    """Return the words of an episode in a setting, a way to say the goal, that does not refuse it.
+
+    They are a scenario's, a whole sentence of a wording file, or a command that states the goal.
+    """
     words = cast("TaskScenarios", _find_words(request))
     if _setting_of(request).offers != EXPLICIT:
         choice = _choose(request)
@@ -103,9 +109,10 @@ def _find_words(request: InstructionRequest) -> TaskScenarios | None:
 
 
 def _choose(request: InstructionRequest) -> _Choice:
-    """Return what a setting says of an episode, from the cache if it was chosen before.
+    """Return what a setting says of an episode, or why it says nothing; cached.
 
-    Nothing is chosen if the setting refuses the episode.
+    All forms of an instruction say the same, so that one choice serves them. A cached choice counts
+    only for the same episode, with its goal.
     """
     setting = _setting_of(request)
     key = (
@@ -119,10 +126,10 @@ def _choose(request: InstructionRequest) -> _Choice:
         request.sampler.key,
         request.frame,
     )
-    known = _CHOICES.get(key)
+    cached_choice = _CHOICES.get(key)
     # The sampler's key has task and seed: the same scene with another goal is another episode.
-    if known is not None and known.episode == request.episode:
-        return known
+    if cached_choice is not None and cached_choice.episode == request.episode:
+        return cached_choice
     if len(_CHOICES) >= _MOST_CHOICES:
         _CHOICES.clear()
     choice = _choose_anew(request, setting)
@@ -136,25 +143,29 @@ def _scenario_setting(setting: Setting) -> str:
 
 
 def _choose_anew(request: InstructionRequest, setting: Setting) -> _Choice:
-    """Return what a setting says of an episode, with the draws; or why it says nothing."""
+    """Return what a setting says of an episode, with the draws noted; or why it says nothing.
+
+    A scenario is what a person says of the task, with slots for values; one of the setting's
+    scenarios for the pool of words is drawn.
+    """
     # A refusal may draw, but its draws are not those of the words: they go to a log of their own.
     reason = setting.refusal(_with_log(request, []))
     if reason is not None:
         return _Choice(request.episode, None, [], reason)
     words = cast("TaskScenarios", _find_words(request))
-    name = _scenario_setting(setting)
+    scenario_setting = _scenario_setting(setting)
     scenarios = [
         scenario
         for scenario in words.scenarios
-        if scenario.fields.setting == name and scenario.fields.is_in(request.pool)
+        if scenario.fields.setting == scenario_setting and scenario.fields.is_in(request.pool)
     ]
     log: list[str] = []
-    chosen = choose(_with_log(request, log), name, scenarios)
+    chosen = choose(_with_log(request, log), scenario_setting, scenarios)
     if chosen is None:
-        file = setting.words or words.file
-        reason = f"{file} has no {name} scenario for it in the pool {request.pool}"
+        file_name = setting.words or words.file
+        reason = f"{file_name} has no {scenario_setting} scenario for it in the pool {request.pool}"
         if scenarios:
-            reason += f": {misfit(_with_log(request, []), name, scenarios)}"
+            reason += f": {misfit(_with_log(request, []), scenario_setting, scenarios)}"
     return _Choice(request.episode, chosen, log, reason)
 
 
@@ -190,7 +201,11 @@ def say_chosen(
 def _scenario_words(
     request: InstructionRequest, words: TaskScenarios, chosen: Chosen
 ) -> InstructionSpec:
-    """Return the words of a scenario; LookupError if it speaks of what has no value."""
+    """Return the utterances of a scenario, with what they mean and notes for the metadata.
+
+    First the introduction, then the stages that are asked for, if any, and the command. Raises
+    LookupError if the scenario speaks of what has no value in the episode.
+    """
     scenario = chosen.scenario
     speech = Speech(request, words, chosen.introduced, scenario)
     utterances = [UtteranceSpec("introduction", speech.phrase(scenario.text("introduction")))]
@@ -214,8 +229,8 @@ def _stage_notes(options: InstructionOptions) -> dict[str, object]:
 def _command(request: InstructionRequest, speech: Speech, chosen: Chosen) -> Phrase:
     """Return the last utterance, such as *So, pick it up twice*.
 
-    The words before the command, *So,*, then a command of the task with the scenario's words, *it*,
-    in its fields.
+    It has the words before the command, *So,*, then a command of the task with the scenario's
+    words, *it*, in its fields.
     """
     field_words: dict[str, Text] = {}
     for name in chosen.scenario.said:
@@ -225,11 +240,11 @@ def _command(request: InstructionRequest, speech: Speech, chosen: Chosen) -> Phr
     # The lead is said before the fields, which can point back at what it names.
     speech.begin_command()
     lead = _lead(request, chosen)
-    before = speech.phrase(lead.text, resolved=request.resolved)
+    lead_words = speech.phrase(lead.text, resolved=request.resolved)
     fields: dict[str, Phrase] = {}
     for name, text in field_words.items():
         fields[name] = speech.field(name, text, lead.remark)
-    return speech.command(fields, before)
+    return speech.command(fields, lead_words)
 
 
 class _Lead(NamedTuple):
@@ -240,10 +255,10 @@ class _Lead(NamedTuple):
 
 
 def _lead(request: InstructionRequest, chosen: Chosen) -> _Lead:
-    """Return the words before the command of a scenario, *So,*.
+    """Return the words before the command of a scenario, *So,*, with the remark in them if any.
 
-    If a remark chooses one of two values, *Let's skip the former*, one is drawn and comes after
-    them.
+    If a remark is to choose one of two values, *Let's skip the former*, one is drawn and comes
+    after *So,*. In the resolved form, which names what is meant, no remark is needed.
     """
     scenario = chosen.scenario
     if request.resolved and "resolved.lead" in scenario.texts:
@@ -262,7 +277,11 @@ def _lead(request: InstructionRequest, chosen: Chosen) -> _Lead:
 def _stages(
     request: InstructionRequest, speech: Speech, scenario: Scenario
 ) -> Iterator[UtteranceSpec]:
-    """Yield the stages between introduction and command that are asked for."""
+    """Yield the utterances between introduction and command, as far as they are asked for.
+
+    The options have the numbers of these stages. One of them has several remarks that do not
+    matter; each is an utterance.
+    """
     for number, stage in _STAGES.items():
         if number not in request.options.stages:
             continue
@@ -276,7 +295,10 @@ def _stages(
 def _distractors(
     options: InstructionOptions, speech: Speech, scenario: Scenario
 ) -> Iterator[Phrase]:
-    """Yield as many remarks as are asked for: neutral ones, or those about other values."""
+    """Yield remarks that do not matter, as many as are asked for.
+
+    They are neutral, or speak of values other than those that are meant (``competing``).
+    """
     remarks = speech.neutral(scenario)
     if options.distractor == "competing":
         remarks = speech.competing(scenario)

@@ -47,7 +47,11 @@ def read_words(path: Path) -> Wordings:
 
 
 def parse_wordings(text: str, where: str, *, needs_name: bool = True) -> Wordings:
-    """Return the content of a wording file; `where` names it in messages."""
+    """Return the content of a wording file: words of its tasks under its name and a hash.
+
+    `where` names the file in messages. Raises InvalidValueError for an invalid file, or one without
+    words of a task that it lists.
+    """
     head = read_head(text, where)
     if head.name or needs_name:
         check_name(head.name, where)

@@ -66,7 +66,8 @@ def find_wordings(identity: str) -> Wordings:
 def task_words(task: str, setting: str, wordings: str | None) -> TaskScenarios | None:
     """Return what is said of a task in a setting; None if nothing has been written.
 
-    A wording file comes before the file of a setting, and this one before the file of the task.
+    An open wording file comes before the file of the setting, and this one before the file of the
+    task.
 
     Args:
         task: its name.
@@ -83,8 +84,8 @@ def task_words(task: str, setting: str, wordings: str | None) -> TaskScenarios |
 def _with_ours(task: str, setting: str, identity: str) -> TaskScenarios | None:
     """Return the words of a wording file for a task, with ours where the file has none.
 
-    That goes for the commands as a whole, for each stated field, and for the scenarios of each
-    setting.
+    Ours stand in for its commands if it has none at all, for each value that it does not state, and
+    for each setting of which it has no scenario.
     """
     ours = words_in(setting, task)
     theirs = find_wordings(identity).tasks.get(task)

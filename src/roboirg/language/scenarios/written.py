@@ -116,7 +116,10 @@ def data_of(text: str, where: str) -> dict[str, Any]:
 
 
 def converted(value: object, kind: type[Stored], where: str) -> Stored:
-    """Return a value of a file as a type; `where` names its field in complaints."""
+    """Return a value of a file as a type; raise if it has another one.
+
+    `where` names its field in the message.
+    """
     choices = _choices(kind)
     if choices and value not in (None, *choices):
         raise InvalidValueError(f"{where} is {shown(value)}; it must be {' or '.join(choices)}.")
@@ -139,24 +142,24 @@ def _plain(complaint: str) -> str:
 def fields_of(
     written: Mapping[str, Any], kind: type[Table], mistakes: Mistakes, others: Iterable[str] = ()
 ) -> Table | None:
-    """Return the fields of a table as a struct; None if it lacks one or one is wrong.
+    """Return a table of a file as a struct; None if it lacks a field or one is wrong.
 
-    Each mistake is added. `others` are fields that a table can have and the struct has not.
+    All mistakes are added. `others` are fields that a table can have and the struct has not.
     """
     found: dict[str, Any] = {}
-    is_whole = True  # until a field lacks or is wrong; then all others are checked as well
+    is_right = True  # until a field lacks or is wrong; then all others are checked as well
     for field in msgspec.structs.fields(kind):
         if field.name in written:
             where = f"{mistakes.where}, {field.name}"
             with mistakes.kept():
                 found[field.name] = converted(written[field.name], field.type, where)
             if field.name not in found:
-                is_whole = False
+                is_right = False
         elif field.required:
             mistakes.add(f"has no {field.name}")
-            is_whole = False
+            is_right = False
     mistakes.check_names("field", written, (*kind.__struct_fields__, *others))
-    if not is_whole:
+    if not is_right:
         return None
     return kind(**found)
 

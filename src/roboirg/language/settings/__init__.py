@@ -59,7 +59,10 @@ SETTING_GROUPS = {"all": plain_settings, "every": setting_names}
 
 
 def expand_settings(words: Iterable[str]) -> tuple[str, ...]:
-    """Return words with those of `SETTING_GROUPS` replaced, each once, the replaced ones first."""
+    """Return names of settings, with words for groups, ``all``, replaced by the names they mean.
+
+    Each name stands there once, those from groups first.
+    """
     names: list[str] = []
     others: list[str] = []
     for word in words:

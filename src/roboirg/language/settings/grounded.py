@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from roboirg.core.episode import Goal, Scene, values_in
 from roboirg.core.goal_slots import COLOR_SLOTS
 from roboirg.core.motions import Away
-from roboirg.language.clues import LEFT, Clue, EventClue, event_clues, thing_clues
+from roboirg.language.clues import CUBES_LEFT_OVER, Clue, EventClue, event_clues, thing_clues
 from roboirg.language.request import GoalValue, InstructionRequest
 from roboirg.language.settings.setting import Setting
 from roboirg.tasks import Task
@@ -27,20 +27,20 @@ def refusal(request: InstructionRequest) -> str | None:
 
 
 def clues_of(request: InstructionRequest) -> Clues:
-    """Return a clue for each value of the goal that the words leave to what is seen.
+    """Return words for what is to be seen for each value of the goal that has any.
 
     For the goal *red* it may be *the cube in the middle*. Where a color is described, counts are
-    stated, so they have no clue.
+    stated, so they have none.
     """
-    found: dict[GoalValue, Clue] = {}
+    clue_by_value: dict[GoalValue, Clue] = {}
     for value in request.goal_values:
         clues = _clues_to(request, value)
         if clues:
-            found[value] = _drawn(request, f"{value.field} seen", clues)
-    has_color = any(value.slot == "colors" for value in found)
+            clue_by_value[value] = _drawn(request, f"{value.field} seen", clues)
+    has_color = any(value.slot == "colors" for value in clue_by_value)
     if has_color:  # the words then state the counts
-        return {value: clue for value, clue in found.items() if value.slot != "counts"}
-    return found
+        return {value: clue for value, clue in clue_by_value.items() if value.slot != "counts"}
+    return clue_by_value
 
 
 def _drawn(request: InstructionRequest, purpose: str, clues: list[Clue]) -> Clue:
@@ -51,7 +51,11 @@ def _drawn(request: InstructionRequest, purpose: str, clues: list[Clue]) -> Clue
 
 
 def _clues_to(request: InstructionRequest, value: GoalValue) -> list[Clue]:
-    """Return the clues to a value; none if the other slots of the goal already give it."""
+    """Return the words for what is to be seen that lead to a value of the goal.
+
+    They speak of the video if there is one, and else of the scene. Empty if the other slots of the
+    goal already give the value.
+    """
     scene = request.episode.scene
     if not _is_open(request, value.slot):
         return []
@@ -66,7 +70,10 @@ def _clues_to(request: InstructionRequest, value: GoalValue) -> list[Clue]:
 
 
 def _color_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
-    """Return the clues to the things of a color, each by where it stands."""
+    """Return words that lead to the things of a color, each by where it stands.
+
+    Empty for amounts in scenes in which cubes arrive later.
+    """
     scene = request.episode.scene
     if request.values_of("amount") and _is_late(scene):
         return []  # another cube may be meant when it is there
@@ -79,14 +86,14 @@ def _color_clues(request: InstructionRequest, color: GoalValue) -> list[Clue]:
 
 
 def _is_open(request: InstructionRequest, slot: str) -> bool:
-    """Return whether several goals of the scene differ in this slot only.
+    """Return whether the scene has goals that differ from the episode's in this slot only.
 
-    If just one goal has the same values in all other slots, these give this one away.
+    If not, the values of the other slots give this one away.
     """
-    rest = _values_of_others(request.episode.goal, slot)
+    other_values = _values_of_others(request.episode.goal, slot)
     goals = request.task.goals(request.episode.scene)
-    agreeing = [goal for goal in goals if _values_of_others(goal, slot) == rest]
-    return len(agreeing) > 1
+    equal_elsewhere = [goal for goal in goals if _values_of_others(goal, slot) == other_values]
+    return len(equal_elsewhere) > 1
 
 
 def _values_of_others(goal: Goal, slot: str) -> list[str]:
@@ -99,7 +106,10 @@ def _values_of_others(goal: Goal, slot: str) -> list[str]:
 
 
 def _is_said(request: InstructionRequest, event: EventClue, value: GoalValue) -> bool:
-    """Return whether something in the video leads to a value, and is drawn to be said."""
+    """Return whether a clue from the video leads to a value, and is drawn to be said.
+
+    Some clues are said in a share of their scenes only, so that all values are equally frequent.
+    """
     if event.slot != value.slot or event.value != value.value:
         return False
     if event.share is None:
@@ -114,14 +124,15 @@ def _is_late(scene: Scene) -> bool:
 
 
 def _amount_clues(request: InstructionRequest, count: GoalValue) -> list[Clue]:
-    """Return *all but three* if it is the only number of cubes, and the scene has a single color.
+    """Return the clue *all but three* if it gives the number of cubes; else no clue.
 
-    Where there are several, large numbers go with certain words.
+    It is said only where a single color is in the scene and no cubes arrive later: with several
+    colors, large numbers would go with certain words.
     """
     if _is_late(request.episode.scene) or len(request.scene_colors) > 1:
         return []
     cubes = request.objects_to_point_at(request.color_values[0])
-    if len(cubes) - count.number != LEFT:
+    if len(cubes) - count.number != CUBES_LEFT_OVER:
         return []
     return [Clue("counts", "all but three")]
 

@@ -12,12 +12,15 @@ from roboirg.language.settings.setting import Setting
 
 
 def refusal(request: InstructionRequest) -> str | None:
-    """Return a reason if no thing that the goal is about has a place of its own."""
+    """Return why no place can say the goal; None if any thing that it is about has a place.
+
+    A place is words that single out one thing by where it stands, *on the left*.
+    """
     kind = request.task.things.pointed
-    placed = things_at(request.episode.scene, kind, request.frame).values()
+    things_with_place = things_at(request.episode.scene, kind, request.frame).values()
     for color in request.color_values:
         for thing in request.objects_to_point_at(color):
-            if thing in placed:
+            if thing in things_with_place:
                 return None
     return "no landmark singles out a target"
 
