@@ -46,6 +46,8 @@ def test_failures_with_a_known_cause_are_attributed_to_the_right_kind():
     Bounds are higher than for causes that the rules had not been written for.
     """
     found = confusion.scores(CAUSED_FAILURES)
+    # Right among the decided ones, and by cause; undecided though acts show the cause, and
+    # undecided where they show none.
     assert found.of_decided >= 0.95
     assert found.of_causes >= 0.9
     assert found.undecided <= 0.05

@@ -84,6 +84,7 @@ def test_picking_the_cube_on_the_opposite_side_is_called_a_mirrored_pick():
     assert (found.kind, found.failure, found.subject) == ("grounding", "mirrored_pick", "cube_red")
     assert found.sentence.endswith("; the words mean it only with left and right exchanged.")
 
+    # Without knowing which object the words mean mirrored, it is just a wrong one.
     untold = attribution_of(env, info)
     assert untold is not None
     assert untold.failure == "wrong_object"

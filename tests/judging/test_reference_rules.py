@@ -135,7 +135,7 @@ def test_the_time_in_which_a_press_is_ignored_starts_after_the_video():
         judge.update(step, frozenset([lying if step else picked, STILL, HOME]))
         step += 1
 
-    assert step > 100
+    assert step > 100  # the video alone is longer than the 50 steps
     for elapsed in (0, 49):
         judge.update(step + elapsed, frozenset([PRESSED]))
         assert judge.status is Status.ONGOING

@@ -24,6 +24,7 @@ def test_every_task_offers_the_four_settings_of_the_paper_and_some_tasks_spatial
     four = ["explicit", "direct", "reasoning", "contextual"]
     assert [*plain_settings()] == [*four, "spatial"]
 
+    # Each harder setting and the usual one that it is made from.
     harder = {
         setting.name: setting.plain
         for setting in all_settings().values()

@@ -111,6 +111,7 @@ def test_a_relation_between_numbers_is_used_only_if_it_leaves_two_numbers_open()
     names = [relation.name for relation, _ in deductions([3], [(1,), (2,), (3,)])]
     assert names == ["one fewer", "one more", "two fewer", "half"]
 
+    # Two numbers at once: 1 and 3 are one fewer than 2 and 4.
     found = deductions([1, 3], [(1, 3), (2, 2), (1, 1), (3, 1)])
     assert [(relation.name, references) for relation, references in found] == [
         ("one fewer", [2, 4]),

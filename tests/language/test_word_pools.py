@@ -34,6 +34,7 @@ def test_choosing_a_pool_gives_the_words_of_a_split_that_uses_it(setting, pool):
         said = instruct(episode, setting, wordings=pool)
         assert (said.metadata["pool"], said.metadata["wordings"]) == (pool, pool)
         assert said.metadata["command"] == "own"
+        # The same scene as an episode of the split that has this pool by default.
         own = instruct(replace(episode, split=split), setting)
         assert (said.turns, said.metadata) == (own.turns, {**own.metadata, "wordings": pool})
 

@@ -94,8 +94,9 @@ def test_any_change_of_what_is_said_changes_the_digest_of_its_pool_only(monkeypa
         digest_of_words(monkeypatch, WORDS_FILE, distractors={**remarks, "train": ("Well.",)})
     )
 
-    assert len(found) == len(changes) + 3
+    assert len(found) == len(changes) + 3  # the file itself, other people and other remarks
 
+    # Changes in the pool "test" leave the digest of the pool "train".
     elsewhere = WORDS_FILE.replace("here, ", "over there, ").replace("Take {color}", "Grab {color}")
     remarks = {**remarks, "test": ("Well.",)}
     assert digest_of_words(monkeypatch, elsewhere, distractors=remarks) == digest_of_words(

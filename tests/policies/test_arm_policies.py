@@ -118,5 +118,6 @@ def test_policies_with_a_planted_fault_are_exposed_by_control_runs_only():
     # Told, habit is as good as the oracle; nothing but another goal tells them apart.
     assert share_won_in_all("habit", *(arm for arm in ALL_ARMS if arm != "other-goal")) == 1.0
     # All paraphrases at once are harder than one for who guesses.
+    # (It has to guess right twice.)
     both = share_won_in_all("forgetful", "paraphrase-1", "paraphrase-2")
     assert both < min(share_won_in_all("forgetful", f"paraphrase-{number}") for number in (1, 2))

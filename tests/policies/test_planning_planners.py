@@ -173,7 +173,7 @@ def test_each_planner_asks_its_model_at_the_steps_that_its_options_set(
 def test_after_an_unreadable_reply_the_last_subgoal_stays(kind):
     with fake_vlm(["{}", "{}", REPLY_OF[kind], "{}"]) as server:
         planner = make_planner(kind, server, **({"first_pause": 0} if kind == "gemini" else {}))
-        policy = play_in_chunks(planner, 64)
+        policy = play_in_chunks(planner, 64)  # five chunks of 16, from step 0
         assert policy.policy.told == [SUBGOAL] * 4  # none at first
 
         usage = planner.usage()

@@ -31,6 +31,7 @@ def test_costs_that_are_unknown_or_beyond_reason_are_left_out_of_a_record():
     """Also one that no float can hold; and what is unknown in a part makes the sum unknown."""
     planner = SimpleNamespace(usage=lambda: {"calls": 1, "input_tokens": math.nan})
     policy = SimpleNamespace(usage=lambda: {"calls": 1, "input_tokens": 5, "x": 10**400, "y": -1})
+    # 1 and 1 calls; tokens, x and y are left out.
     assert policy_usage(PlannerParts(planner, policy)) == {"calls": 2.0}
 
 

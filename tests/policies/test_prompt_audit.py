@@ -101,9 +101,9 @@ def test_mentions_behind_the_token_limit_of_a_prompt_are_reported_as_lost():
     turns = ("Look at the red cube.", "Put it into the bin.")
     limit = PromptLimit(1 + 2 * 6, 0, two_tokens_a_word)  # the beginning, five words and "Put"
     found = audit_instruction([turns], limit)
-    assert found.reached == (21, 3)
+    assert found.reached == (21, 3)  # characters: all of the first turn, and "Put"
 
-    spans = [(0, 20), (1, 3), (1, 6), (1, 19)]
+    spans = [(0, 20), (1, 3), (1, 6), (1, 19)]  # turn, and where the mention ends in it
     assert found.lost(spans) == (2, 3)
     assert audit_instruction([turns], limit._replace(tokens=99)).lost(spans) == ()
     # The second is not said yet: it is not lost.

@@ -188,6 +188,7 @@ def test_a_client_waits_for_a_server_that_starts_late_and_finds_it_after_a_resta
 
     with pytest.raises(PolicyConnectionError):
         policy.act(moment(3, history=(moment(3),)))
+    # It was stopped, and another one starts at the same port.
     with MmeVlaServer(port=port) as again:
         assert play_episode(policy)[0][0, :2].tolist() == [3, 2]
         assert again.connections == 1

@@ -63,6 +63,7 @@ def test_replies_stored_for_an_episode_are_used_when_it_is_played_again(tmp_path
     """So that an interrupted run pays no call of a model twice."""
     settings = ReplySettings(tmp_path)
     with fake_vlm(["one", "two", "never"]) as server:
+        # Episode "a" asks two questions, and asks both again when it is played again.
         first, counts = ask_in_episode(server, settings, "a", "first", "second")
         assert (first, counts["stored"]) == (["one", "two"], 0)
         again, counts = ask_in_episode(server, settings, "a", "first", "second")

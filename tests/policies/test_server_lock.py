@@ -46,10 +46,12 @@ def test_a_busy_server_is_waited_for_replaced_by_a_free_one_or_inherited(
     reported = []
     monkeypatch.setattr(waiting, "_listeners", [reported.append])
     before = queued_seconds()
-    lock_server([SECOND_SERVER], wait=5, folder=tmp_path).file.close()
 
+    # The second server is free: nothing is waited for.
+    lock_server([SECOND_SERVER], wait=5, folder=tmp_path).file.close()
     assert (reported, queued_seconds()) == ([], before)
 
+    # The first one is busy: waiting is reported and counted, and ends in an error.
     start = time.monotonic()
     with (
         waiting.waiting("its turn in a test"),

@@ -258,6 +258,7 @@ def test_results_are_equal_with_an_empty_a_filled_and_no_cache(
     forbid_planning()
     warm = everything_returned()
 
+    # The video has 11 pictures of each of two cameras.
     assert len(cameras_drawn) == at_first - 2 * 11
     for arrays, info, record in (warm, off):
         assert record == cold[2]

@@ -86,6 +86,7 @@ def test_bin_fill_subgoals_number_the_cubes_of_each_color_separately():
         "press the button {at}",
     ]
 
+    # The scene's own order takes the second color first.
     turned = bin_fill.stages(replace(scene, color_order=(second,)), goal)
     assert [stage.subgoal for stage in turned[::2]] == [
         f"pick up the first {second} cube {{at}}",

@@ -52,7 +52,7 @@ def test_layout_number_of_swaps_and_number_of_picks_are_independent():
         line = min(math.hypot(*point) for point in points) < 1e-9
         found[line, len(swaps(episode)), len(episode.goal.texts("colors"))] += 1
 
-    assert len(found) == 8
+    assert len(found) == 8  # 2 layouts, 2 numbers of swaps, 2 numbers of picks
     assert min(found.values()) > 0.06 * len(SEEDS)
 
 

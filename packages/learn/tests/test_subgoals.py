@@ -105,6 +105,7 @@ def test_planner_history_keeps_the_looks_at_which_the_subgoal_changed():
         history.name(form, look)
     assert history.switches == [2, 7, 9]
 
+    # At look 19, of three forms: how often each was done, which is under way, and since when.
     done, under_way, rest = np.split(history.context(19), [3, 6])
     assert done.tolist() == [1, 1, 0]
     assert under_way.tolist() == [1, 0, 0]

@@ -113,6 +113,7 @@ def test_a_move_relative_to_the_tool_keeps_the_tool_s_yaw():
 
 def test_rare_moves_are_not_learned():
     usual, rare = (Move(True, 0.0, 0.0, z, "align", 0.0) for z in (0.1, 0.2))
+    # One rare move among so many is below the share `RAREST`; among three it is not.
     often = [LookDecision(0, usual, 0)] * round(3 / RAREST)
     once = [LookDecision(0, rare, 0)]
 
