@@ -106,6 +106,7 @@ def stage_that_expects(expects: Fact, *forbids: Fact | Rule) -> Stage:
 
 
 def test_a_registered_kind_of_fact_can_be_forbidden_and_is_judged(registered_toppled):
+    """The stage expects the robot at home, and forbids that the pillar is knocked over."""
     pillar = SceneObject("pillar", "pillar", Point(0.0, 0.0, 0.05), color="red")
     judge = Judge([stage_that_expects(Fact("home", "robot"), TOPPLED)], Scene((pillar,)))
 
@@ -115,6 +116,7 @@ def test_a_registered_kind_of_fact_can_be_forbidden_and_is_judged(registered_top
 
 
 def test_a_registered_kind_of_fact_is_described_in_the_words_it_brings(registered_toppled):
+    """*Toppled* brings "knocked {subject} over" for events and "knocked over" for a state."""
     event = EventRecord(step=3, kind="toppled", subject="pillar", place=None, holds=True)
 
     assert fact_words(TOPPLED) == "pillar knocked over"
@@ -135,6 +137,7 @@ def test_a_failure_by_a_registered_kind_of_fact_is_named_by_its_role(registered_
 
 
 def test_registering_a_kind_of_fact_under_a_taken_name_is_refused(registered_toppled):
+    """Registering the same kind again is allowed, *picked* is one of ours."""
     register_fact_kind("toppled", registered_toppled)
     with pytest.raises(InvalidValueError, match="already a kind of fact 'picked'"):
         register_fact_kind("picked", registered_toppled)

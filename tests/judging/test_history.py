@@ -27,6 +27,7 @@ def history_of(course):
 @settings(max_examples=60)
 @given(lists_of_simultaneous_facts, bounds, st.none() | bounds)
 def test_fact_count_counts_which_facts_hold_at_the_last_step(course, least, most):
+    """`least` and `most` are bounds of the count; None is no bound."""
     now = sum(fact in course[-1] for fact in (PICKED_A, PICKED_B))
     wanted = now >= least and (most is None or now <= most)
     assert history_of(course).holds(FactCount((PICKED_A, PICKED_B), least, most)) == wanted
@@ -49,6 +50,7 @@ def test_occurrence_count_counts_how_often_facts_have_begun_to_hold(course, leas
 @settings(max_examples=60)
 @given(lists_of_simultaneous_facts)
 def test_a_fact_and_its_absence_exclude_each_other(course):
+    """`absent(fact)` is the condition that a fact does not hold, `All` that several do."""
     history = history_of(course)
     assert history.holds(PICKED_A) != history.holds(absent(PICKED_A))
     assert history.holds(All((PICKED_A, PICKED_B))) == (

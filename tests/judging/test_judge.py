@@ -17,15 +17,16 @@ PLACED = Fact("placed", "a", "target")
 PRESSED = Fact("pressed", "button")
 
 
-def stage_that_expects(expects: Fact, *forbids: Fact, lasting: int = 0) -> Stage:
+def stage_with_facts(expects: Fact, *forbids: Fact, lasting: int = 0) -> Stage:
     primitive = Primitive("press", expects.subject)
     return Stage(expects, primitive, "do {at} it", forbids, points_at="a", lasting=lasting)
 
 
 def test_doing_what_each_stage_expects_in_order_is_a_success():
-    """Each list holds the facts of one control step."""
+    """A stage has the fact that it expects, then those that it
+    forbids; each list holds the facts of one control step."""
     judge = judged(
-        [stage_that_expects(PICKED, PRESSED), stage_that_expects(PLACED, PRESSED)],
+        [stage_with_facts(PICKED, PRESSED), stage_with_facts(PLACED, PRESSED)],
         None,
         [],
         [PICKED],
@@ -37,13 +38,13 @@ def test_doing_what_each_stage_expects_in_order_is_a_success():
 
 
 def test_doing_what_the_second_stage_expects_does_not_complete_the_first():
-    assert (
-        judged([stage_that_expects(PICKED), stage_that_expects(PLACED)], None, [PLACED]).index == 0
-    )
+    """Two stages, and one control step in which the fact that the second one expects holds."""
+    assert judged([stage_with_facts(PICKED), stage_with_facts(PLACED)], None, [PLACED]).index == 0
 
 
 def test_one_control_step_completes_at_most_one_stage():
-    judge = judged([stage_that_expects(PICKED), stage_that_expects(PICKED)], None, [PICKED])
+    """Both stages expect the same fact, which holds in two steps."""
+    judge = judged([stage_with_facts(PICKED), stage_with_facts(PICKED)], None, [PICKED])
     assert (judge.index, judge.status) == (1, Status.ONGOING)
 
     judge.update(1, frozenset([PICKED]))
@@ -51,21 +52,23 @@ def test_one_control_step_completes_at_most_one_stage():
 
 
 def test_a_forbidden_fact_fails_even_if_the_expected_one_holds_too():
-    judge = judged([stage_that_expects(PICKED, PRESSED)], None, [PICKED, PRESSED])
+    """The stage expects a pick and forbids a press; both happen in the same step."""
+    judge = judged([stage_with_facts(PICKED, PRESSED)], None, [PICKED, PRESSED])
     assert judge.status is Status.FAILURE
     assert judge.cause == "pressed button; expected: do it"
 
 
 def test_a_fact_that_completes_a_stage_may_be_forbidden_by_the_next_one():
-    """It has one step to go away; if it still holds then, the episode fails."""
+    """A stage has the fact that it expects, then those that it forbids. The
+    fact has one step to go away; if it still holds then, the episode fails."""
     # The cube is picked, which the next stage forbids; it is gone by the next evaluation.
     judge = judged(
-        [stage_that_expects(PICKED), stage_that_expects(PLACED, PICKED)], None, [PICKED], [PLACED]
+        [stage_with_facts(PICKED), stage_with_facts(PLACED, PICKED)], None, [PICKED], [PLACED]
     )
     assert judge.status is Status.SUCCESS
     assert (
         judged(
-            [stage_that_expects(PICKED), stage_that_expects(PLACED, PICKED)],
+            [stage_with_facts(PICKED), stage_with_facts(PLACED, PICKED)],
             None,
             [PICKED],
             [PICKED],
@@ -75,18 +78,19 @@ def test_a_fact_that_completes_a_stage_may_be_forbidden_by_the_next_one():
 
 
 def test_a_verdict_never_changes():
-    judge = judged([stage_that_expects(PICKED, PRESSED)], None, [PRESSED], [PICKED])
+    """The stage expects a pick and forbids a press; the other one comes a step later."""
+    judge = judged([stage_with_facts(PICKED, PRESSED)], None, [PRESSED], [PICKED])
     judge.fail("too late")
     assert (judge.status, judge.cause) == (Status.FAILURE, "pressed button; expected: do it")
 
-    judge = judged([stage_that_expects(PICKED, PRESSED)], None, [PICKED], [PRESSED])
+    judge = judged([stage_with_facts(PICKED, PRESSED)], None, [PICKED], [PRESSED])
     assert judge.status is Status.SUCCESS
 
 
 def test_a_stage_that_has_to_last_starts_again_after_an_interruption():
     """The robot has to be still for three steps after the first one that shows it."""
     still = Fact("still", "robot")
-    watch = [stage_that_expects(still, lasting=3)]
+    watch = [stage_with_facts(still, lasting=3)]
     assert judged(watch, None, *[[still]] * 3).status is Status.ONGOING
     assert judged(watch, None, *[[still]] * 4).status is Status.SUCCESS
 

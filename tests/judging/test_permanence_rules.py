@@ -56,6 +56,8 @@ def episode_with_two_picks(task, seed):
 
 @each_task
 def test_one_pick_succeeds_when_the_container_over_the_cube_is_lifted(task, seed):
+    """Each list holds the facts of one step; `PRESSES_OF`
+    has the buttons that a task begins with."""
     episode = make_episode(task, seed, "medium")
     (target,), _ = containers_to_lift_and_others(episode)
 
@@ -67,6 +69,8 @@ def test_one_pick_succeeds_when_the_container_over_the_cube_is_lifted(task, seed
 
 @each_task
 def test_two_picks_succeed_in_order_with_the_first_put_down_between(task, seed):
+    """Each list holds the facts of one step; `PRESSES_OF`
+    has the buttons that a task begins with."""
     episode, first, second, _ = episode_with_two_picks(task, seed)
     begin = [*PRESSES_OF[task], [lifted(first)], [], [put_down(first)], []]
 
@@ -76,6 +80,8 @@ def test_two_picks_succeed_in_order_with_the_first_put_down_between(task, seed):
 
 @each_task
 def test_lifting_another_container_before_the_first_is_put_down_fails(task, seed):
+    """The goal has two containers, `first` and `second`;
+    after lifting one it has to be put down."""
     episode, first, second, others = episode_with_two_picks(task, seed)
 
     for wrong in (second, *others):
@@ -97,6 +103,7 @@ def test_lifting_a_wrong_container_as_the_second_one_fails(task, seed):
 
 @each_task
 def test_holding_the_first_container_long_or_lifting_it_again_is_allowed(task, seed):
+    """The goal has two containers, and the first one is put down late."""
     episode, first, second, _ = episode_with_two_picks(task, seed)
     held = [[lifted(first)]] * 5
     steps = [*PRESSES_OF[task], *held, [], [lifted(first)], []]
@@ -149,6 +156,7 @@ def test_a_container_that_is_up_during_the_last_press_counts_one_step_later(task
 
 @each_button_task
 def test_pressing_again_later_has_no_effect(task, seed):
+    """The goal has two containers; the buttons are pressed again at each moment."""
     episode, first, second, _ = episode_with_two_picks(task, seed)
     again = presses_alone(task)
     steps = [*PRESSES_OF[task], *again, [lifted(first)], *again, [put_down(first)], *again]
@@ -172,6 +180,8 @@ def test_both_buttons_may_be_pressed_in_any_order(order, between):
 
 @pytest.mark.parametrize("button", [LEFT, RIGHT])
 def test_pressing_the_same_button_twice_completes_only_one_of_two_presses(button):
+    """The task begins with a press of each of two
+    buttons; index 1 means that one stage is complete."""
     episode = make_episode("ButtonUnmaskSwap", 3, "medium")
     assert judged_after(episode, [button], [], [button], [], [button]).index == 1
     assert judged_after(episode, *[[button]] * 10).index == 1

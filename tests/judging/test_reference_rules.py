@@ -50,6 +50,8 @@ def repick_episode_and_facts(repeats, difficulty="medium"):
 
 @pytest.mark.parametrize("repeats", [1, 2, 3])
 def test_repick_succeeds_after_the_wanted_number_of_picks_and_a_press(repeats):
+    """Each list holds the facts of one step: the cube
+    lies, is picked up, is in the air, lies again."""
     episode, picked, lying = repick_episode_and_facts(repeats)
     cycle = [[lying], [picked], [], [lying]]
 
@@ -71,7 +73,8 @@ def test_repick_of_any_other_cube_fails_at_any_time(done):
 
 
 def test_repick_counts_a_cube_that_was_let_go_as_put_down():
-    """In the air, neither picked nor lying, nothing happens."""
+    """Each list holds the facts of one step. In the
+    air, neither picked nor lying, nothing happens."""
     episode, picked, lying = repick_episode_and_facts(1)
     # Held low or in the air, neither picked nor lying: nothing happens.
     assert status_after(episode, [picked], [], [], [picked], [lying], [PRESSED]) is Status.SUCCESS
@@ -145,6 +148,8 @@ def test_the_time_in_which_a_press_is_ignored_starts_after_the_video():
 
 
 def test_a_press_before_the_repick_does_not_replace_the_one_after_it():
+    """The task is to pick a cube up once more and to
+    press the button; early presses are ignored."""
     episode, picked, lying = repick_episode_and_facts(1)
     assert status_after(episode, [PRESSED], [picked], [lying]) is Status.ONGOING
     assert status_after(episode, [PRESSED], [picked], [lying], [PRESSED]) is Status.SUCCESS
@@ -179,6 +184,7 @@ def right_pick_and_right_place(episode):
 
 @every_place_goal
 def test_a_place_task_needs_the_right_cube_picked_and_then_placed_on_the_right_disc(episode):
+    """Each list holds the facts of one step; discs are targets on the table."""
     picked, placed = right_pick_and_right_place(episode)
     lying = Fact("lying", picked.subject)
 
@@ -189,6 +195,7 @@ def test_a_place_task_needs_the_right_cube_picked_and_then_placed_on_the_right_d
 
 @every_place_goal
 def test_placing_the_right_cube_on_a_wrong_disc_fails(episode):
+    """Discs are targets on the table. Before it is picked up, the cube may be on any."""
     picked, placed = right_pick_and_right_place(episode)
     others = {disc.name for disc in episode.scene.of_kind("target")} - {placed.place}
     for other in others:
@@ -201,6 +208,7 @@ def test_placing_the_right_cube_on_a_wrong_disc_fails(episode):
 
 @every_place_goal
 def test_picking_another_cube_fails_unless_the_right_one_was_picked_before(episode):
+    """Each list holds the facts of one step."""
     picked, placed = right_pick_and_right_place(episode)
     others = {cube.name for cube in episode.scene.of_kind("cube")} - {picked.subject}
     for other in others:

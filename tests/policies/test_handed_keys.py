@@ -116,6 +116,7 @@ def test_a_key_that_a_policy_server_sends_back_is_masked_in_records_and_errors(p
 
 
 def test_a_key_in_the_reply_of_a_model_is_masked_when_shown_and_stored(tmp_path):
+    """A model may repeat the key that the client sent in its header."""
     query = ModelQuery("system", (ChatTurn("user", ("words",)),))
     with fake_vlm([f"my key is {KEY}"]) as server:
         vlm = VLMQuery(model_options(server, api_key_env=VARIABLE), Template("$why"))
@@ -157,6 +158,7 @@ def test_the_password_of_a_proxy_is_masked_in_plain_and_base64_text(monkeypatch)
     ],
 )
 def test_a_policy_name_that_contains_a_key_is_refused_without_printing_it(spec):
+    """Names of policies are printed and recorded, so keys belong into environment variables."""
     with pytest.raises(InvalidValueError, match="holds a key or password") as caught:
         make_policy(spec.format(key="hunter2hunter2"), 0)
     assert "hunter2" not in str(caught.value)

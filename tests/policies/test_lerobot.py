@@ -258,6 +258,7 @@ def act_in_turns(episodes, length):
 
 
 def test_the_option_execute_changes_how_many_actions_of_a_chunk_are_played(checkpoint):
+    """The checkpoint plans six actions, and says that two are to be played."""
     checkpoint.config.n_action_steps = 2
     assert len(policy_after_reset().act(moment(1))) == 2
     assert len(policy_after_reset(options="?execute=5").act(moment(1))) == 5
@@ -281,7 +282,7 @@ def test_a_checkpoint_without_a_tokenizer_is_noted_as_not_reading_text(checkpoin
 
 
 def test_episodes_in_a_batch_get_the_actions_that_they_get_alone(checkpoint):
-    """Five episodes in batches of four."""
+    """Five episodes in batches of four, of which the second is filled up."""
     checkpoint.config.max_action_dim = 32
     moments = [moment(number) for number in range(5)]
 

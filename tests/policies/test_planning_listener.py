@@ -154,6 +154,7 @@ def test_a_request_to_a_model_contains_nothing_of_the_scene_but_pictures_and_wor
 
 
 def test_an_unreadable_reply_is_asked_again_once_and_then_counted():
+    """First the second reply is good; then both are unreadable, and a third is not asked for."""
     env = stand_in(get_episode("PickXtimes", "test", 0))
     goal = env.episode.goal
     good = goal_schema("PickXtimes").answers[goal]
@@ -243,6 +244,7 @@ FAULTS_OF_OPENAI = [
 def test_each_fault_of_a_model_service_has_its_own_error_without_the_key(
     provider, mishap, error, words, monkeypatch
 ):
+    """`mishap` is what the stand-in service does instead of answering."""
     monkeypatch.setenv(KEY_VARIABLE, KEY)
     # Only what is late may end by the time: a busy machine takes its time for the others, too.
     timeout_s = 0.5 if isinstance(mishap, Late) else 300.0
@@ -293,6 +295,7 @@ def test_a_missing_key_is_reported_with_the_name_of_its_variable(monkeypatch):
 
 
 def test_the_version_of_a_policy_changes_with_its_options_but_not_its_address():
+    """Records are compared by version; what changes no answer must not change it."""
     with fake_vlm(["{}"]) as server:
         version = make_listener(server).version
         assert version.startswith("fake ")

@@ -171,6 +171,7 @@ def test_each_planner_asks_its_model_at_the_steps_that_its_options_set(
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_after_an_unreadable_reply_the_last_subgoal_stays(kind):
+    """A reply is unreadable after a second try; replies are {}, {}, a good one, then {} only."""
     with fake_vlm(["{}", "{}", REPLY_OF[kind], "{}"]) as server:
         planner = make_planner(kind, server, **({"first_pause": 0} if kind == "gemini" else {}))
         policy = play_in_chunks(planner, 64)  # five chunks of 16, from step 0
@@ -235,6 +236,7 @@ def test_the_gemini_planner_sends_pictures_to_a_service_that_takes_no_clips():
 
 
 def test_the_gemini_planner_repeats_the_clip_after_an_unreadable_answer():
+    """The frames since the last answer of use are sent once more."""
     answers = [REPLY_OF["gemini"], "?", "?", REPLY_OF["gemini"]]
     with fake_vlm(answers) as server:
         policy = play_in_chunks(make_planner("gemini", server, "google", first_pause=0), 96)
@@ -364,6 +366,7 @@ def test_key_frame_positions_that_do_not_exist_make_a_memer_reply_unreadable(pos
 
 @pytest.mark.parametrize(("option", "kept"), [({"most": 2}, [66, 82]), ({"near": 16}, [82])])
 def test_options_of_the_memer_planner_limit_the_key_frames_it_keeps(option, kept):
+    """In each reply the model chooses the first of the frames that it sees."""
     choose = json.dumps({"current_subtask": REPLY, "keyframe_positions": [1]})
     with fake_vlm([choose]) as server:
         planner = make_planner("memer", server, **option)
@@ -386,6 +389,7 @@ def test_requests_of_planners_are_equal_to_the_stored_ones(kind, subgoals):
 
 
 def test_planner_and_policy_form_a_policy_whose_costs_are_summed():
+    """Three questions to the planner's model, and one call at 0.5 US dollars by the policy."""
     with fake_vlm([REPLY]) as server:
         policy = play_in_chunks(make_planner("qwen", server, input_price=1.0), 32)
         assert isinstance(policy, Policy)

@@ -64,6 +64,7 @@ def messages_before_inference(protocol):
     ],
 )
 def test_a_malformed_reply_is_reported_and_the_next_episode_works(protocol, reply, words):
+    """`reply` takes the place of the server's answer to the first request for actions."""
     faults = [None] * messages_before_inference(protocol) + [reply]
     with PROTOCOLS[protocol](faults=faults) as server:
         with client_of(server, protocol, "?max_reply_mib=1") as policy:
@@ -116,6 +117,7 @@ def _played_in_time(policy):
 
 @pytest.mark.parametrize("protocol", ["openpi", "mme-vla", "challenge"])
 def test_a_server_that_dies_ends_its_episode_and_the_next_reset_connects_again(protocol):
+    """The server ends the connection at the first request for actions."""
     with (
         PROTOCOLS[protocol](
             faults=[None] * messages_before_inference(protocol) + ["die"]
@@ -158,6 +160,7 @@ def test_a_server_that_stops_sending_or_reading_is_given_up_after_the_timeout(se
 
 
 def test_a_second_reply_to_one_request_is_an_error():
+    """Otherwise each later request would get the reply to the one before it."""
     said_twice = threading.Event()
 
     class Twice(MmeVlaServer):
@@ -207,6 +210,7 @@ def test_an_absent_server_is_reported_in_one_sentence():
 
 
 def test_closing_a_policy_closes_its_connection():
+    """Three policies are closed, each of them twice."""
     with WireServer() as server:
         for _ in range(3):
             policy = make_policy(f"openpi://{server.place}", 0)

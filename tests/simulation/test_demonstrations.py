@@ -273,6 +273,7 @@ def test_results_are_equal_with_an_empty_a_filled_and_no_cache(
 def test_a_reset_from_the_cache_equals_one_that_plans_the_demonstration(
     task, cache, forbid_planning
 ):
+    """After the first reset, planning is forbidden: the second one has to read the cache."""
     _, observation, info = reset(task)
     small = [entry.stat().st_size < 200_000 for entry in cache.glob("actions/*")]
     # A shipped recording needs no cache.
@@ -298,6 +299,7 @@ def stored_recording(cache):
 def test_a_cached_recording_that_replays_differently_is_rebuilt_with_a_warning(
     cache, caplog, fault
 ):
+    """The cached recording gets another final state, other actions, or no actions at all."""
     _, observation, info = reset()
     store, name, right = stored_recording(cache)
     wrong = {
@@ -336,6 +338,7 @@ def test_a_frame_hook_does_not_see_the_replay_of_a_wrong_recording(cache):
 
 
 def test_the_cache_key_of_a_demonstration_changes_with_code_and_processor(monkeypatch):
+    """The key also names the versions of the libraries that compute motions."""
     episode = get_episode(SHORT_VIDEO_TASK, "test", 1)
     key = demonstration_cache.recording_key(episode)
     assert demonstration_cache.recording_key(get_episode(SHORT_VIDEO_TASK, "test", 1)) == key
@@ -355,6 +358,9 @@ def test_the_cache_key_of_a_demonstration_changes_with_code_and_processor(monkey
 
 
 def test_pictures_of_other_meshes_or_frame_rates_have_their_own_cache_entries(cache):
+    """*Faithful* and *light* are ways of drawing; every eleventh
+    frame is another series than every twenty-second."""
+
     def read(meshes_read_once, every=11):
         options = {"cameras": ("front",), "meshes": meshes_read_once, "demonstration_frames": every}
         return reset(**options)[2]["demonstration"]["front_rgb"]

@@ -140,6 +140,7 @@ def test_a_shuttle_counts_as_near_from_three_steps_before_the_target_s_middle():
 
 
 def test_a_pressed_button_stops_a_shuttle_for_good():
+    """At step 33 the shuttle is over its target; the button goes down by 12 mm, and up again."""
     world = shuttle_world()
     stopped = Fact("stopped", "s", "target")
     rest(world, 33)
@@ -192,6 +193,7 @@ def test_a_light_glows_while_something_is_over_its_target_and_lingers():
 
 
 def test_a_cube_that_falls_into_the_bin_is_gone_and_stays_counted():
+    """What has vanished is parked at x > 5 m, 10 m high."""
     binned = Fact("binned", "a", "bin")
     objects = (
         SceneObject("bin", "bin", Point(0.1, 0.0, 0.025), yaw=0.2),

@@ -47,6 +47,7 @@ def pose_with_yaw(position: np.ndarray, angle: float) -> ToolPose:
 
 
 def test_forward_kinematics_of_home_is_where_the_simulator_has_the_tool(planner):
+    """Position of the tool in meters, at the arm's resting position."""
     assert planner.forward_kinematics(HOME).position == pytest.approx(
         [-0.0605, 0.0, 0.5211], abs=1e-4
     )
@@ -190,6 +191,7 @@ def cube(name: str, x: float, y: float, yaw: float = 0.0) -> SceneObject:
 
 
 def test_a_cube_at_the_edge_of_the_workspace_is_gripped_short_of_its_middle(planner):
+    """Its middle is out of reach, but the near edge is not; 2 cm farther away, that is, too."""
     place = np.array([0.171, -0.159, CUBE_HALF])
     with pytest.raises(MotionPlanningError, match="cannot reach"):
         planner.plan_move(HOME, ToolPose(place, DOWN))

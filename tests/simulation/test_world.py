@@ -54,6 +54,7 @@ def test_cubes_and_buttons_rest_where_and_weigh_what_robomme_s_do():
 
 
 def test_containers_appear_over_their_cubes_after_32_steps():
+    """Until then they are parked 10 m high."""
     world = world_of("VideoUnmask")
     rest(world, 32)
     assert all(
@@ -77,6 +78,7 @@ def world_scene(world: World) -> Scene:
 
 
 def test_a_container_that_has_appeared_falls_when_it_is_let_go():
+    """`Away` keeps it parked at first, and must leave it to physics afterward."""
     episode = get_episode("VideoUnmask", "test", 0)
     moved = World(episode.scene, visible=False)
     rest(moved, 40)
@@ -126,6 +128,7 @@ def test_the_gripper_opens_and_closes():
 
 
 def test_the_robot_is_not_still_while_its_arm_moves():
+    """The base joint turns by 0.3 rad, which takes less than 40 steps."""
     world = world_of("PickXtimes")
     action = physics_settings.HOME_ACTION.copy()
     action[0] += 0.3

@@ -47,6 +47,7 @@ def test_a_scene_without_room_for_the_bin_is_rejected():
 
 
 def test_bin_fill_keeps_the_bin_off_the_button(monkeypatch):
+    """In the real regions the two hardly ever meet; here they would in every second draw."""
     # In the real regions the two hardly ever meet; here they would in every second draw.
     monkeypatch.setattr(bin_fill, "BUTTON_REGION", Region(-0.15, 0.0, 0.0, 0.0))
     monkeypatch.setattr(bin_fill, "BIN_REGION", Region(-0.05, 0.0, 0.03, 0.03))
@@ -157,6 +158,7 @@ def test_stop_cube_waits_in_steps_of_100_until_30_steps_before_the_visit(interva
 
 
 def test_stop_cube_stages_hover_wait_and_press():
+    """The hand goes over the button, waits until it is time, and presses."""
     for scene, _ in scenes("StopCube", "easy")[:50]:
         (run,) = scene.motions
         for goal in stop_cube.goals(scene):

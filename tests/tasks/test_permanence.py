@@ -98,6 +98,7 @@ def test_in_half_to_three_quarters_of_episodes_the_hidden_cube_ends_up_elsewhere
 
 @each_task
 def test_subgoals_name_presses_and_containers_in_order(task):
+    """A subgoal is the text of a step; `{at}` stands for a point in the picture."""
     presses = {
         "ButtonUnmask": [("press the button {at}", "button")],
         "ButtonUnmaskSwap": [
@@ -122,6 +123,7 @@ def test_subgoals_name_presses_and_containers_in_order(task):
 
 
 def test_scenes_with_fewer_than_three_containers_are_rejected():
+    """Two of the four places of containers are drawn, so two containers are placed."""
     rng = np.random.default_rng(0)
     placed = unmask_swap.draw_containers_about(rng, [FOUR[0], FOUR[1]])
 

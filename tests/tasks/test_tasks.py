@@ -109,6 +109,7 @@ def test_the_number_of_goals_that_can_replace_that_of_an_episode_is_stable(task)
 @each_task
 @pytest.mark.parametrize("difficulty", DIFFICULTIES)
 def test_same_seed_same_episode_other_seed_other_scene(task, difficulty):
+    """Two seeds that give a scene, and the first one made again."""
     first, second = first_episodes(task, difficulty, 2)
     again = make_episode(task, first.seed, difficulty)
 
@@ -187,6 +188,7 @@ def disc_areas(scene, *kinds):
 
 @each_task
 def test_things_on_the_table_do_not_touch(task):
+    """Solid things and targets keep apart, and so do targets and sites; a cube may lie on a site."""
     for episode in episodes(task):
         # Cubes may lie where the video puts one back, as in RoboMME.
         for areas in (
@@ -198,6 +200,7 @@ def test_things_on_the_table_do_not_touch(task):
 
 @each_task
 def test_hidden_cubes_are_in_the_middle_of_their_containers(task):
+    """So that a cube is under the container that the video shows over it."""
     for episode in episodes(task):
         for cube in episode.scene.of_kind("hidden_cube"):
             assert cube.position[:2] == episode.scene[cube.inside].position[:2]

@@ -94,6 +94,7 @@ def first_looks_of(batch, looks, things):
 
 @pytest.mark.parametrize("memory", sorted(MEMORIES))
 def test_memory_carried_from_look_to_look_equals_reading_all_looks_at_once(memory):
+    """A policy reads one look more each time; training reads all. Objects 3 and 4 appear late."""
     body = body_of(memory)
     batch = batch_of(1)
     batch.seen[:, :4, 3:], batch.known[:, :4, 3:] = False, False

@@ -56,6 +56,7 @@ def test_objects_that_stay_keep_their_track_numbers_in_any_order_of_detection(th
 
 
 def test_two_containers_that_exchange_places_keep_their_track_numbers():
+    """They pass each other on opposite sides, as in the videos."""
     tracks = Tracks()
     for share in np.linspace(0.0, 1.0, 8):
         smooth = share * share * (3 - 2 * share)
@@ -68,6 +69,7 @@ def test_two_containers_that_exchange_places_keep_their_track_numbers():
 
 
 def test_an_object_out_of_sight_keeps_its_place_and_its_track_number():
+    """Two objects are seen, then only the second, then the first one at other places."""
     tracks = Tracks()
     tracks.update(look_at([1, 2], [(0.0, 0.1), (0.1, -0.1)]))
 
@@ -112,6 +114,7 @@ def test_a_move_relative_to_the_tool_keeps_the_tool_s_yaw():
 
 
 def test_rare_moves_are_not_learned():
+    """A move whose share is below `RAREST` is left out."""
     usual, rare = (Move(True, 0.0, 0.0, z, "align", 0.0) for z in (0.1, 0.2))
     # One rare move among so many is below the share `RAREST`; among three it is not.
     often = [LookDecision(0, usual, 0)] * round(3 / RAREST)
