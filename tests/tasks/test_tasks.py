@@ -188,7 +188,7 @@ def disc_areas(scene, *kinds):
 
 @each_task
 def test_things_on_the_table_do_not_touch(task):
-    """Solid things and targets keep apart, and so do targets and sites; a cube may lie on a site."""
+    """Solid things and targets keep apart, and targets and sites; a cube may lie on a site."""
     for episode in episodes(task):
         # Cubes may lie where the video puts one back, as in RoboMME.
         for areas in (
